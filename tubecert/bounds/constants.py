@@ -1,0 +1,103 @@
+"""The constants of the certificates as values, and the table of what each one is.
+
+Console, JSON and docs read names, symbols, equations and units from `TABLE` and nowhere else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Witness:
+    """Where the value proven from below is attained: time in s (if it matters) and state, shape (n,)."""
+
+    t: float | None = None
+    x: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constant:
+    """A supremum (or infimum) enclosed: proven to lie in [below, above]."""
+
+    below: float
+    above: float
+    at: Witness | None = None
+
+    def __post_init__(self) -> None:
+        if not self.below <= self.above:  # NaN fails too
+            raise ValueError(f"empty enclosure [{self.below}, {self.above}]")
+
+    @staticmethod
+    def exactly(value: float) -> Constant:
+        """A value known exactly."""
+        return Constant(below=value, above=value)
+
+    @property
+    def gap(self) -> float:
+        """Relative width (above - below)/|above|; 0 for an exact value."""
+        return 0.0 if self.above == self.below else (self.above - self.below) / abs(self.above)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Meaning:
+    """What a constant is: symbol of the paper or of docs/theory, equation tag, unit, and words."""
+
+    symbol: str
+    equation: str
+    unit: str
+    words: str
+
+
+def _of(symbol: str, equation: str, unit: str, words: str) -> dict[str, Meaning]:
+    return {"meaning": Meaning(symbol=symbol, equation=equation, unit=unit, words=words)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundConstants:
+    """Every constant of certificates A, B and C over O(rho), each an enclosure.
+
+    The units are those of the states and inputs of the specification; "1" is dimensionless.
+    """
+
+    lower: Constant = field(metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M"))
+    upper: Constant = field(metadata=_of("A", "CCM_1", "1", "largest eigenvalue of the metric M"))
+    f: Constant = field(metadata=_of("Df", "assumption 3", "x/s", "sup |f|"))
+    f_x: Constant = field(metadata=_of("Dfx", "assumption 3", "1/s", "sup |df/dx|"))
+    B: Constant = field(metadata=_of("DB", "assumption 3", "x/(u s)", "sup |B|"))
+    B_x: Constant = field(metadata=_of("DBx", "assumption 3", "1/(u s)", "sup of the sum of |dB/dx_i|"))
+    b_x: Constant = field(metadata=_of("Dbx", "assumption 3", "1/(u s)", "sup of the sum of |db_j/dx|"))
+    B_pinv: Constant = field(metadata=_of("DBp", "assumption 5", "u s/x", "sup |B^+|"))
+    B_pinv_x: Constant = field(metadata=_of("DBpx", "assumption 5", "u s/x^2", "sup of the sum of |dB^+/dx_i|"))
+    M_x: Constant = field(metadata=_of("DMx", "bounds:M_x", "1/x", "sup of the sum of |dM/dx_i|"))
+    u_star: Constant = field(metadata=_of("Dus", "assumption 2", "u", "sup |u*|"))
+    h: Constant = field(metadata=_of("Dh", "assumption 4", "u", "sup |h|"))
+    h_x: Constant = field(metadata=_of("Dhx", "assumption 4", "u/x", "sup |dh/dx|"))
+    h_t: Constant = field(metadata=_of("Dht", "assumption 4", "u/s", "sup |dh/dt|"))
+    feedback_gain: Constant = field(
+        metadata=_of("du", "bounds:delta_u, corrected", "u/d", "|feedback| per Riemannian distance")
+    )
+    metric_input_gain: Constant = field(
+        metadata=_of("beta", "theory 4", "d/(u s)", "largest singular value of Theta B on the plan")
+    )
+    drift_on_plan: Constant = field(metadata=_of("phi", "theory 4", "x/s", "sup |f + B u*| over the tube"))
+    initial_distance: Constant = field(
+        metadata=_of("d0", "theory 4", "d", "length of the segment from x*(0) to x(0)")
+    )
+    plan_defect: Constant = field(metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|"))
+    plan_defect_metric: Constant = field(
+        metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
+    )
+    input_gain_least: Constant = field(
+        metadata=_of("smin(Theta B)", "bounds:delta_u", "d/(u s)", "inf of the smallest singular value of Theta B")
+    )
+    contraction_excess: Constant = field(
+        metadata=_of("lmax(F~)", "bounds:delta_u", "1/s", "sup of the largest eigenvalue of the pencil (F, W)")
+    )
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of every constant, in the order of the table."""
+        return [(item.name, getattr(self, item.name), item.metadata["meaning"]) for item in fields(self)]
+
+
+TABLE: dict[str, Meaning] = {item.name: item.metadata["meaning"] for item in fields(BoundConstants)}

@@ -1,0 +1,261 @@
+"""Vectorised interval arithmetic with outward rounding.
+
+An `Interval` is a pair of float64 arrays; every operation returns an enclosure of the exact result for all reals in
+its operands. IEEE operations are rounded to nearest and moved one float outward; library functions are not correctly
+rounded and are widened by several ulps. An undefined operation (0/0, sqrt of a negative, inf - inf) yields NaN bounds;
+`Interval.sanitised` turns those into [-inf, inf], so that NaN never reads as a bound.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# numpy's and libm's elementary functions are documented to 4 ulp; 8 units of 2**-53 relative are 4 to 8 ulp.
+_LIBRARY_ERROR: Final = 8 * 2.0**-53
+_TINY: Final = 1e-300  # covers gradual underflow of library functions
+_LARGEST_ANGLE: Final = 1e6  # beyond it the quadrant test below would need more than double precision
+
+
+def down(x: ArrayLike) -> Array:
+    """The next float64 below."""
+    return np.nextafter(x, -np.inf)
+
+
+def up(x: ArrayLike) -> Array:
+    """The next float64 above."""
+    return np.nextafter(x, np.inf)
+
+
+class Interval:
+    """Arrays `lo <= hi` of equal shape; the set of all x with lo <= x <= hi elementwise."""
+
+    __slots__ = ("hi", "lo")
+
+    # numpy must not take over `array + interval`
+    __array_ufunc__ = None
+
+    def __init__(self, lo: ArrayLike, hi: ArrayLike | None = None) -> None:
+        self.lo: Array = np.asarray(lo, dtype=np.float64)
+        self.hi: Array = self.lo if hi is None else np.asarray(hi, dtype=np.float64)
+
+    @staticmethod
+    def of(value: Interval | Fraction | ArrayLike) -> Interval:
+        """The tightest interval that contains `value` (floats are exact, fractions rounded outward)."""
+        if isinstance(value, Interval):
+            return value
+        if isinstance(value, (Fraction, int)):
+            return Interval(*fraction_bounds(Fraction(value)))
+        return Interval(value)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the bounds."""
+        return np.broadcast_shapes(self.lo.shape, self.hi.shape)
+
+    @property
+    def mid(self) -> Array:
+        """A float inside (or beside by rounding) each interval."""
+        return 0.5 * self.lo + 0.5 * self.hi
+
+    @property
+    def rad(self) -> Array:
+        """A radius about `mid` that covers each interval, rounded up."""
+        mid = self.mid
+        return np.maximum(up(self.hi - mid), up(mid - self.lo))
+
+    @property
+    def magnitude(self) -> Array:
+        """sup |x| over each interval."""
+        return np.maximum(-self.lo, self.hi)
+
+    @property
+    def mignitude(self) -> Array:
+        """inf |x| over each interval."""
+        return np.maximum(0.0, np.maximum(self.lo, -self.hi))
+
+    def sanitised(self) -> Interval:
+        """The same with NaN bounds opened to infinity."""
+        bad = np.isnan(self.lo) | np.isnan(self.hi)
+        return Interval(np.where(bad, -np.inf, self.lo), np.where(bad, np.inf, self.hi))
+
+    def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
+        """Elementwise lo <= x <= hi."""
+        return (self.lo <= x) & (x <= self.hi)
+
+    def hull(self, other: Interval) -> Interval:
+        """The smallest interval containing both."""
+        return Interval(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi))
+
+    def __getitem__(self, index: object) -> Interval:
+        return Interval(self.lo[index], self.hi[index])  # type: ignore[index]  # any numpy index
+
+    def __repr__(self) -> str:
+        return f"Interval({self.lo!r}, {self.hi!r})"
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.hi, -self.lo)
+
+    def __add__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        b = Interval.of(other)
+        return Interval(down(self.lo + b.lo), up(self.hi + b.hi))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        b = Interval.of(other)
+        return Interval(down(self.lo - b.hi), up(self.hi - b.lo))
+
+    def __rsub__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        return Interval.of(other) - self
+
+    def __mul__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        b = Interval.of(other)
+        if self.lo is self.hi and b.lo is b.hi:
+            product = self.lo * b.lo
+            return Interval(down(product), up(product))
+        p, q, r, s = self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi
+        return Interval(
+            down(np.minimum(np.minimum(p, q), np.minimum(r, s))),
+            up(np.maximum(np.maximum(p, q), np.maximum(r, s))),
+        )
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        b = Interval.of(other)
+        through_zero = ~((b.lo > 0) | (b.hi < 0))
+        p, q, r, s = self.lo / b.lo, self.lo / b.hi, self.hi / b.lo, self.hi / b.hi
+        lo = down(np.minimum(np.minimum(p, q), np.minimum(r, s)))
+        hi = up(np.maximum(np.maximum(p, q), np.maximum(r, s)))
+        return Interval(np.where(through_zero, np.nan, lo), np.where(through_zero, np.nan, hi))
+
+    def __rtruediv__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+        return Interval.of(other) / self
+
+    def __pow__(self, n: int) -> Interval:
+        if n < 0:
+            return 1.0 / self ** (-n)
+        if n % 2:
+            return Interval(_power(self.lo, n, upward=False), _power(self.hi, n, upward=True))
+        big, small = self.magnitude, self.mignitude
+        nan = np.isnan(self.lo) | np.isnan(self.hi)
+        lo, hi = _power(small, n, upward=False), _power(big, n, upward=True)
+        return Interval(np.where(nan, np.nan, lo), np.where(nan, np.nan, hi))
+
+
+def _power(x: Array, n: int, *, upward: bool) -> Array:
+    """x**n by repeated multiplication, rounded upward or downward; x >= 0 if n is even."""
+    magnitude = np.abs(x)
+    above, below = magnitude, magnitude
+    for _ in range(n - 1):
+        above, below = up(above * magnitude), np.maximum(0.0, down(below * magnitude))
+    return np.where(x >= 0, above, -below) if upward else np.where(x >= 0, below, -above)
+
+
+def fraction_bounds(q: Fraction) -> tuple[float, float]:
+    """The floats next to a rational number: `(lo, hi)` with lo <= q <= hi, equal if q is a float."""
+    try:
+        near = q.numerator / q.denominator
+    except OverflowError:
+        return (np.finfo(float).max, np.inf) if q > 0 else (-np.inf, -np.finfo(float).max)
+    exact = Fraction(near)
+    if exact == q:
+        return near, near
+    if exact < q:
+        return near, float(np.nextafter(near, np.inf))
+    return float(np.nextafter(near, -np.inf)), near
+
+
+PI: Final = Interval(np.pi, np.nextafter(np.pi, np.inf))  # float pi lies below pi
+
+
+def _widened(lo: Array, hi: Array) -> Interval:
+    return Interval(
+        lo - (_LIBRARY_ERROR * np.abs(lo) + _TINY),
+        hi + (_LIBRARY_ERROR * np.abs(hi) + _TINY),
+    )
+
+
+def sqrt(a: Interval) -> Interval:
+    """Square root; NaN where the operand reaches below 0."""
+    lo, hi = np.sqrt(a.lo), np.sqrt(a.hi)
+    return Interval(np.where(a.lo == 0, 0.0, np.maximum(down(lo), 0.0)), np.where(np.isnan(lo), np.nan, up(hi)))
+
+
+def exp(a: Interval) -> Interval:
+    """Exponential."""
+    wide = _widened(np.exp(a.lo), np.exp(a.hi))
+    return Interval(np.maximum(wide.lo, 0.0), wide.hi)
+
+
+def expm1(a: Interval) -> Interval:
+    """exp(a) - 1 without cancellation."""
+    return _widened(np.expm1(a.lo), np.expm1(a.hi))
+
+
+def log1p(a: Interval) -> Interval:
+    """log(1 + a) without cancellation; NaN where the operand reaches -1."""
+    wide = _widened(np.log1p(a.lo), np.log1p(a.hi))
+    bad = ~(a.lo > -1)
+    return Interval(np.where(bad, np.nan, wide.lo), np.where(bad, np.nan, wide.hi))
+
+
+def _touches(a: Interval, phase: float) -> NDArray[np.bool_]:
+    """Whether phase + 2 k pi may lie in `a` for some integer k; says yes in doubt."""
+    period = 2 * np.pi
+    slack = 1e-9  # the float error of the quotients is below 1e-9 for |x| <= 1e6
+    return np.ceil((a.lo - phase) / period - slack) <= np.floor((a.hi - phase) / period + slack)
+
+
+def _wave(a: Interval, function: np.ufunc, peak: float, trough: float) -> Interval:
+    left, right = function(a.lo), function(a.hi)
+    wide = _widened(np.minimum(left, right), np.maximum(left, right))
+    # near its zeros the relative error of a range reduction can be lost: allow an absolute one too
+    lo, hi = wide.lo - 2.0**-52, wide.hi + 2.0**-52
+    large = ~((np.abs(a.lo) <= _LARGEST_ANGLE) & (np.abs(a.hi) <= _LARGEST_ANGLE))
+    lo = np.where(_touches(a, trough) | large, -1.0, np.maximum(lo, -1.0))
+    hi = np.where(_touches(a, peak) | large, 1.0, np.minimum(hi, 1.0))
+    return Interval(lo, hi)
+
+
+def sin(a: Interval) -> Interval:
+    """Sine."""
+    return _wave(a, np.sin, np.pi / 2, -np.pi / 2)
+
+
+def cos(a: Interval) -> Interval:
+    """Cosine."""
+    return _wave(a, np.cos, 0.0, np.pi)
+
+
+def tan(a: Interval) -> Interval:
+    """Tangent; NaN where a pole may lie inside."""
+    wide = _widened(np.tan(a.lo), np.tan(a.hi))
+    doubled = Interval(2.0 * a.lo, 2.0 * a.hi)  # tan(x) has its poles where 2x = pi + 2 k pi
+    bad = _touches(doubled, np.pi) | ~((np.abs(a.lo) <= _LARGEST_ANGLE) & (np.abs(a.hi) <= _LARGEST_ANGLE))
+    return Interval(np.where(bad, np.nan, wide.lo - 2.0**-52), np.where(bad, np.nan, wide.hi + 2.0**-52))
+
+
+def norm(parts: list[Interval]) -> Interval:
+    """Euclidean norm; of one part its absolute value."""
+    if len(parts) == 1:
+        return Interval(parts[0].mignitude + 0 * parts[0].lo, parts[0].magnitude + 0 * parts[0].lo)
+    total = parts[0] ** 2
+    for part in parts[1:]:
+        total = total + part**2
+    return sqrt(Interval(np.maximum(total.lo, 0.0), total.hi))
+
+
+def direction(parts: list[Interval], index: int) -> Interval:
+    """The component parts[index]/norm(parts); any value in [-1, 1] where the norm may vanish."""
+    length = norm(parts)
+    ratio = parts[index] / length
+    bad = np.isnan(ratio.lo) | np.isnan(ratio.hi) | ~(length.lo > 0)
+    lo = np.where(bad, -1.0, np.clip(ratio.lo, -1.0, 1.0))
+    return Interval(lo, np.where(bad, 1.0, np.clip(ratio.hi, -1.0, 1.0)))

@@ -1,0 +1,50 @@
+"""The error family and the exit codes.
+
+Every failure that a user can cause or meet is a `TubecertError` that carries findings and an exit code; anything
+else that escapes is a defect of tubecert (exit code 3).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tubecert.findings import Finding
+
+
+class ExitCode(IntEnum):
+    """What a command's exit code means."""
+
+    CERTIFIED = 0
+    NOT_CERTIFIED = 1
+    INVALID = 2
+    INTERNAL = 3
+    UNDECIDED = 4
+    INTERRUPTED = 130
+
+
+class TubecertError(Exception):
+    """Something the user has to know, as findings, with the exit code it leads to."""
+
+    exit_code = ExitCode.INVALID
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("; ".join(f"{item.code}: {item.message}" for item in self.findings))
+
+
+class SpecError(TubecertError):
+    """The specification cannot be read or does not describe a system (exit code 2)."""
+
+
+class TargetError(TubecertError):
+    """A file cannot be read or written (exit code 2)."""
+
+
+class RefutedError(TubecertError):
+    """A claim that everything later rests on is false, with its witness (exit code 1)."""
+
+    exit_code = ExitCode.NOT_CERTIFIED

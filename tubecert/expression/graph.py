@@ -1,0 +1,373 @@
+"""Exact expressions: an immutable, hash-consed graph over rational constants.
+
+Structurally equal expressions are the same object, so a derivative of a large matrix shares its common parts and
+`is` decides structural equality. Constants are `Fraction`s and are folded exactly; nothing is ever rounded here.
+
+Simplification (0*e -> 0, e/e never) may forget that a part was undefined somewhere; the parser therefore records every
+partial operation as an obligation *before* the graph is built (see `parse`), and the model proves those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from itertools import count
+from typing import Final
+from weakref import WeakValueDictionary
+
+Number = int | Fraction
+
+_table: WeakValueDictionary[tuple[object, ...], Expression]
+_serial = count()
+
+
+class Expression:
+    """A node: an operation `op`, its arguments, and for some operations a `value`.
+
+    | op | args | value |
+    |---|---|---|
+    | `const` | - | the `Fraction` |
+    | `pi` | - | - |
+    | `symbol` | - | its name |
+    | `add`, `mul`, `div` | two | - |
+    | `pow` | base | integer exponent, not 0 or 1 |
+    | `sqrt`, `sin`, `cos`, `tan`, `exp` | one | - |
+    | `norm` | one or more | - (Euclidean norm; of one argument: its absolute value) |
+    | `direction` | those of a norm | i: the i-th component of args/norm(args), any value in [-1, 1] where norm is 0 |
+    """
+
+    __slots__ = ("__weakref__", "args", "op", "serial", "value")
+
+    op: str
+    args: tuple[Expression, ...]
+    value: Fraction | str | int | None
+    serial: int
+
+    def __add__(self, other: Expression | Number) -> Expression:
+        return add(self, as_expression(other))
+
+    __radd__ = __add__
+
+    def __mul__(self, other: Expression | Number) -> Expression:
+        return mul(self, as_expression(other))
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Expression:
+        return mul(constant(-1), self)
+
+    def __sub__(self, other: Expression | Number) -> Expression:
+        return add(self, -as_expression(other))
+
+    def __rsub__(self, other: Expression | Number) -> Expression:
+        return add(as_expression(other), -self)
+
+    def __truediv__(self, other: Expression | Number) -> Expression:
+        return div(self, as_expression(other))
+
+    def __rtruediv__(self, other: Expression | Number) -> Expression:
+        return div(as_expression(other), self)
+
+    def __pow__(self, exponent: int) -> Expression:
+        return power(self, exponent)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether this is a rational constant."""
+        return self.op == "const"
+
+    @property
+    def fraction(self) -> Fraction:
+        """The value of a rational constant."""
+        if not isinstance(self.value, Fraction):
+            raise TypeError(f"{self.op} is not a rational constant")
+        return self.value
+
+    def __repr__(self) -> str:
+        return to_text(self)
+
+
+_table = WeakValueDictionary()
+
+
+def _node(op: str, args: tuple[Expression, ...] = (), value: Fraction | str | int | None = None) -> Expression:
+    key = (op, value, *(id(arg) for arg in args))
+    found = _table.get(key)
+    if found is None:
+        found = Expression.__new__(Expression)
+        found.op, found.args, found.value, found.serial = op, args, value, next(_serial)
+        _table[key] = found
+    return found
+
+
+def constant(value: Number) -> Expression:
+    """A rational constant."""
+    return _node("const", (), Fraction(value))
+
+
+def symbol(name: str) -> Expression:
+    """A variable."""
+    return _node("symbol", (), name)
+
+
+ZERO: Final = constant(0)
+ONE: Final = constant(1)
+PI: Final = _node("pi")
+
+
+def as_expression(value: Expression | Number) -> Expression:
+    """`value` itself, or the constant it stands for."""
+    return value if isinstance(value, Expression) else constant(value)
+
+
+def add(a: Expression, b: Expression) -> Expression:
+    """a + b."""
+    if a.is_constant and b.is_constant:
+        return constant(a.fraction + b.fraction)
+    if a is ZERO:
+        return b
+    if b is ZERO:
+        return a
+    if _coefficient(a)[1] is _coefficient(b)[1]:
+        (p, rest), (q, _) = _coefficient(a), _coefficient(b)
+        return mul(constant(p + q), rest)
+    return _node("add", _ordered(a, b))
+
+
+def mul(a: Expression, b: Expression) -> Expression:
+    """a b; rational factors are collected in front, equal factors become powers."""
+    (p, a), (q, b) = _coefficient(a), _coefficient(b)
+    factor = p * q
+    if factor == 0:
+        return ZERO
+    if a is ONE:
+        product = b
+    elif b is ONE:
+        product = a
+    else:
+        (a_base, m), (b_base, n) = _base(a), _base(b)
+        product = power(a_base, m + n) if a_base is b_base else _node("mul", _ordered(a, b))
+    if factor == 1:
+        return product
+    return constant(factor) if product is ONE else _node("mul", (constant(factor), product))
+
+
+def div(a: Expression, b: Expression) -> Expression:
+    """a / b; a constant zero divisor raises `ZeroDivisionError`."""
+    if b.is_constant:
+        if b.fraction == 0:
+            raise ZeroDivisionError
+        return mul(constant(1 / b.fraction), a)
+    if a is ZERO:
+        return ZERO
+    p, numerator = _coefficient(a)
+    q, denominator = _coefficient(b)
+    return mul(constant(p / q), _node("div", (numerator, denominator)))
+
+
+def power(base: Expression, exponent: int) -> Expression:
+    """`base` to an integer power; 0 ** 0 is 1, 0 to a negative power raises `ZeroDivisionError`."""
+    if exponent == 0:
+        return ONE
+    if exponent == 1:
+        return base
+    if base.is_constant:
+        return constant(base.fraction**exponent)
+    if base.op == "pow":
+        return power(base.args[0], int(str(base.value)) * exponent)
+    p, rest = _coefficient(base)
+    return mul(constant(p**exponent), _node("pow", (rest,), exponent))
+
+
+def sqrt(e: Expression) -> Expression:
+    """Square root."""
+    if e in (ZERO, ONE):
+        return e
+    return _node("sqrt", (e,))
+
+
+def sin(e: Expression) -> Expression:
+    """Sine."""
+    return ZERO if e is ZERO else _node("sin", (e,))
+
+
+def cos(e: Expression) -> Expression:
+    """Cosine."""
+    return ONE if e is ZERO else _node("cos", (e,))
+
+
+def tan(e: Expression) -> Expression:
+    """Tangent."""
+    return ZERO if e is ZERO else _node("tan", (e,))
+
+
+def exp(e: Expression) -> Expression:
+    """Exponential."""
+    return ONE if e is ZERO else _node("exp", (e,))
+
+
+def norm(args: Iterable[Expression]) -> Expression:
+    """Euclidean norm of the arguments; of one argument, its absolute value."""
+    kept = tuple(arg for arg in args if arg is not ZERO)
+    if not kept:
+        return ZERO
+    if len(kept) == 1 and kept[0].is_constant:
+        return constant(abs(kept[0].fraction))
+    return _node("norm", kept)
+
+
+def _direction(args: tuple[Expression, ...], index: int) -> Expression:
+    return _node("direction", args, index)
+
+
+def _coefficient(e: Expression) -> tuple[Fraction, Expression]:
+    """`(q, rest)` with e = q rest and rest free of a leading rational factor."""
+    if e.is_constant:
+        return e.fraction, ONE
+    if e.op == "mul" and e.args[0].is_constant:
+        return e.args[0].fraction, e.args[1]
+    return Fraction(1), e
+
+
+def _base(e: Expression) -> tuple[Expression, int]:
+    return (e.args[0], int(str(e.value))) if e.op == "pow" else (e, 1)
+
+
+def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
+    return (a, b) if a.serial <= b.serial else (b, a)
+
+
+def rebuild(e: Expression, args: tuple[Expression, ...]) -> Expression:
+    """The operation of `e` applied to other arguments."""
+    unary = {"sqrt": sqrt, "sin": sin, "cos": cos, "tan": tan, "exp": exp}
+    if e.op in unary:
+        return unary[e.op](args[0])
+    if e.op == "add":
+        return add(*args)
+    if e.op == "mul":
+        return mul(*args)
+    if e.op == "div":
+        return div(*args)
+    if e.op == "pow":
+        return power(args[0], int(str(e.value)))
+    if e.op == "norm":
+        return norm(args)
+    if e.op == "direction":
+        return _direction(args, int(str(e.value)))
+    return e
+
+
+def topological(roots: Iterable[Expression]) -> list[Expression]:
+    """Every node that `roots` need, arguments before their users; no recursion, any depth."""
+    order: list[Expression] = []
+    seen: set[Expression] = set()
+    stack = [(root, False) for root in reversed(list(roots))]
+    while stack:
+        node, expanded = stack.pop()
+        if expanded:
+            order.append(node)
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            stack.extend((arg, False) for arg in reversed(node.args) if arg not in seen)
+    return order
+
+
+def free_symbols(roots: Iterable[Expression]) -> frozenset[str]:
+    """Names of the variables that occur."""
+    return frozenset(str(node.value) for node in topological(roots) if node.op == "symbol")
+
+
+def substitute(roots: Iterable[Expression], values: Mapping[str, Expression]) -> list[Expression]:
+    """The expressions with variables replaced (simultaneously)."""
+    roots = list(roots)
+    new: dict[Expression, Expression] = {}
+    for node in topological(roots):
+        if node.op == "symbol":
+            new[node] = values.get(str(node.value), node)
+        else:
+            args = tuple(new[arg] for arg in node.args)
+            new[node] = node if args == node.args else rebuild(node, args)
+    return [new[root] for root in roots]
+
+
+def derivatives(roots: Iterable[Expression], name: str) -> list[Expression]:
+    """d(root)/d(name) for every root. A norm is differentiated to its generalised gradient (see `direction`)."""
+    roots = list(roots)
+    slope: dict[Expression, Expression] = {}
+    for node in topological(roots):
+        if node.op == "symbol":
+            slope[node] = ONE if node.value == name else ZERO
+        elif any(slope[arg] is not ZERO for arg in node.args):
+            slope[node] = _slope(node, [slope[arg] for arg in node.args])
+        else:
+            slope[node] = ZERO
+    return [slope[root] for root in roots]
+
+
+def derivative(e: Expression, name: str) -> Expression:
+    """de/d(name)."""
+    return derivatives([e], name)[0]
+
+
+def _slope(e: Expression, d: list[Expression]) -> Expression:
+    """The chain rule at one node, given the derivatives `d` of its arguments."""
+    u = e.args[0]
+    match e.op:
+        case "add":
+            return d[0] + d[1]
+        case "mul":
+            return d[0] * e.args[1] + u * d[1]
+        case "div":
+            return d[0] / e.args[1] - e * d[1] / e.args[1]
+        case "pow":
+            n = int(str(e.value))
+            return n * power(u, n - 1) * d[0]
+        case "sqrt":
+            return d[0] / (2 * e)
+        case "sin":
+            return cos(u) * d[0]
+        case "cos":
+            return -sin(u) * d[0]
+        case "tan":
+            return (1 + e**2) * d[0]
+        case "exp":
+            return e * d[0]
+        case "norm":
+            terms = (_direction(e.args, i) * slope for i, slope in enumerate(d))
+            return sum(terms, start=ZERO)
+    raise ValueError(f"{e.op} has no derivative")
+
+
+def to_text(e: Expression) -> str:
+    """Text in the specification's grammar that parses back to the same expression."""
+    text: dict[Expression, tuple[str, int]] = {}  # with binding strength: 0 sum, 1 product, 2 power, 3 atom
+
+    def wrap(node: Expression, least: int) -> str:
+        words, strength = text[node]
+        return words if strength >= least else f"({words})"
+
+    for node in topological([e]):
+        a = node.args
+        match node.op:
+            case "const":
+                q = node.fraction
+                words = str(q.numerator) if q.denominator == 1 else f"{q.numerator}/{q.denominator}"
+                text[node] = words, 3 if q >= 0 and q.denominator == 1 else 1 if q >= 0 else 0
+            case "pi":
+                text[node] = "pi", 3
+            case "symbol":
+                text[node] = str(node.value), 3
+            case "add":
+                text[node] = f"{wrap(a[0], 0)} + {wrap(a[1], 1)}", 0
+            case "mul":
+                text[node] = f"{wrap(a[0], 1)}*{wrap(a[1], 2)}", 1
+            case "div":
+                text[node] = f"{wrap(a[0], 1)}/{wrap(a[1], 2)}", 1
+            case "pow":
+                text[node] = f"{wrap(a[0], 3)}**{f'({node.value})' if int(str(node.value)) < 0 else node.value}", 2
+            case "norm" if len(a) == 1:
+                text[node] = f"abs({text[a[0]][0]})", 3
+            case _:
+                text[node] = f"{node.op}({', '.join(text[arg][0] for arg in a)})", 3
+    return text[e][0]
