@@ -1,6 +1,14 @@
 """Exact expressions: text in, hash-consed graph over Fractions out; derivatives by our own rules.
 
-In: text of the specification. Out: `Expression`s and the obligations of their partial operations. Trusted: yes.
+In: text of the specification. Out: `Expression`s and the obligations of their partial operations. Trusted:
+yes.
+
+| module | what it does |
+|---|---|
+| `graph` | the hash-consed graph, exact folding, derivatives |
+| `text` | graph -> text in the grammar of the specification |
+| `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
+| `zero` | proves that an expression vanishes identically |
 """
 
 from tubecert.expression.graph import (
@@ -23,15 +31,22 @@ from tubecert.expression.graph import (
     substitute,
     symbol,
     tan,
-    to_text,
     topological,
 )
+from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
+from tubecert.expression.scan import FUNCTIONS, ExpressionError
+from tubecert.expression.text import number_text, to_text
+from tubecert.expression.zero import is_zero
 
 __all__ = [
+    "FUNCTIONS",
     "ONE",
     "PI",
     "ZERO",
     "Expression",
+    "ExpressionError",
+    "Obligation",
+    "Parsed",
     "as_expression",
     "constant",
     "cos",
@@ -39,7 +54,11 @@ __all__ = [
     "derivatives",
     "exp",
     "free_symbols",
+    "is_zero",
     "norm",
+    "number_text",
+    "parse",
+    "parse_number",
     "power",
     "rebuild",
     "sin",

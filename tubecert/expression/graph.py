@@ -1,10 +1,12 @@
 """Exact expressions: an immutable, hash-consed graph over rational constants.
 
-Structurally equal expressions are the same object, so a derivative of a large matrix shares its common parts and
-`is` decides structural equality. Constants are `Fraction`s and are folded exactly; nothing is ever rounded here.
+Structurally equal expressions are the same object, so a derivative of a large matrix shares its common parts
+and `is` decides structural equality. Constants are `Fraction`s and are folded exactly; nothing is ever
+rounded here.
 
-Simplification (0*e -> 0, e/e never) may forget that a part was undefined somewhere; the parser therefore records every
-partial operation as an obligation *before* the graph is built (see `parse`), and the model proves those.
+Simplification (0*e -> 0, e/e never) may forget that a part was undefined somewhere; the parser therefore
+records every partial operation as an obligation *before* the graph is built (see `parse`), and the model
+proves those.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import count
+from math import isqrt
 from typing import Final
 from weakref import WeakValueDictionary
 
@@ -33,7 +36,7 @@ class Expression:
     | `pow` | base | integer exponent, not 0 or 1 |
     | `sqrt`, `sin`, `cos`, `tan`, `exp` | one | - |
     | `norm` | one or more | - (Euclidean norm; of one argument: its absolute value) |
-    | `direction` | those of a norm | i: the i-th component of args/norm(args), any value in [-1, 1] where norm is 0 |
+    | `direction` | those of a norm | i: component i of args/norm(args); where norm is 0, any in [-1, 1] |
     """
 
     __slots__ = ("__weakref__", "args", "op", "serial", "value")
@@ -84,13 +87,17 @@ class Expression:
         return self.value
 
     def __repr__(self) -> str:
+        from tubecert.expression.text import to_text
+
         return to_text(self)
 
 
 _table = WeakValueDictionary()
 
 
-def _node(op: str, args: tuple[Expression, ...] = (), value: Fraction | str | int | None = None) -> Expression:
+def _node(
+    op: str, args: tuple[Expression, ...] = (), value: Fraction | str | int | None = None
+) -> Expression:
     key = (op, value, *(id(arg) for arg in args))
     found = _table.get(key)
     if found is None:
@@ -121,22 +128,22 @@ def as_expression(value: Expression | Number) -> Expression:
 
 
 def add(a: Expression, b: Expression) -> Expression:
-    """a + b."""
+    """The sum a + b."""
     if a.is_constant and b.is_constant:
         return constant(a.fraction + b.fraction)
     if a is ZERO:
         return b
     if b is ZERO:
         return a
-    if _coefficient(a)[1] is _coefficient(b)[1]:
-        (p, rest), (q, _) = _coefficient(a), _coefficient(b)
+    if coefficient(a)[1] is coefficient(b)[1]:
+        (p, rest), (q, _) = coefficient(a), coefficient(b)
         return mul(constant(p + q), rest)
     return _node("add", _ordered(a, b))
 
 
 def mul(a: Expression, b: Expression) -> Expression:
-    """a b; rational factors are collected in front, equal factors become powers."""
-    (p, a), (q, b) = _coefficient(a), _coefficient(b)
+    """The product a b; rational factors are collected in front, equal factors become powers."""
+    (p, a), (q, b) = coefficient(a), coefficient(b)
     factor = p * q
     if factor == 0:
         return ZERO
@@ -153,15 +160,15 @@ def mul(a: Expression, b: Expression) -> Expression:
 
 
 def div(a: Expression, b: Expression) -> Expression:
-    """a / b; a constant zero divisor raises `ZeroDivisionError`."""
+    """The quotient a / b; a constant zero divisor raises `ZeroDivisionError`."""
     if b.is_constant:
         if b.fraction == 0:
             raise ZeroDivisionError
         return mul(constant(1 / b.fraction), a)
     if a is ZERO:
         return ZERO
-    p, numerator = _coefficient(a)
-    q, denominator = _coefficient(b)
+    p, numerator = coefficient(a)
+    q, denominator = coefficient(b)
     return mul(constant(p / q), _node("div", (numerator, denominator)))
 
 
@@ -175,14 +182,16 @@ def power(base: Expression, exponent: int) -> Expression:
         return constant(base.fraction**exponent)
     if base.op == "pow":
         return power(base.args[0], int(str(base.value)) * exponent)
-    p, rest = _coefficient(base)
+    p, rest = coefficient(base)
     return mul(constant(p**exponent), _node("pow", (rest,), exponent))
 
 
 def sqrt(e: Expression) -> Expression:
-    """Square root."""
-    if e in (ZERO, ONE):
-        return e
+    """Square root; of the square of a rational, that rational."""
+    if e.is_constant and e.fraction >= 0:
+        top, bottom = isqrt(e.fraction.numerator), isqrt(e.fraction.denominator)
+        if (top * top, bottom * bottom) == e.fraction.as_integer_ratio():
+            return constant(Fraction(top, bottom))
     return _node("sqrt", (e,))
 
 
@@ -220,7 +229,7 @@ def _direction(args: tuple[Expression, ...], index: int) -> Expression:
     return _node("direction", args, index)
 
 
-def _coefficient(e: Expression) -> tuple[Fraction, Expression]:
+def coefficient(e: Expression) -> tuple[Fraction, Expression]:
     """`(q, rest)` with e = q rest and rest free of a leading rational factor."""
     if e.is_constant:
         return e.fraction, ONE
@@ -292,7 +301,7 @@ def substitute(roots: Iterable[Expression], values: Mapping[str, Expression]) ->
 
 
 def derivatives(roots: Iterable[Expression], name: str) -> list[Expression]:
-    """d(root)/d(name) for every root. A norm is differentiated to its generalised gradient (see `direction`)."""
+    """d(root)/d(name) for every root; of a norm its generalised gradient (see `direction`)."""
     roots = list(roots)
     slope: dict[Expression, Expression] = {}
     for node in topological(roots):
@@ -337,37 +346,3 @@ def _slope(e: Expression, d: list[Expression]) -> Expression:
             terms = (_direction(e.args, i) * slope for i, slope in enumerate(d))
             return sum(terms, start=ZERO)
     raise ValueError(f"{e.op} has no derivative")
-
-
-def to_text(e: Expression) -> str:
-    """Text in the specification's grammar that parses back to the same expression."""
-    text: dict[Expression, tuple[str, int]] = {}  # with binding strength: 0 sum, 1 product, 2 power, 3 atom
-
-    def wrap(node: Expression, least: int) -> str:
-        words, strength = text[node]
-        return words if strength >= least else f"({words})"
-
-    for node in topological([e]):
-        a = node.args
-        match node.op:
-            case "const":
-                q = node.fraction
-                words = str(q.numerator) if q.denominator == 1 else f"{q.numerator}/{q.denominator}"
-                text[node] = words, 3 if q >= 0 and q.denominator == 1 else 1 if q >= 0 else 0
-            case "pi":
-                text[node] = "pi", 3
-            case "symbol":
-                text[node] = str(node.value), 3
-            case "add":
-                text[node] = f"{wrap(a[0], 0)} + {wrap(a[1], 1)}", 0
-            case "mul":
-                text[node] = f"{wrap(a[0], 1)}*{wrap(a[1], 2)}", 1
-            case "div":
-                text[node] = f"{wrap(a[0], 1)}/{wrap(a[1], 2)}", 1
-            case "pow":
-                text[node] = f"{wrap(a[0], 3)}**{f'({node.value})' if int(str(node.value)) < 0 else node.value}", 2
-            case "norm" if len(a) == 1:
-                text[node] = f"abs({text[a[0]][0]})", 3
-            case _:
-                text[node] = f"{node.op}({', '.join(text[arg][0] for arg in a)})", 3
-    return text[e][0]

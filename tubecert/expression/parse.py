@@ -1,0 +1,263 @@
+"""Text -> exact expression, and an obligation for every operation that is not defined everywhere.
+
+Python's `ast` supplies the structure; nothing is evaluated. Numbers are read from their source text.
+Obligations are recorded before the graph simplifies: 0*tan(x) is 0 in the graph, and yet x must stay off the
+poles.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final, Literal
+
+from tubecert.expression import graph
+from tubecert.expression.graph import Expression
+from tubecert.expression.scan import ARITIES, ExpressionError, Kind, Vocabulary, normalise_spaces, scan
+
+MAX_EXPONENT: Final = 12
+MAX_NESTED_EXPONENT: Final = 144
+MAX_BITS: Final = 5_000
+
+_UNARY = {"sin": graph.sin, "cos": graph.cos, "tan": graph.tan, "exp": graph.exp, "sqrt": graph.sqrt}
+_NOT_FINITE = frozenset({"nan", "inf", "infinity"})
+_NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obligation:
+    """What must hold for an operation to be defined (and C1): `argument` is `nonzero`, or `positive`.
+
+    A divisor and the base of a negative power must be nonzero, so must cos(u) for tan(u); the argument of
+    sqrt must be positive (sqrt is not C1 at 0). `offset` and `width` locate the operation in its text, of
+    which `text` is that part.
+    """
+
+    kind: Literal["nonzero", "positive"]
+    argument: Expression
+    offset: int
+    width: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parsed:
+    """An expression with everything that must be proven before it may be used."""
+
+    expression: Expression
+    obligations: tuple[Obligation, ...]
+
+
+def parse(
+    text: str,
+    *,
+    symbols: Mapping[str, Expression],
+    kinks: bool = False,
+    refused: Mapping[str, str] | None = None,
+) -> Parsed:
+    """The expression that `text` stands for; raises `ExpressionError`.
+
+    `symbols` are the names it may use (with what they stand for), `kinks` allows abs and norm, and `refused`
+    gives the reason why a name that exists elsewhere is not allowed here.
+    """
+    line = normalise_spaces(text)
+    scan(line, Vocabulary(symbols=symbols.keys(), kinks=kinks, refused=refused or {}))
+    return _Lowering(line, symbols).run(_tree(line))
+
+
+def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fraction:
+    """The rational that `text` stands for: a number or an expression of numbers and parameters."""
+    word = text.strip()
+    bare = word.lower().lstrip("+-.")
+    width = max(1, len(word))
+    start = len(text) - len(text.lstrip()) if word else 0
+    if bare in _NOT_FINITE:
+        raise ExpressionError(
+            f"{word} is not a finite number", offset=start, width=width, kind="value", help="write a number"
+        )
+    if bare in _NOT_NUMBERS or not word:
+        what = f"{word} is not a number" if word else "a number is missing"
+        raise ExpressionError(
+            what, offset=start, width=width, kind="value", help="write a number such as 0.1 or 1e-3"
+        )
+    known = {name: graph.constant(value) for name, value in (symbols or {}).items()}
+    value = parse(text, symbols=known).expression
+    if not value.is_constant:
+        raise ExpressionError(
+            f"{word[:60]} is not a rational number",
+            offset=start,
+            width=width,
+            kind="value",
+            help="write it as a decimal or a fraction; numbers here are exact",
+        )
+    return value.fraction
+
+
+def _tree(line: str) -> ast.expr:
+    """Python's parse of the scanned text. The parentheses allow leading blanks and shift offsets by one."""
+    try:
+        return ast.parse(f"({line})", mode="eval").body
+    except (RecursionError, MemoryError):
+        raise ExpressionError("the expression is nested too deeply", help="split it", kind="limit") from None
+    except (SyntaxError, ValueError) as error:
+        offset = min(max((getattr(error, "offset", None) or 2) - 2, 0), len(line))
+        raise ExpressionError("this is not an expression", offset=offset) from None
+
+
+class _Lowering:
+    """Builds the graph bottom-up, without recursion, and collects obligations on the way."""
+
+    def __init__(self, line: str, symbols: Mapping[str, Expression]) -> None:
+        self.line, self.symbols = line, symbols
+        self.obligations: list[Obligation] = []
+        self.values: dict[ast.expr, Expression] = {}
+        self.growth: dict[ast.expr, int] = {}  # the product of the exponents above a leaf
+
+    def run(self, root: ast.expr) -> Parsed:
+        """Every node after its operands, the leftmost first."""
+        stack, order = [root], []
+        while stack:
+            node = stack.pop()
+            order.append(node)
+            stack.extend(self._operands(node))
+        for node in reversed(order):
+            operands = self._operands(node)
+            self.growth[node] = max((self.growth[operand] for operand in operands), default=1)
+            try:
+                self.values[node] = self._lower(node)
+            except ZeroDivisionError:
+                raise self._error(node, "division by zero", kind="value") from None
+            self._bound(node)
+        self.obligations.sort(key=lambda item: (item.offset, item.width))
+        return Parsed(expression=self.values[root], obligations=tuple(self.obligations))
+
+    def _operands(self, node: ast.expr) -> list[ast.expr]:
+        match node:
+            case ast.BinOp(left, ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow(), right):
+                return [left, right]
+            case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
+                return [operand]
+            case ast.Call(ast.Name(name), args, []) if name in ARITIES:
+                return list(args)
+            case ast.Name() | ast.Constant(int() | float()):
+                return []
+        raise self._error(node, "this is not part of the grammar of expressions")
+
+    def _lower(self, node: ast.expr) -> Expression:
+        match node:
+            case ast.BinOp(left, ast.Pow(), _):
+                return self._power(node, left)
+            case ast.BinOp(left, ast.Div(), right):
+                self._owe("nonzero", self.values[right], node)
+                return self.values[left] / self.values[right]
+            case ast.BinOp(left, operator, right):
+                a, b = self.values[left], self.values[right]
+                return (
+                    a + b
+                    if isinstance(operator, ast.Add)
+                    else a - b
+                    if isinstance(operator, ast.Sub)
+                    else a * b
+                )
+            case ast.UnaryOp(operator, operand):
+                value = self.values[operand]
+                return -value if isinstance(operator, ast.USub) else value
+            case ast.Call(ast.Name(name), args):
+                return self._call(node, name, [self.values[arg] for arg in args])
+            case ast.Name("pi"):
+                return graph.PI
+            case ast.Name(name):
+                return self.symbols[name]
+        return graph.constant(Fraction(self._source(node)))
+
+    def _call(self, node: ast.expr, name: str, args: list[Expression]) -> Expression:
+        arity = ARITIES[name]
+        if not args or (arity is not None and len(args) != arity):
+            wanted = "one argument" if arity else "at least one argument"
+            raise self._error(node, f"{name} takes {wanted}, not {len(args)}")
+        if name in ("abs", "norm"):
+            return graph.norm(args)
+        if name == "tan":
+            self._owe("nonzero", graph.cos(args[0]), node)
+        if name == "sqrt":
+            if args[0].is_constant and args[0].fraction <= 0:
+                reason = "is not real" if args[0].fraction < 0 else "is not differentiable"
+                raise self._error(node, f"{self._source(node)[:60]} {reason}", kind="value")
+            self._owe("positive", args[0], node)
+        return _UNARY[name](args[0])
+
+    def _power(self, node: ast.BinOp, left: ast.expr) -> Expression:
+        base, n = self.values[left], self._exponent(node)
+        self.growth[node] = self.growth[left] * max(1, abs(n))
+        if self.growth[node] > MAX_NESTED_EXPONENT:
+            raise self._error(node, f"nested powers exceed {MAX_NESTED_EXPONENT} in total", kind="limit")
+        if _bits(base) * abs(n) > MAX_BITS:
+            raise self._too_big(node)
+        if n < 0:
+            self._owe("nonzero", base, node)
+        return graph.power(base, n)
+
+    def _exponent(self, node: ast.BinOp) -> int:
+        value, words = self.values[node.right], self._source(node.right)[:40]
+        if value.is_constant and value.fraction == Fraction(1, 2):
+            raise self._error(node.right, "the exponent must be an integer", help="write sqrt(...)")
+        if not value.is_constant or value.fraction.denominator != 1:
+            raise self._error(
+                node.right,
+                f"the exponent {words} is not an integer",
+                help="exponents are integers; sqrt and exp are functions",
+            )
+        if abs(value.fraction) > MAX_EXPONENT:
+            raise self._error(
+                node.right,
+                f"the exponent {words} is beyond {MAX_EXPONENT}",
+                help="write a product",
+                kind="limit",
+            )
+        return value.fraction.numerator
+
+    def _owe(self, kind: Literal["nonzero", "positive"], argument: Expression, node: ast.expr) -> None:
+        if argument.is_constant and argument.fraction != 0:
+            return  # holds: a nonzero divisor, or an argument of sqrt that was seen to be positive
+        offset, width = self._place(node)
+        text = self.line[offset : offset + width]
+        self.obligations.append(
+            Obligation(kind=kind, argument=argument, offset=offset, width=width, text=text)
+        )
+
+    def _bound(self, node: ast.expr) -> None:
+        """Neither the constants nor the powers that folding creates may grow without end."""
+        value = self.values[node]
+        if _bits(value) > MAX_BITS:
+            raise self._too_big(node)
+        _, rest = graph.coefficient(value)
+        if rest.op == "pow" and abs(int(str(rest.value))) > MAX_NESTED_EXPONENT:
+            raise self._error(node, f"powers exceed {MAX_NESTED_EXPONENT} in total", kind="limit")
+
+    def _too_big(self, node: ast.expr) -> ExpressionError:
+        return self._error(
+            node,
+            "a constant in this part is too long",
+            help=f"at most {MAX_BITS} bits are kept",
+            kind="limit",
+        )
+
+    def _place(self, node: ast.expr) -> tuple[int, int]:
+        offset = max(node.col_offset - 1, 0)
+        return offset, max(1, (node.end_col_offset or node.col_offset + 1) - 1 - offset)
+
+    def _source(self, node: ast.expr) -> str:
+        offset, width = self._place(node)
+        return self.line[offset : offset + width]
+
+    def _error(self, node: ast.expr, message: str, help: str = "", kind: Kind = "syntax") -> ExpressionError:
+        offset, width = self._place(node)
+        return ExpressionError(message, help=help, offset=offset, width=width, kind=kind)
+
+
+def _bits(e: Expression) -> int:
+    """Size of the rational factor of `e`."""
+    q, _ = graph.coefficient(e)
+    return max(q.numerator.bit_length(), q.denominator.bit_length()) if abs(q) != 1 else 0

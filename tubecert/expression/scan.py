@@ -1,0 +1,328 @@
+"""The linear look at an expression's text before anything parses it.
+
+It bounds length, nesting and numbers, knows every name, and finds what people write by mistake (`^`, `2x`,
+`0x10`, a pasted minus sign), so that Python's own parser afterwards meets only short, shallow, well-formed
+text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Final, Literal
+
+MAX_LENGTH: Final = 4_000
+MAX_DEPTH: Final = 50
+MAX_SIGNS: Final = 50
+MAX_NUMBER_LENGTH: Final = 40
+MAX_NUMBER_EXPONENT: Final = 300
+
+ARITIES: Final[Mapping[str, int | None]] = {
+    "sin": 1,
+    "cos": 1,
+    "tan": 1,
+    "exp": 1,
+    "sqrt": 1,
+    "abs": 1,
+    "norm": None,
+}
+FUNCTIONS: Final = tuple(ARITIES)
+KINKED: Final = frozenset({"abs", "norm"})
+
+Kind = Literal["syntax", "symbol", "limit", "value"]
+
+
+class ExpressionError(ValueError):
+    """What is wrong with an expression, `offset` characters into its text, and what to write instead."""
+
+    def __init__(
+        self, message: str, *, help: str = "", offset: int = 0, width: int = 1, kind: Kind = "syntax"
+    ) -> None:
+        super().__init__(message)
+        self.message, self.help, self.offset, self.width, self.kind = message, help, offset, width, kind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vocabulary:
+    """The names an expression may use; `refused` says of other known names why they are not allowed here."""
+
+    symbols: Collection[str]
+    kinks: bool = False
+    refused: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    kind: Literal["number", "name", "operator"]
+    text: str
+    offset: int
+
+    def error(self, message: str, help: str = "", kind: Kind = "syntax") -> ExpressionError:
+        return ExpressionError(message, help=help, offset=self.offset, width=len(self.text), kind=kind)
+
+
+_TOKEN = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+    r"|(?P<operator>\*\*|[-+*/(),])"
+)
+# Longest first: what is no part of the grammar, and what to write instead.
+_FOREIGN = {
+    "//": "there is no floor division; write / for a quotient",
+    "<<": "there are no bit operations",
+    ">>": "there are no bit operations",
+    ":=": "an expression assigns nothing",
+    "==": "an expression compares nothing; write one side only",
+    "!=": "an expression compares nothing; write one side only",
+    "<": "an expression compares nothing",
+    ">": "an expression compares nothing",
+    "=": "an expression assigns nothing; write the right-hand side only",
+    "^": "write ** for a power",
+    "%": "there is no remainder operation",
+    "@": "write products entry by entry",
+    "&": "there are no bit operations",
+    "|": "write abs(x) for an absolute value (in h only)",
+    "~": "there are no bit operations",
+    "!": "there is no factorial",
+    "[": "an entry is one scalar expression; group with parentheses",
+    "]": "an entry is one scalar expression; group with parentheses",
+    "{": "group with parentheses",
+    "}": "group with parentheses",
+    "'": "an expression contains no text in quotes",
+    '"': "an expression contains no text in quotes",
+    ";": "write one expression",
+    ":": "write one expression",
+    "#": "an expression contains no comment",
+    "\\": "write one expression, on as many lines as you like, without backslashes",
+    "`": "an expression contains no quotes",
+    "?": "remove it",
+    "$": "remove it",
+}
+_LOOKALIKES = {
+    "\u2212": "-", "\u2010": "-", "\u2011": "-", "\u2012": "-", "\u2013": "-", "\u2014": "-", "\ufe63": "-",
+    "\uff0d": "-", "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u2217": "*", "\u2219": "*", "\u2022": "*",
+    "\u00f7": "/", "\u2215": "/", "\u2044": "/", "\u00b2": "**2", "\u00b3": "**3", "\u2074": "**4",
+    "\u221a": "sqrt(...)", "\u03c0": "pi", "\u2018": "no quotes", "\u2019": "no quotes", "\u00a0": "a space",
+    "\u202f": "a space", "\u2009": "a space", "\uff08": "(", "\uff09": ")", "\uff0c": ",",
+}  # fmt: skip
+
+
+def normalise_spaces(text: str) -> str:
+    """Line breaks and tabs as spaces, so that a text may span lines; offsets stay."""
+    return text.translate({ord(c): " " for c in "\t\n\r\f\v"})
+
+
+def scan(text: str, vocabulary: Vocabulary) -> None:
+    """Raises `ExpressionError` unless `text` is a bounded sequence of known words in a sensible order."""
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(
+            f"the expression has {len(text)} characters; at most {MAX_LENGTH} are read",
+            help="split it, or use shorter names",
+            kind="limit",
+        )
+    if not text.strip():
+        raise ExpressionError("the expression is empty", help="write 0 if zero is meant")
+    walk = _Walk(vocabulary)
+    for token in _tokens(text):
+        walk.step(token)
+    walk.finish(text)
+
+
+def _tokens(text: str) -> Iterator[_Token]:
+    position = 0
+    while position < len(text):
+        if text[position] == " ":
+            position += 1
+        elif match := _TOKEN.match(text, position):
+            yield _token(text, match)
+            position = match.end()
+        else:
+            raise _foreign(text, position)
+
+
+def _token(text: str, match: re.Match[str]) -> _Token:
+    word = match.group()
+    if match.lastgroup == "operator":
+        if word == "/" and text.startswith("//", match.start()):
+            raise _foreign(text, match.start())
+        return _Token("operator", word, match.start())
+    if match.lastgroup == "name":
+        return _Token("name", word, match.start())
+    token = _Token("number", word, match.start())
+    _check_number(token)
+    tail = re.compile(r"[A-Za-z0-9_.]*").match(text, match.end())
+    if tail and tail.group():
+        raise _glued(token, tail.group())
+    return token
+
+
+def _check_number(token: _Token) -> None:
+    digits, _, exponent = token.text.lower().partition("e")
+    if len(token.text) > MAX_NUMBER_LENGTH:
+        raise token.error(
+            f"the number has {len(token.text)} characters; at most {MAX_NUMBER_LENGTH} are read", kind="limit"
+        )
+    if exponent and abs(int(exponent)) > MAX_NUMBER_EXPONENT:
+        raise token.error(
+            f"the exponent of {token.text} is beyond {MAX_NUMBER_EXPONENT}",
+            "choose units in which the numbers are moderate",
+            "limit",
+        )
+    if digits.isdigit() and len(digits) > 1 and digits[0] == "0":
+        raise token.error(f"{token.text} has leading zeros", f"write {token.text.lstrip('0') or '0'}")
+
+
+def _glued(token: _Token, tail: str) -> ExpressionError:
+    """The error for a number that runs into something."""
+    whole = _Token("number", token.text + tail, token.offset)
+    if token.text == "0" and tail[0] in "xXoObB":
+        return whole.error(f"{whole.text} is not a decimal number", "write numbers in decimal")
+    if tail[0] == "_" and tail[1:2].isdigit():
+        return whole.error("numbers have no separators", f"write {whole.text.replace('_', '')}")
+    if tail in ("j", "J"):
+        return whole.error("there are no imaginary numbers")
+    if tail in ("e", "E"):
+        return whole.error(
+            f"the exponent of {whole.text} is missing", f"write {token.text}e0 or {token.text}*e"
+        )
+    if tail[0] == "." or tail[0].isdigit():
+        return whole.error(f"{whole.text} is not a number", "write one decimal point")
+    return whole.error(f"{whole.text} lacks a multiplication sign", f"write {token.text}*{tail}")
+
+
+def _foreign(text: str, position: int) -> ExpressionError:
+    """The error for a character that is no part of the grammar."""
+    for width in (2, 1):
+        if advice := _FOREIGN.get(text[position : position + width]):
+            return ExpressionError(
+                f"{text[position : position + width]} is not allowed in an expression",
+                help=advice,
+                offset=position,
+                width=width,
+            )
+    if text[position] == ".":
+        return ExpressionError(
+            "there are no attributes", help="write plain names and decimal numbers", offset=position
+        )
+    character = text[position]
+    shown = character if character.isprintable() else f"U+{ord(character):04X}"
+    if instead := _LOOKALIKES.get(character):
+        return ExpressionError(f"{shown} is not ASCII", help=f"write {instead}", offset=position)
+    return ExpressionError(
+        f"{shown} is not ASCII" if ord(character) > 126 else f"{shown} is not allowed",
+        help="names are made of ASCII letters, digits and _ (spell Greek letters out: omega, theta)",
+        offset=position,
+    )
+
+
+class _Walk:
+    """Whether an operand or an operator is due, and which parentheses are open."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        self.vocabulary = vocabulary
+        self.open: list[tuple[_Token, bool]] = []  # opening parenthesis, whether it belongs to a call
+        self.last: _Token | None = None
+        self.signs = 0
+
+    @property
+    def operand_due(self) -> bool:
+        return self.last is None or (self.last.kind == "operator" and self.last.text != ")")
+
+    def step(self, token: _Token) -> None:
+        """Takes one token."""
+        called = self.last is not None and self.last.kind == "name" and self.last.text in FUNCTIONS
+        if called and token.text != "(":
+            raise self._uncalled()
+        if token.kind == "name":
+            self._known(token)
+        if token.kind != "operator" or token.text == "(":
+            self._operand(token, called)
+        else:
+            self._operator(token)
+        self.last = token
+
+    def finish(self, text: str) -> None:
+        """Nothing may be left open at the end."""
+        if self.last and self.last.kind == "name" and self.last.text in FUNCTIONS:
+            raise self._uncalled()
+        if self.last and self.operand_due:
+            raise ExpressionError("the expression ends where a value is expected", offset=len(text.rstrip()))
+        if self.open:
+            raise self.open[-1][0].error("this parenthesis is never closed", _QUOTE)
+
+    def _operand(self, token: _Token, called: bool) -> None:
+        if token.text == "(":
+            if not called and not self.operand_due:
+                raise self._juxtaposed(token)
+            self.open.append((token, called))
+            if len(self.open) > MAX_DEPTH:
+                raise token.error(f"parentheses are nested more than {MAX_DEPTH} deep", kind="limit")
+        elif not self.operand_due:
+            raise self._juxtaposed(token)
+        self.signs = 0
+
+    def _operator(self, token: _Token) -> None:
+        if self.operand_due:
+            self._sign(token)
+        else:
+            self.signs = 0
+        if token.text == ")":
+            if not self.open:
+                raise token.error("this parenthesis was never opened", _QUOTE)
+            self.open.pop()
+        elif token.text == "," and not (self.open and self.open[-1][1]):
+            raise token.error(
+                "an entry is one expression", "a comma separates the arguments of a function only"
+            )
+
+    def _sign(self, token: _Token) -> None:
+        if token.text not in "+-":
+            if token.text == ")" and self.last and self.last.text == "(":
+                raise token.error("there is nothing between the parentheses")
+            raise token.error(f"a value is missing before {token.text}")
+        self.signs += 1
+        if self.signs > MAX_SIGNS:
+            raise token.error(f"more than {MAX_SIGNS} signs in a row", "write at most one sign", "limit")
+
+    def _known(self, token: _Token) -> None:
+        name, words = token.text, self.vocabulary
+        if name in KINKED and not words.kinks:
+            raise token.error(
+                f"{name} is only allowed in h",
+                "elsewhere expressions must be differentiable; sqrt(x**2 + c) with c > 0 may serve",
+            )
+        if name in words.symbols or name in FUNCTIONS or name == "pi":
+            return
+        if name in words.refused:
+            raise token.error(words.refused[name], kind="symbol")
+        known = [*words.symbols, "pi", *(f for f in FUNCTIONS if words.kinks or f not in KINKED)]
+        raise token.error(f"unknown symbol {name[:40]}", suggestion(name, known), "symbol")
+
+    def _uncalled(self) -> ExpressionError:
+        assert self.last is not None  # noqa: S101 - callers have seen the function's name
+        name = self.last.text
+        return self.last.error(f"{name} needs an argument in parentheses", f"write {name}(...)")
+
+    def _juxtaposed(self, token: _Token) -> ExpressionError:
+        assert self.last is not None  # noqa: S101 - no operand can be unexpected at the start
+        left = self.last.text if self.last.text != ")" else "(...)"
+        right = token.text if token.text != "(" else "(...)"
+        if self.last.kind == "name" and token.text == "(":
+            message = f"{left} is not a function; for a product a sign is missing"
+        else:
+            message = "a multiplication sign or another operator is missing"
+        return token.error(message, f"write {left}*{right}")
+
+
+_QUOTE = "text with commas inside [ ] or { } must stand in quotes in YAML"
+
+
+def suggestion(name: str, known: Collection[str], *, what: str = "known names") -> str:
+    """A did-you-mean, and the list of what is known."""
+    words = sorted(set(known))
+    lower = {word.lower(): word for word in reversed(words)}
+    near = get_close_matches(name.lower()[:60], lower, n=1, cutoff=0.6)
+    shown = ", ".join(words[:20]) + (", ..." if len(words) > 20 else "")
+    return f"did you mean {lower[near[0]]}? {what}: {shown}" if near else f"{what}: {shown}"
