@@ -1,0 +1,164 @@
+"""Suprema over a domain by vectorised branch and bound.
+
+The result encloses the supremum: `below` is a value proven at a point proven to lie in the domain, `above` a bound
+proven for every box that may meet it. Which boxes are split, and where, is heuristic; what is dropped never is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.objective import Estimate, Objective
+
+_BATCH: Final = 1024
+_PROBES: Final = 64  # boxes whose corners are tried as points, per round
+
+
+class Domain(Protocol):
+    """A set of points, known through boxes."""
+
+    def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
+        """Boxes (N, d) that cover the domain's projection to `variables`."""
+        ...
+
+    def contract(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Smaller boxes with the same points of the domain, and which of them may contain any."""
+        ...
+
+    def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
+        """Thin boxes near the given points, each proven to lie in the domain's projection; shape (P', d)."""
+        ...
+
+    def priorities(self, variables: tuple[str, ...], lo: Array, hi: Array, estimate: Estimate) -> Array:
+        """How much splitting each variable promises, (N, d); <= 0 where it cannot be split."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Supremum:
+    """An enclosure [below, above] of a supremum, where `below` was found, and the work done."""
+
+    below: float
+    above: float
+    at: dict[str, float]
+    boxes: int
+    reached: bool  # whether the requested gap was reached within the budget
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How hard to try: relative `gap`, `absolute` gap that always suffices, and a `budget` of boxes."""
+
+    gap: float = 0.01
+    absolute: float = 1e-12
+    budget: int = 2_000_000
+    progress: Callable[[int, float, float], None] | None = None
+
+
+def supremum(objective: Objective, domain: Domain, effort: Effort) -> Supremum:
+    """Enclose the supremum of `objective` over `domain`.
+
+    Raises `ValueError` if the domain turns out empty.
+    """
+    with np.errstate(all="ignore"):
+        return _Search(objective, domain, effort).run()
+
+
+class _Search:
+    def __init__(self, objective: Objective, domain: Domain, effort: Effort) -> None:
+        self.objective, self.domain, self.effort = objective, domain, effort
+        self.variables = objective.variables
+        self.below, self.settled = -np.inf, -np.inf
+        self.at: dict[str, float] = {}
+        self.count = 0
+
+    @property
+    def target(self) -> float:
+        """A bound at or below which a box need not be looked at again."""
+        if not np.isfinite(self.below):
+            return float(self.below)
+        return self.below + max(self.effort.gap * abs(self.below), self.effort.absolute)
+
+    def run(self) -> Supremum:
+        lo, hi = self.domain.boxes(self.variables)
+        bound = np.full(len(lo), np.inf)
+        self._probe(0.5 * (lo + hi))
+        while len(lo) and self.count < self.effort.budget:
+            take = np.argsort(-bound, kind="stable")[:_BATCH]
+            rest = np.setdiff1d(np.arange(len(lo)), take)
+            children = self._round(lo[take], hi[take], bound[take])
+            kept = bound[rest] > self.target
+            self._settle(bound[rest][~kept])
+            lo, hi, bound = (
+                np.concatenate([old[rest][kept], new])
+                for old, new in zip((lo, hi, bound), children, strict=True)
+            )
+            if self.effort.progress:
+                self.effort.progress(self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf))))
+        if not np.isfinite(self.below) and not len(lo) and not np.isfinite(self.settled):
+            raise ValueError("the domain is empty, or the objective could be evaluated nowhere")
+        above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
+        tolerance = max(self.effort.gap * abs(self.below), self.effort.absolute)
+        return Supremum(
+            below=float(self.below),
+            above=above,
+            at=self.at,
+            boxes=self.count,
+            reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
+        )
+
+    def _round(self, lo: Array, hi: Array, bound: Array) -> tuple[Array, Array, Array]:
+        """Bound a batch of boxes, settle those at or below the target, split the others."""
+        lo, hi, alive = self.domain.contract(self.variables, lo, hi)
+        lo, hi, bound = lo[alive], hi[alive], bound[alive]
+        self.count += len(alive)
+        if not len(lo):
+            return lo, hi, bound
+        self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
+        estimate = self.objective.upper(lo, hi, self.target)
+        bound = np.minimum(bound, estimate.upper)
+        self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
+        priority = self.domain.priorities(self.variables, lo, hi, estimate)
+        choice = np.argmax(priority, axis=1) if priority.shape[1] else np.zeros(len(lo), dtype=np.intp)
+        cut = _cuts(lo, hi, choice)
+        rows = np.arange(len(lo))
+        splittable = rows < 0
+        if priority.shape[1]:
+            splittable = (lo[rows, choice] < cut) & (cut < hi[rows, choice]) & (priority[rows, choice] > 0)
+        done = (bound <= self.target) | ~splittable
+        self._settle(bound[done])
+        lo, hi, bound, choice, cut = (x[~done] for x in (lo, hi, bound, choice, cut))
+        rows = np.arange(len(lo))
+        left_hi, right_lo = hi.copy(), lo.copy()
+        left_hi[rows, choice], right_lo[rows, choice] = cut, cut
+        return np.concatenate([lo, right_lo]), np.concatenate([left_hi, hi]), np.concatenate([bound, bound])
+
+    def _settle(self, bound: Array) -> None:
+        self.settled = max(self.settled, float(bound.max(initial=-np.inf)))
+
+    def _probe(self, points: Array) -> None:
+        """Raise `below` by values at points proven to lie in the domain."""
+        lo, hi = self.domain.inside(self.variables, points)
+        if not len(lo):
+            return
+        values = self.objective.lower(lo, hi)
+        best = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
+        if values[best] > self.below:
+            self.below = float(values[best])
+            self.at = {v: float(x) for v, x in zip(self.variables, 0.5 * (lo + hi)[best], strict=True)}
+
+
+def _cuts(lo: Array, hi: Array, choice: NDArray[np.intp]) -> Array:
+    """Where to split: the middle, geometrically for ranges that span many orders of magnitude."""
+    if not lo.shape[1]:
+        return np.zeros(len(lo))
+    rows = np.arange(len(lo))
+    a, b = lo[rows, choice], hi[rows, choice]
+    middle = 0.5 * a + 0.5 * b
+    return np.where((a > 0) & (b > 4 * a), np.sqrt(a) * np.sqrt(b), middle)

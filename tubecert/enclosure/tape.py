@@ -1,0 +1,132 @@
+"""Straight-line programs: expression graphs compiled once, run on batches of floats or intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from tubecert.enclosure import interval as iv
+from tubecert.enclosure.interval import Array, Interval
+from tubecert.expression import Expression, topological
+
+Step = tuple[str, int, tuple[int, ...], int]  # operation, target slot, argument slots, exponent or index
+
+
+class Tape:
+    """The values of `outputs` as functions of `inputs`.
+
+    Slots are reused after their last use, so that memory stays small for large batches.
+    """
+
+    def __init__(self, outputs: Sequence[Expression], inputs: Sequence[str]) -> None:
+        order = topological(outputs)
+        names = {name: index for index, name in enumerate(inputs)}
+        last_use = {arg: place for place, node in enumerate(order) for arg in node.args}
+        last_use.update(dict.fromkeys(outputs, len(order)))
+        self._constants: list[tuple[int, Expression]] = []
+        self._symbols: list[tuple[int, int]] = []
+        self._steps: list[Step] = []
+        slot: dict[Expression, int] = {}
+        free: list[int] = []
+        size = 0
+        for place, node in enumerate(order):
+            slot[node] = target = size
+            if node.op in ("const", "pi"):
+                self._constants.append((target, node))
+                size += 1
+            elif node.op == "symbol":
+                if str(node.value) not in names:
+                    raise ValueError(f"{node.value} is not an input of the tape")
+                self._symbols.append((target, names[str(node.value)]))
+                size += 1
+            else:
+                arguments = tuple(slot[arg] for arg in node.args)
+                slot[node] = target = free.pop() if free else size
+                size += target == size
+                exponent = node.value if isinstance(node.value, int) else 0
+                self._steps.append((node.op, target, arguments, exponent))
+                free.extend(
+                    slot[arg]
+                    for arg in dict.fromkeys(node.args)
+                    if last_use[arg] == place and arg.op not in ("const", "pi", "symbol")
+                )
+        self._outputs = tuple(slot[node] for node in outputs)
+        self._size = size
+        self.inputs = tuple(inputs)
+
+    def run_floats(self, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
+        """Float values of the outputs, shape (outputs, *shape); rounded, hence for proposals only."""
+        memory: list[Array] = [np.empty(0)] * self._size
+        for target, node in self._constants:
+            memory[target] = np.asarray(np.pi if node.op == "pi" else float(node.fraction))
+        for target, index in self._symbols:
+            memory[target] = values[index]
+        with np.errstate(all="ignore"):
+            for op, target, arguments, exponent in self._steps:
+                memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
+        result = np.empty((len(self._outputs), *shape))
+        for row, index in enumerate(self._outputs):
+            result[row] = memory[index]
+        return result
+
+    def run(self, values: Sequence[Interval], shape: tuple[int, ...]) -> Interval:
+        """Enclosures of the outputs, shape (outputs, *shape); unknown values are unbounded."""
+        memory: list[Interval] = [_NOTHING] * self._size
+        for target, node in self._constants:
+            memory[target] = _constant(node)
+        for target, index in self._symbols:
+            memory[target] = values[index]
+        with np.errstate(all="ignore"):
+            for op, target, arguments, exponent in self._steps:
+                memory[target] = _INTERVALS[op]([memory[i] for i in arguments], exponent)
+        lo, hi = np.empty((len(self._outputs), *shape)), np.empty((len(self._outputs), *shape))
+        for row, index in enumerate(self._outputs):
+            lo[row], hi[row] = memory[index].lo, memory[index].hi
+        return Interval(lo, hi).sanitised()
+
+
+_NOTHING = Interval(np.nan)
+
+
+@cache
+def _fraction(numerator: int, denominator: int) -> Interval:
+    from fractions import Fraction
+
+    return Interval.of(Fraction(numerator, denominator))
+
+
+def _constant(node: Expression) -> Interval:
+    if node.op == "pi":
+        return iv.PI
+    return _fraction(node.fraction.numerator, node.fraction.denominator)
+
+
+_FLOATS: Mapping[str, Callable[[list[Array], int], Array]] = {
+    "add": lambda a, _: a[0] + a[1],
+    "mul": lambda a, _: a[0] * a[1],
+    "div": lambda a, _: a[0] / a[1],
+    "pow": lambda a, n: np.power(a[0], n) if n > 0 else 1.0 / np.power(a[0], -n),
+    "sqrt": lambda a, _: np.sqrt(a[0]),
+    "sin": lambda a, _: np.sin(a[0]),
+    "cos": lambda a, _: np.cos(a[0]),
+    "tan": lambda a, _: np.tan(a[0]),
+    "exp": lambda a, _: np.exp(a[0]),
+    "norm": lambda a, _: np.sqrt(sum((x * x for x in a), start=np.zeros(()))),
+    "direction": lambda a, i: a[i] / np.sqrt(sum((x * x for x in a), start=np.zeros(()))),
+}
+
+_INTERVALS: Mapping[str, Callable[[list[Interval], int], Interval]] = {
+    "add": lambda a, _: a[0] + a[1],
+    "mul": lambda a, _: a[0] * a[1],
+    "div": lambda a, _: a[0] / a[1],
+    "pow": lambda a, n: a[0] ** n,
+    "sqrt": lambda a, _: iv.sqrt(a[0]),
+    "sin": lambda a, _: iv.sin(a[0]),
+    "cos": lambda a, _: iv.cos(a[0]),
+    "tan": lambda a, _: iv.tan(a[0]),
+    "exp": lambda a, _: iv.exp(a[0]),
+    "norm": lambda a, _: iv.norm(a),
+    "direction": lambda a, i: iv.direction(a, i),
+}

@@ -1,0 +1,212 @@
+"""Enclosures of matrix functions over boxes that converge quadratically.
+
+With c the centre and r the radii of a box X, every x in X has
+    G(x) = G(c) + sum_i (x_i - c_i) G_i(c) + R,   |R| <= 1/2 sum_ij r_i r_j |G_ij(X)|  elementwise.
+The part without R is affine in x, so a convex function of it is largest at one of the sign vertices. Variables in which
+every entry is affine (the others fixed) are not expanded at all: there the vertices of the box are exact.
+A norm (|x|, in h only) has a generalised gradient but no second derivative: such functions are enclosed to first order,
+and functions that contain the gradient itself by their natural interval extension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.linalg import midrad
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import ZERO, Expression, derivatives, free_symbols, topological
+
+Matrix = Sequence[Sequence[Expression]]
+_MOST_VERTICES = 8  # variables expanded into vertices; more are bounded by their slopes
+
+
+@dataclass(frozen=True, slots=True)
+class Expansion:
+    """One batch of boxes: N boxes, V vertices, K matrices.
+
+    `mid[k]`, `rad[k]`: the affine part of matrix k at the vertices, shape (N, V, p_k, q_k);
+    `rest[k]`: bound of |R| elementwise, split by the variable that causes it, shape (d, N, V, p_k, q_k);
+    `signs`: shape (V, d), -1, 0 or 1 for each variable of the function (0: not expanded into vertices).
+    """
+
+    mid: list[Array]
+    rad: list[Array]
+    rest: list[Array]
+    signs: Array
+
+
+class MatrixFunction:
+    """Matrices of expressions in `variables`, with tapes for values, slopes and curvature."""
+
+    def __init__(self, matrices: Sequence[Matrix]) -> None:
+        entries = [e for matrix in matrices for row in matrix for e in row]
+        self.shapes = [(len(matrix), len(matrix[0])) for matrix in matrices]
+        self.variables = tuple(sorted(free_symbols(entries)))
+        ops = {node.op for node in topological(entries)}
+        self._order = 0 if "direction" in ops else 1 if "norm" in ops else 2
+        first = {v: derivatives(entries, v) for v in self.variables} if self._order else {}
+        self._affine, self._curved = self._classify(first)
+        self._values = _Table(entries, self.variables)
+        self._slopes = _Table([e for v in self._curved for e in first.get(v, [])], self.variables)
+        curvature = []
+        if self._order == 2:
+            for i, v in enumerate(self._curved):
+                for w in self._curved[i:]:
+                    curvature += derivatives(first[v], w)
+        self._curvature = _Table(curvature, self.variables)
+
+    def _classify(self, first: dict[str, list[Expression]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Variables in which every entry is affine, and the others."""
+        if self._order < 2:
+            return (), self.variables
+        affine = tuple(
+            v for v in self.variables if all(e is ZERO for e in derivatives(first[v], v))
+        )[:_MOST_VERTICES]
+        return affine, tuple(v for v in self.variables if v not in affine)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether every entry is the constant 0."""
+        return all(e is ZERO for e in self._values.outputs)
+
+    def at(self, lo: Array, hi: Array) -> list[Interval]:
+        """Enclosures over thin boxes (points), a list over matrices of shape (N, p, q)."""
+        return self._unpack(self._values.run(Interval(lo, hi)), self.shapes)
+
+    def floats(self, points: Array) -> list[Array]:
+        """Float values at points of shape (N, d), each (N, p, q)."""
+        return _split(self._values.run_floats(points), self.shapes)
+
+    def expand(self, lo: Array, hi: Array) -> Expansion:
+        """Enclose the function over N boxes; `lo` and `hi` have shape (N, d)."""
+        if self._order == 0:
+            return self._natural(lo, hi)
+        count, dim = lo.shape
+        column = {v: i for i, v in enumerate(self.variables)}
+        centre = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
+        radius = np.nextafter(np.maximum(hi - centre, centre - lo), np.inf)
+        corners = [column[v] for v in self._affine]
+        curved = [column[v] for v in self._curved]
+        # all combinations of ends of the affine variables, stacked as (A N, d)
+        choices = list(product((-1.0, 1.0), repeat=len(corners)))
+        point = np.repeat(centre[None], len(choices), axis=0)
+        box_lo, box_hi = np.repeat(lo[None], len(choices), axis=0), np.repeat(hi[None], len(choices), axis=0)
+        for a, choice in enumerate(choices):
+            for sign, i in zip(choice, corners, strict=True):
+                end = lo[:, i] if sign < 0 else hi[:, i]
+                point[a, :, i] = box_lo[a, :, i] = box_hi[a, :, i] = end
+        point, box_lo, box_hi = (x.reshape(-1, dim) for x in (point, box_lo, box_hi))
+        expanded = curved[: max(0, _MOST_VERTICES - len(corners))] if self._order == 2 else []
+        flips = np.array(list(product((-1.0, 1.0), repeat=len(expanded))))
+        base = self._unpack(self._values.run(Interval(point)), self.shapes)
+        here, second = self._derivatives(point, box_lo, box_hi, len(curved))
+        stacked_radius = np.tile(radius, (len(choices), 1))
+        mids, rads, rests = [], [], []
+        for k, value in enumerate(base):
+            mid, rad = midrad(value)
+            rest = np.zeros((dim, *mid.shape))
+            steps = []
+            for j, i in enumerate(curved):
+                r = stacked_radius[:, i][:, None, None]
+                slope_mid, slope_rad = midrad(here[j][k])
+                if i in expanded:
+                    steps.append(r * slope_mid)
+                    rad = rad + r * (slope_rad + 4e-16 * np.abs(slope_mid))
+                else:
+                    rest[i] += r * (np.abs(slope_mid) + slope_rad)
+                for j2, i2 in enumerate(curved if second else []):
+                    pair = second[min(j, j2)][max(j, j2) - min(j, j2)][k]
+                    rest[i] += 0.5 * r * stacked_radius[:, i2][:, None, None] * pair.magnitude
+            lifted = mid[None] + sum(
+                (flips[:, s][:, None, None, None] * step[None] for s, step in enumerate(steps)),
+                start=np.zeros((len(flips), 1, 1, 1)),
+            )
+            slack = 4e-16 * (len(steps) + 2) * (np.abs(mid) + sum(map(np.abs, steps), start=np.zeros(())))
+            mids.append(_fold(lifted, len(choices), count))
+            rads.append(_fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count))
+            full = np.broadcast_to((rest * (1 + 1e-14))[:, None], (dim, *lifted.shape))
+            rests.append(np.stack([_fold(part, len(choices), count) for part in full]) if dim else full[:, :, 0])
+        signs = np.zeros((len(flips) * len(choices), dim))
+        for v, (flip, choice) in enumerate(product(flips, choices)):
+            signs[v, expanded], signs[v, corners] = flip, choice
+        return Expansion(mids, rads, rests, signs)
+
+    def _derivatives(
+        self, point: Array, box_lo: Array, box_hi: Array, curved: int
+    ) -> tuple[list[list[Interval]], list[list[list[Interval]]]]:
+        """Slopes by variable (over the box where there is no curvature), and curvature by pair."""
+        if not curved:
+            return [], []
+        where = Interval(point) if self._order == 2 else Interval(box_lo, box_hi)
+        slopes = self._unpack(self._slopes.run(where), self.shapes * curved)
+        k = len(self.shapes)
+        here = [slopes[j * k : (j + 1) * k] for j in range(curved)]
+        if self._order < 2:
+            return here, []
+        pairs = curved * (curved + 1) // 2
+        flat = self._unpack(self._curvature.run(Interval(box_lo, box_hi)), self.shapes * pairs)
+        second, start = [], 0
+        for j in range(curved):
+            second.append([flat[(start + s) * k : (start + s + 1) * k] for s in range(curved - j)])
+            start += curved - j
+        return here, second
+
+    def _natural(self, lo: Array, hi: Array) -> Expansion:
+        mids, rads, rests = [], [], []
+        for value in self.at(lo, hi):
+            mid, rad = midrad(value)
+            mids.append(mid[:, None])
+            rads.append(rad[:, None])
+            rests.append(np.zeros((lo.shape[1], *mid[:, None].shape)))
+        return Expansion(mids, rads, rests, np.zeros((1, lo.shape[1])))
+
+    @staticmethod
+    def _unpack(values: Interval, shapes: Sequence[tuple[int, int]]) -> list[Interval]:
+        return [
+            Interval(lo, hi)
+            for lo, hi in zip(_split(values.lo, shapes), _split(values.hi, shapes), strict=True)
+        ]
+
+
+class _Table:
+    """A tape that evaluates each distinct expression once and returns them all."""
+
+    def __init__(self, outputs: list[Expression], variables: tuple[str, ...]) -> None:
+        self.outputs = outputs
+        distinct = list(dict.fromkeys(outputs))
+        place = {e: i for i, e in enumerate(distinct)}
+        self._index = np.array([place[e] for e in outputs], dtype=np.intp)
+        self._tape = Tape(distinct, variables)
+
+    def run(self, x: Interval) -> Interval:
+        """Enclosures at N boxes (N, d): shape (outputs, N)."""
+        columns = [x[:, i] if x.lo is not x.hi else Interval(x.lo[:, i]) for i in range(x.lo.shape[1])]
+        return self._tape.run(columns, (x.lo.shape[0],))[self._index]
+
+    def run_floats(self, x: Array) -> Array:
+        """Float values at N points (N, d): shape (outputs, N)."""
+        return self._tape.run_floats(list(x.T), (x.shape[0],))[self._index]
+
+
+def _split(values: Array, shapes: Sequence[tuple[int, int]]) -> list[Array]:
+    """Rows of `values` (entries, N) as matrices (N, p, q)."""
+    result, start = [], 0
+    for p, q in shapes:
+        block = values[start : start + p * q]
+        result.append(np.ascontiguousarray(np.moveaxis(block, 0, -1)).reshape(-1, p, q))
+        start += p * q
+    return result
+
+
+def _fold(values: Array, choices: int, count: int) -> Array:
+    """(F, A N, p, q) -> (N, F A, p, q)."""
+    flips = values.shape[0]
+    p, q = values.shape[-2:]
+    return np.ascontiguousarray(
+        np.moveaxis(values.reshape(flips, choices, count, p, q), 2, 0)
+    ).reshape(count, flips * choices, p, q)
