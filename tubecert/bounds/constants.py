@@ -7,36 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
+from tubecert.enclosure.constant import Constant, Witness
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Witness:
-    """Where the value proven from below is attained: time in s (if it matters) and state, shape (n,)."""
-
-    t: float | None = None
-    x: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Constant:
-    """A supremum (or infimum) enclosed: proven to lie in [below, above]."""
-
-    below: float
-    above: float
-    at: Witness | None = None
-
-    def __post_init__(self) -> None:
-        if not self.below <= self.above:  # NaN fails too
-            raise ValueError(f"empty enclosure [{self.below}, {self.above}]")
-
-    @staticmethod
-    def exactly(value: float) -> Constant:
-        """A value known exactly."""
-        return Constant(below=value, above=value)
-
-    @property
-    def gap(self) -> float:
-        """Relative width (above - below)/|above|; 0 for an exact value."""
-        return 0.0 if self.above == self.below else (self.above - self.below) / abs(self.above)
+__all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "Witness"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +47,7 @@ class BoundConstants:
     h: Constant = field(metadata=_of("Dh", "assumption 4", "u", "sup |h|"))
     h_x: Constant = field(metadata=_of("Dhx", "assumption 4", "u/x", "sup |dh/dx|"))
     h_t: Constant = field(metadata=_of("Dht", "assumption 4", "u/s", "sup |dh/dt|"))
+    h_initial: Constant = field(metadata=_of("H0", "theory 4", "u", "|h(0, x(0))|, or sup |h|"))
     feedback_gain: Constant = field(
         metadata=_of("du", "bounds:delta_u, corrected", "u/d", "|feedback| per Riemannian distance")
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ _PROBES: Final = 64  # boxes whose corners are tried as points, per round
 
 class Domain(Protocol):
     """A set of points, known through boxes."""
+
+    def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
+        """The variables to search over: those needed, then those that the domain itself depends on."""
+        ...
 
     def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
         """Boxes (N, d) that cover the domain's projection to `variables`."""
@@ -53,12 +57,38 @@ class Supremum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How hard to try: relative `gap`, `absolute` gap that always suffices, and a `budget` of boxes."""
+    """How hard to try.
+
+    A relative `gap`, or an `absolute` one, suffices; a tenth of the gap is aimed at while the search is `cheap` (boxes);
+    after `budget` boxes it gives up and reports the gap that it has.
+    """
 
     gap: float = 0.01
     absolute: float = 1e-12
     budget: int = 2_000_000
+    cheap: int = 4_000
     progress: Callable[[int, float, float], None] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """Whether an objective stays below a threshold everywhere: proven, refuted at a point, or undecided."""
+
+    verdict: Literal["proven", "refuted", "undecided"]
+    at: dict[str, float]
+    value: float  # proven below at the witness when refuted, a proven bound from above otherwise
+    boxes: int
+
+
+def decide(objective: Objective, domain: Domain, threshold: float, effort: Effort) -> Decision:
+    """Decide whether objective < threshold on the whole domain."""
+    with np.errstate(all="ignore"):
+        search = _Search(objective, domain, effort, threshold)
+        found = search.run()
+    if found.below >= threshold:
+        return Decision(verdict="refuted", at=found.at, value=found.below, boxes=found.boxes)
+    verdict: Literal["proven", "undecided"] = "proven" if found.above < threshold else "undecided"
+    return Decision(verdict=verdict, at=found.at, value=found.above, boxes=found.boxes)
 
 
 def supremum(objective: Objective, domain: Domain, effort: Effort) -> Supremum:
@@ -71,9 +101,14 @@ def supremum(objective: Objective, domain: Domain, effort: Effort) -> Supremum:
 
 
 class _Search:
-    def __init__(self, objective: Objective, domain: Domain, effort: Effort) -> None:
+    def __init__(
+        self, objective: Objective, domain: Domain, effort: Effort, threshold: float | None = None
+    ) -> None:
         self.objective, self.domain, self.effort = objective, domain, effort
-        self.variables = objective.variables
+        self.threshold = threshold
+        # the domain may need more variables than the objective (a tube: time), placed after them
+        self.variables = domain.variables(objective.variables)
+        self.own = len(objective.variables)
         self.below, self.settled = -np.inf, -np.inf
         self.at: dict[str, float] = {}
         self.count = 0
@@ -81,15 +116,18 @@ class _Search:
     @property
     def target(self) -> float:
         """A bound at or below which a box need not be looked at again."""
+        if self.threshold is not None:
+            return float(np.nextafter(self.threshold, -np.inf))
         if not np.isfinite(self.below):
             return float(self.below)
-        return self.below + max(self.effort.gap * abs(self.below), self.effort.absolute)
+        gap = self.effort.gap if self.count > self.effort.cheap else 0.1 * self.effort.gap
+        return self.below + max(gap * abs(self.below), self.effort.absolute)
 
     def run(self) -> Supremum:
         lo, hi = self.domain.boxes(self.variables)
         bound = np.full(len(lo), np.inf)
         self._probe(0.5 * (lo + hi))
-        while len(lo) and self.count < self.effort.budget:
+        while len(lo) and self.count < self.effort.budget and not self._refuted:
             take = np.argsort(-bound, kind="stable")[:_BATCH]
             rest = np.setdiff1d(np.arange(len(lo)), take)
             children = self._round(lo[take], hi[take], bound[take])
@@ -113,6 +151,10 @@ class _Search:
             reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
         )
 
+    @property
+    def _refuted(self) -> bool:
+        return self.threshold is not None and self.below >= self.threshold
+
     def _round(self, lo: Array, hi: Array, bound: Array) -> tuple[Array, Array, Array]:
         """Bound a batch of boxes, settle those at or below the target, split the others."""
         lo, hi, alive = self.domain.contract(self.variables, lo, hi)
@@ -121,7 +163,7 @@ class _Search:
         if not len(lo):
             return lo, hi, bound
         self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
-        estimate = self.objective.upper(lo, hi, self.target)
+        estimate = self._widened(self.objective.upper(lo[:, : self.own], hi[:, : self.own], self.target), lo, hi)
         bound = np.minimum(bound, estimate.upper)
         self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
         priority = self.domain.priorities(self.variables, lo, hi, estimate)
@@ -139,6 +181,17 @@ class _Search:
         left_hi[rows, choice], right_lo[rows, choice] = cut, cut
         return np.concatenate([lo, right_lo]), np.concatenate([left_hi, hi]), np.concatenate([bound, bound])
 
+    def _widened(self, estimate: Estimate, lo: Array, hi: Array) -> Estimate:
+        """The estimate with columns for the variables that only the domain needs."""
+        extra = np.zeros((len(lo), len(self.variables) - self.own))
+        middle = 0.5 * (lo + hi)[:, self.own :]
+        return Estimate(
+            estimate.upper,
+            np.concatenate([estimate.corner, middle], axis=1),
+            np.concatenate([estimate.caused, extra], axis=1),
+            np.concatenate([estimate.spread, extra], axis=1),
+        )
+
     def _settle(self, bound: Array) -> None:
         self.settled = max(self.settled, float(bound.max(initial=-np.inf)))
 
@@ -147,7 +200,7 @@ class _Search:
         lo, hi = self.domain.inside(self.variables, points)
         if not len(lo):
             return
-        values = self.objective.lower(lo, hi)
+        values = self.objective.lower(lo[:, : self.own], hi[:, : self.own])
         best = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[best] > self.below:
             self.below = float(values[best])

@@ -21,6 +21,10 @@ class BoxDomain:
         self._outer = {v: (_bounds(lo)[0], _bounds(hi)[1]) for v, (lo, hi) in ranges.items()}
         self._inner = {v: (_bounds(lo)[1], _bounds(hi)[0]) for v, (lo, hi) in ranges.items()}
 
+    def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
+        """Nothing beside what the objective needs."""
+        return needed
+
     def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
         """The box itself, rounded outward."""
         ends = np.array([self._outer[v] for v in variables]).reshape(-1, 2)

@@ -14,6 +14,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import (
     congruence,
+    eigenvalues,
     eigenvalues_midrad,
     midrad,
     norm_bound,
@@ -81,35 +82,68 @@ class SumOfNorms:
 class Lipschitz:
     """|dh/dx| for an h with norms in it: the norm of the generalised Jacobian.
 
-    Beside the natural extension of the Jacobian, a structural bound is used: with every norm N_k(u_k) as a variable of
-    its own, |h_x| <= |h_x without N| + sum_k |dh/dN_k| |d u_k/dx|, which stays tight where a norm vanishes.
+    Beside the natural extension of the Jacobian, a structural bound is used that stays tight where a norm vanishes.
+    Level k is (J_k, [G_k1, ...]): the Jacobian of the arguments of the k-th norm with the norms before it held fixed,
+    and its derivatives by those norms; the last level is h itself. A norm is 1-Lipschitz in its arguments, so
+    L_k = |J_k| + sum_j |G_kj| L_j bounds the Lipschitz constant of level k.
     """
 
-    def __init__(self, jacobian: Matrix, smooth: Matrix, kinks: Sequence[tuple[Matrix, Matrix]]) -> None:
-        self._jacobian = MatrixFunction([jacobian])
-        # the structural parts contain placeholders for the norms; they are evaluated naturally with the norms put back
-        self._parts = MatrixFunction([smooth, *(m for pair in kinks for m in pair)])
-        self.variables = tuple(sorted({*self._jacobian.variables, *self._parts.variables}))
+    def __init__(self, jacobian: Matrix, levels: Sequence[tuple[Matrix, Sequence[Matrix]]]) -> None:
+        self._gains = [len(gains) for _, gains in levels]
+        self._function = MatrixFunction([jacobian, *(m for own, gains in levels for m in (own, *gains))])
+        self.variables = self._function.variables
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
         """The smaller of the natural and the structural bound."""
-        natural = spectral_norm(self._jacobian.at(*self._columns(self._jacobian, lo, hi))[0]).hi
-        parts = [spectral_norm(g).hi for g in self._parts.at(*self._columns(self._parts, lo, hi))]
-        structural = parts[0]
-        for gain, inner in zip(parts[1::2], parts[2::2], strict=True):
-            structural = structural + gain * inner
-        value = np.fmin(natural, structural) * (1 + 1e-14)
-        value = np.where(np.isnan(value), np.inf, value)
+        natural, *rest = (spectral_norm(g).hi for g in self._function.at(lo, hi))
+        bounds: list[Array] = []
+        for count in self._gains:
+            own, gains, rest = rest[0], rest[1 : 1 + count], rest[1 + count :]
+            bounds.append(sum((g * b for g, b in zip(gains, bounds, strict=True)), start=own) * (1 + 1e-14))
+        value = np.fmin(natural, bounds[-1])
+        width = hi - lo
+        return Estimate(np.where(np.isnan(value), np.inf, value), 0.5 * (lo + hi), width, width)
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """The norm of the Jacobian at points; where a norm vanishes its gradient is unknown, and so is the value."""
+        return spectral_norm(self._function.at(lo, hi)[0]).lo
+
+
+class LeastInputGain:
+    """-lmin(B' M B) with M = W^-1, to be maximised.
+
+    With any T: B'MB = (TB)'(TWT')^-1(TB), between lmin((TB)'(TB))/lmax(TWT') and lmin((TB)'(TB))/lmin(TWT').
+    """
+
+    def __init__(self, B: Matrix, W: Matrix) -> None:
+        self._function = MatrixFunction([W, B])
+        self.variables = self._function.variables
+
+    def _range(self, lo: Array, hi: Array) -> Interval:
+        w, b = self._function.at(lo, hi)
+        mid, rad = midrad(w)
+        t = whitening(mid)
+        scaled = eigenvalues_midrad(*congruence(t, mid, rad))
+        image = [sum((b[:, j] * t[:, i, j, None] for j in range(t.shape[-1])), start=Interval(0.0)) for i in range(t.shape[-1])]
+        gram_lo = np.empty((len(lo), b.shape[-1], b.shape[-1]))
+        gram_hi = gram_lo.copy()
+        for p in range(b.shape[-1]):
+            for q in range(b.shape[-1]):
+                entry = sum((row[:, p] * row[:, q] for row in image), start=Interval(0.0))
+                gram_lo[:, p, q], gram_hi[:, p, q] = entry.lo, entry.hi
+        least = eigenvalues(Interval(gram_lo, gram_hi))[..., 0]
+        positive = Interval(np.where(scaled.lo[:, 0] > 0, scaled.lo[:, 0], np.nan), scaled.hi[:, -1])
+        return (Interval(np.maximum(least.lo, 0.0), least.hi) / positive).sanitised()
+
+    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+        """Minus the smallest value over the box."""
+        value = -np.maximum(self._range(lo, hi).lo, 0.0)
         width = hi - lo
         return Estimate(value, 0.5 * (lo + hi), width, width)
 
     def lower(self, lo: Array, hi: Array) -> Array:
-        """The norm of the Jacobian at points where h is differentiable."""
-        return spectral_norm(self._jacobian.at(*self._columns(self._jacobian, lo, hi))[0]).lo
-
-    def _columns(self, function: MatrixFunction, lo: Array, hi: Array) -> tuple[Array, Array]:
-        index = [self.variables.index(v) for v in function.variables]
-        return lo[:, index], hi[:, index]
+        """Minus the value at points."""
+        return -self._range(lo, hi).hi
 
 
 Weights = Callable[[Array, Array], Sequence[Array]]

@@ -100,7 +100,7 @@ class MatrixFunction:
             for sign, i in zip(choice, corners, strict=True):
                 end = lo[:, i] if sign < 0 else hi[:, i]
                 point[a, :, i] = box_lo[a, :, i] = box_hi[a, :, i] = end
-        point, box_lo, box_hi = (x.reshape(-1, dim) for x in (point, box_lo, box_hi))
+        point, box_lo, box_hi = (x.reshape(len(choices) * count, dim) for x in (point, box_lo, box_hi))
         expanded = curved[: max(0, _MOST_VERTICES - len(corners))] if self._order == 2 else []
         flips = np.array(list(product((-1.0, 1.0), repeat=len(expanded))))
         base = self._unpack(self._values.run(Interval(point)), self.shapes)
@@ -130,7 +130,8 @@ class MatrixFunction:
             mids.append(_fold(lifted, len(choices), count))
             rads.append(_fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count))
             full = np.broadcast_to((rest * (1 + 1e-14))[:, None], (dim, *lifted.shape))
-            rests.append(np.stack([_fold(part, len(choices), count) for part in full]) if dim else full[:, :, 0])
+            folded = [_fold(part, len(choices), count) for part in full]
+            rests.append(np.stack(folded) if folded else np.zeros((0, *mids[-1].shape)))
         signs = np.zeros((len(flips) * len(choices), dim))
         for v, (flip, choice) in enumerate(product(flips, choices)):
             signs[v, expanded], signs[v, corners] = flip, choice

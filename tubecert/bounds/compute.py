@@ -1,0 +1,117 @@
+"""The radius of the tube and all constants over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.suprema import Suprema
+from tubecert.enclosure.interval import Interval, sqrt
+from tubecert.model import TIME
+from tubecert.tube import Containment, containment
+
+Box = tuple[tuple[Fraction, Fraction], ...]
+_ROUNDS = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Radius:
+    """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, exactly the float over which every constant is taken.
+
+    `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused.
+    """
+
+    rho: float
+    lower: Constant | None
+    upper: Constant | None
+    contained: Containment
+
+
+def least_radius(
+    suprema: Suprema, safe_set: Box, offset: Interval, width: Fraction, declared: tuple[Constant, Constant] | None
+) -> Radius:
+    """The least rho with rho >= sqrt(A/a)|x0* - x0| + width, where a and A are those of O(rho) itself.
+
+    Iterated upwards, inflated by 1e-6, and proven: with a and A over O(rho), the right-hand side is at most rho.
+    With declared a and A (proven on the safe set) there is nothing to iterate.
+    """
+
+    def needed(a: Constant, A: Constant) -> float:
+        overshoot = sqrt(Interval(A.above) / Interval(a.below))
+        return float((overshoot * offset + Interval.of(width)).hi)
+
+    def check(rho: float) -> Containment:
+        return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
+
+    if declared is not None:
+        rho = needed(*declared)
+        return Radius(rho=rho, lower=declared[0], upper=declared[1], contained=check(rho))
+    rho = float((offset + Interval.of(width)).hi)
+    for _ in range(_ROUNDS):
+        contained = check(rho)
+        if contained.verdict != "certified":
+            return Radius(rho=rho, lower=None, upper=None, contained=contained)
+        a, A = replace(suprema, rho=rho).metric_bounds()
+        right = needed(a, A)
+        if right <= rho:
+            return Radius(rho=rho, lower=a, upper=A, contained=contained)
+        rho = right * (1 + 1e-6) if right < rho * (1 + 1e-4) else right
+    raise ValueError("the radius did not settle")
+
+
+def bound_constants(
+    suprema: Suprema,
+    x0: tuple[Fraction, ...],
+    metric: tuple[Constant, Constant],
+    declared: Mapping[str, Constant],
+) -> BoundConstants:
+    """Every constant over O(rho).
+
+    `metric` is (a, A) over the tube; `declared` may hold h, h_x, h_t, which then take the place of derived bounds.
+    """
+    model = suprema.model
+    if model.h is not None:
+        h, h_x, h_t = suprema.uncertainty()
+        derived = {"h": h, "h_x": h_x, "h_t": h_t, "h_initial": suprema.initial_uncertainty(x0)}
+    else:
+        derived = {"h_initial": declared["h"]}
+    uncertainty = {**derived, **declared}
+    if "h" in declared and model.h is not None:
+        uncertainty["h_initial"] = declared["h"]
+    delta_p, delta = suprema.plan_defect()
+    return BoundConstants(
+        lower=metric[0],
+        upper=metric[1],
+        f=suprema.norms("f", [tuple((e,) for e in model.f)]),
+        f_x=suprema.norms("f_x", [model.f_x]),
+        B=suprema.norms("B", [model.B]),
+        B_x=suprema.norms("B_x", model.B_x),
+        b_x=suprema.norms("b_x", model.b_x),
+        B_pinv=suprema.norms("B_pinv", [model.B_pinv]),
+        B_pinv_x=suprema.norms("B_pinv_x", model.B_pinv_x),
+        M_x=suprema.metric_slope(),
+        u_star=suprema.input_on_plan(),
+        **uncertainty,
+        feedback_gain=suprema.feedback_gain(),
+        metric_input_gain=suprema.metric_input_gain(),
+        drift_on_plan=suprema.drift_on_plan(),
+        initial_distance=suprema.initial_distance(x0),
+        plan_defect=delta_p,
+        plan_defect_metric=delta,
+        input_gain_least=suprema.input_gain_least(),
+        contraction_excess=suprema.contraction_excess(),
+    )
+
+
+def time_range(horizon: Fraction | None, period: Interval | None) -> tuple[Fraction | float, Fraction | float] | None:
+    """The range of t over which h must be bounded: the horizon, or one period where there is no horizon.
+
+    None if h does not depend on t or is not given; raises `ValueError` if neither is known.
+    """
+    if horizon is not None:
+        return Fraction(0), horizon
+    if period is None:
+        raise ValueError(f"h depends on {TIME} without a period, so a horizon is needed")
+    return (0.0, float(period.hi)) if period.hi > 0 else None

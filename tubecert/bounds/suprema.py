@@ -1,0 +1,296 @@
+"""Each constant as a supremum over O(rho): the objective that defines it, and its enclosure.
+
+`Suprema` fixes a model, a plan, a radius and an effort; every method returns one enclosed constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.bounds.constants import Constant, Witness
+from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.interval import Array, Interval, sqrt
+from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
+from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, Pencil, SumOfNorms, SumOfPencils
+from tubecert.enclosure.taylor import MatrixFunction
+from tubecert.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    constant,
+    derivatives,
+    free_symbols,
+    rebuild,
+    substitute,
+    symbol,
+    topological,
+)
+from tubecert.expression.matrix import Matrix, column, identity, jacobian, multiply, transpose
+from tubecert.model import TIME, ControlAffineModel
+from tubecert.trajectory import Plan
+from tubecert.tube import Tube
+
+_SEGMENT_PIECES = 512
+MU = "mu#"  # no state can have this name
+Report = Callable[[str, int, float, float], None]
+
+
+@dataclass(frozen=True)
+class Suprema:
+    """The suprema of a model over the tube of radius `rho` around a plan.
+
+    `time` is the range of t for h (the horizon, or one period of h); the plan brings its own.
+    """
+
+    model: ControlAffineModel
+    plan: Plan
+    rho: float
+    time: Range | None
+    effort: Effort
+    report: Report | None = None
+
+    # -- metric ------------------------------------------------------------------------------------------------
+
+    def metric_bounds(self) -> tuple[Constant, Constant]:
+        """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1."""
+        fine = replace(self.effort, gap=min(self.effort.gap, 1e-4))  # they enter every condition
+        eye = identity(len(self.model.states))
+        largest = self._over_tube("lower", Pencil(self.model.W, [eye]), fine)
+        upper = self._over_tube("upper", Pencil(eye, [self.model.W]), fine)
+        inverse = Interval(1.0) / Interval(largest.below, largest.above)
+        lower = Constant(below=float(inverse.lo), above=float(inverse.hi), at=self._witness(largest))
+        return lower, self._constant(upper)
+
+    def metric_slope(self) -> Constant:
+        """DMx = sup sum_i |dM/dx_i|, dM/dx_i = -M W_i M: eigenvalues of the pencils (W_i, W^2)."""
+        slopes = [w for w in self.model.W_x if any(e is not ZERO for row in w for e in row)]
+        if not slopes:
+            return Constant.exactly(0.0)
+        return self._constant(
+            self._over_tube("M_x", SumOfPencils(slopes, multiply(self.model.W, self.model.W)))
+        )
+
+    # -- dynamics ----------------------------------------------------------------------------------------------
+
+    def norms(self, name: str, matrices: list[Matrix]) -> Constant:
+        """sup over the tube of the sum of spectral norms."""
+        objective = SumOfNorms(matrices)
+        return Constant.exactly(0.0) if objective.is_zero else self._constant(self._over_tube(name, objective))
+
+    def drift_on_plan(self) -> Constant:
+        """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
+        drift = self.model.drift_on_plan()
+        if self.plan.is_constant:
+            drift = _replace(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
+        return self.norms("drift_on_plan", [drift])
+
+    def input_on_plan(self) -> Constant:
+        """Dus = sup_t |u*(t)|."""
+        return self._on_plan("u_star", SumOfNorms([column(self.plan.u)]))
+
+    # -- uncertainty -------------------------------------------------------------------------------------------
+
+    def uncertainty(self) -> tuple[Constant, Constant, Constant]:
+        """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks."""
+        h = self._h()
+        by_time = derivatives(h, TIME)
+        states = set(self.model.states)
+        if not free_symbols(h) & states:
+            lipschitz = Constant.exactly(0.0)
+        else:
+            lipschitz = self._constant(self._over_tube("h_x", _lipschitz(h, self.model.states)))
+        return self.norms("h", [column(h)]), lipschitz, self.norms("h_t", [column(by_time)])
+
+    def initial_uncertainty(self, x0: tuple[Fraction, ...]) -> Constant:
+        """|h(0, x0)|."""
+        values = {TIME: ZERO, **{name: constant(q) for name, q in zip(self.model.states, x0, strict=True)}}
+        start = SumOfNorms([column(substitute(self._h(), values))])
+        return Constant.exactly(0.0) if start.is_zero else self._constant(supremum(start, BoxDomain({}), self.effort))
+
+    def _h(self) -> tuple[Expression, ...]:
+        if self.model.h is None:
+            raise ValueError("h is declared by bounds, not by expressions")
+        return self.model.h
+
+    # -- feedback ----------------------------------------------------------------------------------------------
+
+    def feedback_gain(self) -> Constant:
+        """du = sup over x and mu of the largest eigenvalue of (F, B B'/mu + mu W), at least 0.
+
+        Exact: 2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2, attained at some mu <= smax(B~).
+        """
+        top = self._over_tube("feedback_gain", Pencil(self.model.BBt, [self.model.W]))
+        largest = float(np.nextafter(np.sqrt(top.above), np.inf))
+        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra=(MU,), weights=_mu_weights)
+        found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
+        return Constant(
+            below=max(0.0, found.below), above=max(0.0, found.above), at=self._witness(found)
+        )
+
+    def contraction_excess(self) -> Constant:
+        """sup lmax of the pencil (F, W), as in the printed (bounds:delta_u)."""
+        return self._constant(self._over_tube("contraction_excess", Pencil(self.model.F, [self.model.W])))
+
+    def input_gain_least(self) -> Constant:
+        """inf over the tube of the smallest singular value of Theta B."""
+        found = self._over_tube("input_gain_least", LeastInputGain(self.model.B, self.model.W))
+        root = sqrt(Interval(max(0.0, -found.above), max(0.0, -found.below)))
+        return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
+
+    # -- on the plan -------------------------------------------------------------------------------------------
+
+    def metric_input_gain(self) -> Constant:
+        """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan."""
+        on = self.plan.on
+        return self._root(
+            self._search_plan("metric_input_gain", Pencil(on(self.model, self.model.BBt), [on(self.model, self.model.W)]))
+        )
+
+    def plan_defect(self) -> tuple[Constant, Constant]:
+        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
+        p = self.plan.defect(self.model)
+        if all(row[0] is ZERO for row in p):
+            return Constant.exactly(0.0), Constant.exactly(0.0)
+        scaled = Pencil(multiply(p, transpose(p)), [self.plan.on(self.model, self.model.W)])
+        return (
+            self._on_plan("plan_defect", SumOfNorms([p])),
+            self._root(self._search_plan("plan_defect_metric", scaled)),
+        )
+
+    def initial_distance(self, x0: tuple[Fraction, ...]) -> Constant:
+        """d0: the length of the straight segment from x*(0) to x0, an upper bound of their Riemannian distance.
+
+        The segment is cut into pieces; on each, delta' M delta lies between its least and largest value.
+        """
+        start = substitute(self.plan.x, {TIME: ZERO})
+        delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
+        if all(d is ZERO for d in delta):
+            return Constant.exactly(0.0)
+        s = symbol("s")
+        along = dict(zip(self.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True))
+        edges = np.linspace(0.0, 1.0, _SEGMENT_PIECES + 1)
+        function = MatrixFunction([_replace(self.model.W, along), column(delta), ((s,),)])
+        with np.errstate(all="ignore"):
+            speed = _speed(function, edges[:-1, None], edges[1:, None])
+        widths = np.diff(edges)
+        return Constant(
+            below=float((speed.lo * widths).sum() * (1 - 1e-13)),
+            above=float((speed.hi * widths).sum() * (1 + 1e-13)),
+        )
+
+    def initial_offset(self, x0: tuple[Fraction, ...]) -> Interval:
+        """|x0* - x0|."""
+        start = substitute(self.plan.x, {TIME: ZERO})
+        delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
+        if all(d is ZERO for d in delta):
+            return Interval(0.0)
+        found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), self.effort)
+        return Interval(found.below, found.above)
+
+    def half_widths(self) -> tuple[Constant, ...]:
+        """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
+        found = []
+        for i, name in enumerate(self.model.states):
+            entry = Pencil([[self.model.W[i][i]]], [[[ONE]]])
+            found.append(self._root(self._over_tube(f"half width of {name}", entry)))
+        return tuple(found)
+
+    # -- searches ----------------------------------------------------------------------------------------------
+
+    def _over_tube(
+        self,
+        name: str,
+        objective: Objective,
+        effort: Effort | None = None,
+        extra: dict[str, Range] | None = None,
+    ) -> Supremum:
+        time = self.plan.time.get(TIME, self.time)
+        tube = Tube(
+            self.plan,
+            self.rho,
+            states=self.model.states,
+            inputs=self.model.inputs,
+            time=time,
+            extra=extra,
+        )
+        return self._run(name, objective, tube, effort or self.effort)
+
+    def _search_plan(self, name: str, objective: Objective) -> Supremum:
+        return self._run(name, objective, BoxDomain(self.plan.time), self.effort)
+
+    def _on_plan(self, name: str, objective: SumOfNorms) -> Constant:
+        return Constant.exactly(0.0) if objective.is_zero else self._constant(self._search_plan(name, objective))
+
+    def _run(self, name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
+        if self.report is not None:
+            report = self.report
+            effort = replace(effort, progress=lambda boxes, below, above: report(name, boxes, below, above))
+        return supremum(objective, domain, effort)
+
+    def _constant(self, found: Supremum) -> Constant:
+        return Constant(below=found.below, above=found.above, at=self._witness(found))
+
+    def _root(self, found: Supremum) -> Constant:
+        root = sqrt(Interval(max(0.0, found.below), max(0.0, found.above)))
+        return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
+
+    def _witness(self, found: Supremum) -> Witness:
+        """Where the value was found; states that do not matter are taken from the plan."""
+        t = found.at.get(TIME)
+        moment = np.array([0.0 if t is None else t])
+        centre, _ = self.plan.enclose(moment, moment)
+        x = tuple(float(found.at.get(name, centre.mid[0, i])) for i, name in enumerate(self.model.states))
+        return Witness(t=t, x=x)
+
+
+def _mu_weights(lo: Array, hi: Array) -> tuple[Array, Array]:
+    """Weights of (B B', W) below (1/mu, mu) for all mu in the range."""
+    inverse = np.where(hi[:, 0] > 0, np.nextafter(1.0 / hi[:, 0], 0.0), 0.0)
+    return inverse, lo[:, 0]
+
+
+def _replace(rows: Matrix, values: dict[str, Expression]) -> Matrix:
+    width = len(rows[0])
+    flat = substitute([e for row in rows for e in row], values)
+    return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
+
+
+def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
+    """sqrt(delta' M delta) over pieces of the segment: |T delta|^2 over the eigenvalues of T W T', T any matrix."""
+    w, delta, _ = function.at(lo, hi)
+    mid, rad = midrad(w)
+    t = whitening(mid)
+    scaled = eigenvalues_midrad(*congruence(t, mid, rad))
+    total = Interval(np.zeros(len(lo)))
+    for i in range(t.shape[-2]):
+        entry = Interval(np.zeros(len(lo)))
+        for j in range(t.shape[-1]):
+            entry = entry + delta[:, j, 0] * t[:, i, j]
+        total = total + entry**2
+    return sqrt(total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])).sanitised()
+
+
+def _lipschitz(h: tuple[Expression, ...], states: tuple[str, ...]) -> Lipschitz:
+    """The objective |h_x|, with every norm in h taken apart into a level of its own."""
+    plain: dict[Expression, Expression] = {}  # each node with placeholders for the norms below it
+    back: dict[str, Expression] = {}  # placeholder -> the norm it stands for
+    arguments: list[tuple[Expression, ...]] = []
+    for node in topological(h):
+        args = tuple(plain[arg] for arg in node.args)
+        plain[node] = node if args == node.args else rebuild(node, args)
+        if plain[node].op == "norm":
+            name = f"norm#{len(back)}"
+            back[name] = node
+            arguments.append(args)
+            plain[node] = symbol(name)
+    names = list(back)
+    levels = []
+    for depth, entries in enumerate([*arguments, tuple(plain[e] for e in h)]):
+        gains = [_replace(column(derivatives(entries, name)), back) for name in names[:depth]]
+        levels.append((_replace(jacobian(entries, states), back), gains))
+    return Lipschitz(jacobian(h, states), levels)

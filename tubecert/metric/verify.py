@@ -1,0 +1,143 @@
+"""Conditions C1, C2, C3 on the safe set: certified with a margin, refuted at a point, or undecided.
+
+C1: 0 < W, with a and A on the set. C3 exactly, on the expressions. C2 as a largest rate: B_perp'(F_0 + 2 r W)B_perp <= 0
+holds for all rates r up to -1/2 sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), F_0 = -d_f W + f_x W + W f_x'.
+Implements: (CCM_1), (CCM_2) and (CCM_3) in dual form. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, decide, supremum
+from tubecert.enclosure.constant import Constant, Witness
+from tubecert.enclosure.domain import BoxDomain
+from tubecert.enclosure.interval import Interval
+from tubecert.enclosure.objective import Pencil
+from tubecert.enclosure.taylor import MatrixFunction
+from tubecert.expression import ZERO, is_zero
+from tubecert.expression.matrix import Matrix, identity, multiply, transpose
+from tubecert.model import ControlAffineModel
+
+Box = Sequence[tuple[Fraction, Fraction]]
+_FINEST = 1e-10  # relative to the rate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricProof:
+    """The outcome of C1-C3.
+
+    `largest_rate` encloses the supremum of the rates that C2 supports; `margin` is it minus the rate asked for, in 1/s.
+    `condition` names what failed (C1, C2, C3), `at` is a point where that is proven.
+    """
+
+    verdict: str
+    condition: str = ""
+    reason: str = ""
+    at: Witness | None = None
+    lower_on_set: Constant | None = None
+    upper_on_set: Constant | None = None
+    largest_rate: Constant | None = None
+    margin: Constant | None = None
+
+
+def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> MetricProof:
+    """Decide C1, C3 and C2, in this order, on the whole safe set."""
+    domain = BoxDomain(dict(zip(model.states, safe_set, strict=True)))
+    eye = identity(len(model.states))
+
+    def place(at: dict[str, float]) -> Witness:
+        middle = [float((lo + hi) / 2) for lo, hi in safe_set]
+        return Witness(x=tuple(at.get(name, m) for name, m in zip(model.states, middle, strict=True)))
+
+    negative = tuple(tuple(-e for e in row) for row in model.W)
+    positive = decide(Pencil(negative, [eye]), domain, 0.0, effort)
+    if positive.verdict != "proven":
+        return MetricProof(
+            verdict=positive.verdict,
+            condition="C1",
+            reason="W is not positive definite" if positive.verdict == "refuted" else "W could not be proven positive",
+            at=place(positive.at),
+        )
+    fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
+    largest = supremum(Pencil(model.W, [eye]), domain, fine)
+    upper = supremum(Pencil(eye, [model.W]), domain, fine)
+    inverse = Interval(1.0) / Interval(largest.below, largest.above)
+    on_set = {
+        "lower_on_set": Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
+        "upper_on_set": Constant(below=upper.below, above=upper.above, at=place(upper.at)),
+    }
+    if (failed := _killing(model, domain)) is not None:
+        verdict, reason, at = failed
+        return MetricProof(verdict=verdict, condition="C3", reason=reason, at=place(at), **on_set)
+    if not model.annihilator:
+        return MetricProof(verdict="certified", **on_set)  # as many inputs as states: C2 is void
+    found = _largest_rate(model, domain, effort)
+    below, above = -found.above / 2, -found.below / 2
+    margin = Interval(below, above) - Interval.of(model.rate)
+    rates = {
+        "largest_rate": Constant(below=below, above=above, at=place(found.at)),
+        "margin": Constant(below=float(margin.lo), above=float(margin.hi), at=place(found.at)),
+    }
+    if Fraction(below) > model.rate:
+        return MetricProof(verdict="certified", **on_set, **rates)
+    if Fraction(above) < model.rate:
+        reason = f"C2 fails at rate {float(model.rate):g}: the largest rate that this metric supports is {_floor(below)}"
+        return MetricProof(verdict="refuted", condition="C2", reason=reason, at=place(found.at), **on_set, **rates)
+    reason = f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {float(model.rate):g} to tell"
+    return MetricProof(verdict="undecided", condition="C2", reason=reason, **on_set, **rates)
+
+
+def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
+    """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the margin is known to a hundredth."""
+    objective = Pencil(_restrict(model.drift_form, model.annihilator), [_restrict(model.W, model.annihilator)])
+    rate = float(model.rate)
+    precision = 1e-2
+    while True:
+        sharp = Effort(gap=0.0, absolute=precision * rate, budget=effort.budget, progress=effort.progress)
+        found = supremum(objective, domain, sharp)
+        margin = -found.above / 2 - rate, -found.below / 2 - rate
+        settled = margin[0] > 0 or margin[1] < 0
+        if (settled and margin[1] - margin[0] <= effort.gap * max(map(abs, margin))) or precision <= _FINEST:
+            return found
+        if not found.reached:
+            return found
+        precision /= 100
+
+
+def _restrict(a: Matrix, basis: Matrix) -> Matrix:
+    return multiply(transpose(basis), multiply(a, basis))
+
+
+def _killing(model: ControlAffineModel, domain: BoxDomain) -> tuple[str, str, dict[str, float]] | None:
+    """None if C3 is proven exactly, else (verdict, reason, point)."""
+    for j, name in enumerate(model.inputs):
+        defect = model.killing_defect(j)
+        entries = [e for row in defect for e in row if e is not ZERO]
+        doubtful = [e for e in entries if is_zero(e) is not True]
+        if not doubtful:
+            continue
+        for e in doubtful:
+            function = MatrixFunction([[[e]]])
+            lo, hi = domain.boxes(function.variables)
+            corners = [lo + w * (hi - lo) for w in (0.5, 0.31, 0.77, 0.123)]
+            points, _ = domain.inside(function.variables, np.concatenate(corners))
+            with np.errstate(all="ignore"):
+                value = function.at(points, points)[0][:, 0, 0]
+            wrong = np.flatnonzero((value.lo > 0) | (value.hi < 0))
+            if len(wrong):
+                at = dict(zip(function.variables, points[wrong[0]].tolist(), strict=True))
+                reason = f"C3 (the Killing condition) fails for input {name}: its residual is {value.mid[wrong[0]]:.3g}"
+                return "refuted", reason, at
+        return "undecided", f"C3 (the Killing condition) could not be proven exactly for input {name}", {}
+    return None
+
+
+def _floor(rate: float) -> str:
+    """A rate rounded down to six digits, so that what is named is still supported."""
+    step = 10.0 ** (np.floor(np.log10(abs(rate))) - 5) if rate else 1.0
+    return f"{np.floor(rate / step) * step:.6g}"

@@ -1,0 +1,264 @@
+"""The model: a specification as exact matrices of expressions, checked to be defined where they are used.
+
+In: a `Spec`. Out: a `ControlAffineModel`, or findings about where f, B, W or h are undefined or B loses rank.
+Trusted: yes. Implements: F(x) = -d_f W + f_x W + W f_x' + 2 rate W, B^+ = (B'B)^-1 B' and their parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property, reduce
+from math import gcd, lcm
+from typing import TYPE_CHECKING
+
+from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
+from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.interval import PI, Interval
+from tubecert.enclosure.objective import scalar
+from tubecert.expression import (
+    Expression,
+    constant,
+    derivative,
+    free_symbols,
+    rebuild,
+    symbol,
+    topological,
+)
+from tubecert.expression.matrix import (
+    Matrix,
+    adjugate,
+    along,
+    combine,
+    determinant,
+    differentiate,
+    jacobian,
+    multiply,
+    null_space,
+    transpose,
+)
+from tubecert.findings import Finding
+
+if TYPE_CHECKING:
+    from tubecert.spec import Spec, Term
+
+TIME = "t"
+
+
+@dataclass(frozen=True)
+class ControlAffineModel:
+    """xdot = f(x) + B(x)(u + h(t, x)) with dual metric W at a rate, all exact.
+
+    Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared.
+    """
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    f: tuple[Expression, ...]
+    B: Matrix
+    W: Matrix
+    rate: Fraction
+    h: tuple[Expression, ...] | None
+
+    @cached_property
+    def f_x(self) -> Matrix:
+        """df/dx, (n, n)."""
+        return jacobian(self.f, self.states)
+
+    @cached_property
+    def columns(self) -> Matrix:
+        """The columns b_j of B, as rows (m, n)."""
+        return transpose(self.B)
+
+    @cached_property
+    def constant_input(self) -> bool:
+        """Whether B does not depend on the state."""
+        return not free_symbols(e for row in self.B for e in row)
+
+    @cached_property
+    def B_x(self) -> list[Matrix]:
+        """dB/dx_i for every state, each (n, m)."""
+        return [differentiate(self.B, name) for name in self.states]
+
+    @cached_property
+    def b_x(self) -> list[Matrix]:
+        """db_j/dx for every input, each (n, n)."""
+        return [jacobian(column, self.states) for column in self.columns]
+
+    @cached_property
+    def gram(self) -> Matrix:
+        """B'B, (m, m); its determinant is positive where B has full column rank."""
+        return multiply(self.columns, self.B)
+
+    @cached_property
+    def B_pinv(self) -> Matrix:
+        """B^+ = (B'B)^-1 B', (m, n)."""
+        return divide(multiply(adjugate(self.gram), self.columns), determinant(self.gram))
+
+    @cached_property
+    def B_pinv_x(self) -> list[Matrix]:
+        """dB^+/dx_i for every state, each (m, n)."""
+        return [differentiate(self.B_pinv, name) for name in self.states]
+
+    @cached_property
+    def BBt(self) -> Matrix:
+        """B B', (n, n)."""
+        return multiply(self.B, self.columns)
+
+    @cached_property
+    def W_x(self) -> list[Matrix]:
+        """dW/dx_i for every state, each (n, n)."""
+        return [differentiate(self.W, name) for name in self.states]
+
+    @cached_property
+    def drift_form(self) -> Matrix:
+        """-d_f W + f_x W + W f_x', (n, n): F without its rate term."""
+        product = multiply(self.f_x, self.W)
+        return combine(1, combine(1, product, 1, transpose(product)), -1, along(self.W, self.f, self.states))
+
+    @cached_property
+    def F(self) -> Matrix:
+        """-d_f W + f_x W + W f_x' + 2 rate W, (n, n)."""
+        return combine(1, self.drift_form, 2 * self.rate, self.W)
+
+    @cached_property
+    def annihilator(self) -> Matrix:
+        """B_perp of a constant rational B, (n, n - m): columns spanning {v : B'v = 0}."""
+        from tubecert.expression.matrix import constants
+
+        basis = null_space([[e.fraction for e in column] for column in self.columns])
+        return transpose(constants(basis)) if basis else ()
+
+    def killing_defect(self, j: int) -> Matrix:
+        """d_bj W - (b_j)_x W - W (b_j)_x', (n, n): zero where C3 holds for input j."""
+        product = multiply(self.b_x[j], self.W)
+        moved = along(self.W, self.columns[j], self.states)
+        return combine(1, moved, -1, combine(1, product, 1, transpose(product)))
+
+    def drift_on_plan(self) -> Matrix:
+        """f(x) + B(x) u* as a column, with the input names standing for u*, (n, 1)."""
+        u = [(symbol(name),) for name in self.inputs]
+        return combine(1, [(e,) for e in self.f], 1, multiply(self.B, u))
+
+
+def divide(a: Matrix, e: Expression) -> Matrix:
+    """Every entry over `e`."""
+    return tuple(tuple(x / e for x in row) for row in a)
+
+
+def build(spec: Spec) -> ControlAffineModel:
+    """The model of a specification that has a metric."""
+    if spec.metric is None:
+        raise ValueError("the specification has no metric")
+    h = spec.uncertainty.h
+    return ControlAffineModel(
+        states=spec.states,
+        inputs=spec.inputs,
+        f=tuple(term.expression for term in spec.f),
+        B=tuple(tuple(term.expression for term in row) for row in spec.B),
+        W=tuple(tuple(term.expression for term in row) for row in spec.metric.dual_metric),
+        rate=spec.metric.rate,
+        h=None if h is None else tuple(term.expression for term in h),
+    )
+
+
+def time_period(h: Iterable[Expression]) -> Interval | None:
+    """An enclosure of a common period in t of expressions that depend on t through sin, cos, tan only.
+
+    None if there is none to be seen; [0, 0] if t does not occur. Frequencies must be all rational or all rational
+    multiples of pi.
+    """
+    rational: list[Fraction] = []
+    of_pi: list[Fraction] = []
+    replaced: dict[Expression, Expression] = {}
+    roots = list(h)
+    for node in topological(roots):
+        args = tuple(replaced[arg] for arg in node.args)
+        replaced[node] = node if args == node.args else rebuild(node, args)
+        if node.op in ("sin", "cos", "tan") and TIME in free_symbols([node]):
+            slope = derivative(node.args[0], TIME)
+            if slope.is_constant:
+                rational.append(slope.fraction)
+            elif slope.op == "pi":
+                of_pi.append(Fraction(1))
+            elif slope.op == "mul" and slope.args[0].is_constant and slope.args[1].op == "pi":
+                of_pi.append(slope.args[0].fraction)
+            else:
+                return None
+            replaced[node] = constant(1)
+    if TIME in free_symbols(replaced[root] for root in roots) or (rational and of_pi):
+        return None
+    if not rational and not of_pi:
+        return Interval(0.0)
+    frequencies = rational or of_pi
+    common = Fraction(
+        reduce(gcd, (q.numerator for q in frequencies)), reduce(lcm, (q.denominator for q in frequencies))
+    )
+    return Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
+
+
+def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
+    """What is undefined, not differentiable or rank-deficient on the safe set (and for h and the plan: over `time`)."""
+    box: dict[str, Range] = dict(zip(spec.states, spec.safe_set, strict=True))
+    over_time: dict[str, Range] = box if time is None else {**box, TIME: time}
+    terms = [*spec.f, *(t for row in spec.B for t in row)]
+    if spec.metric:
+        terms += [t for row in spec.metric.dual_metric for t in row]
+    findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
+    for term in spec.uncertainty.h or ():
+        findings += _undefined(term, over_time, "the safe set and the horizon", effort)
+    for term in (*spec.trajectory.x, *spec.trajectory.u):
+        findings += _undefined(term, over_time, "the horizon", effort)
+    return findings
+
+
+def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort) -> list[Finding]:
+    findings = []
+    for duty, location in term.owed():
+        decision, needed = _prove(duty.kind, duty.argument, ranges, effort)
+        if decision.verdict == "proven":
+            continue
+        if decision.verdict == "refuted":
+            point = ", ".join(f"{name} = {value:.6g}" for name, value in decision.at.items()) or "every point"
+            message = f"'{duty.text}' must be {needed} on {where}, but is not at {point}"
+            findings.append(
+                Finding(
+                    code="TC201",
+                    message=message,
+                    location=location,
+                    help="shrink the safe set or rewrite the expression so that it is smooth there",
+                )
+            )
+        else:
+            findings.append(
+                Finding(
+                    code="TC202",
+                    message=f"'{duty.text}' could not be proven {needed} on {where}",
+                    location=location,
+                    help="rewrite the expression with a larger distance from the singularity",
+                )
+            )
+    return findings
+
+
+def _prove(kind: str, argument: Expression, ranges: dict[str, Range], effort: Effort) -> tuple[Decision, str]:
+    used = {v: ranges[v] for v in sorted(free_symbols([argument])) if v in ranges}
+    domain = BoxDomain(used)
+    if kind == "positive":
+        return decide(scalar(-argument), domain, 0.0, effort), "positive"
+    # nonzero on a connected set: of one sign everywhere
+    below = decide(scalar(-argument), domain, 0.0, effort)
+    if below.verdict == "proven":
+        return below, "nonzero"
+    above = decide(scalar(argument), domain, 0.0, effort)
+    if above.verdict == "proven" or (below.verdict == "refuted" and above.verdict == "refuted"):
+        return above, "nonzero"
+    return Decision(verdict="undecided", at={}, value=above.value, boxes=above.boxes), "nonzero"
+
+
+def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: Effort) -> Decision:
+    """Whether det(B'B) > 0 on the safe set; refuted with a point where B loses rank."""
+    gram = determinant(model.gram)
+    box = dict(zip(model.states, safe_set, strict=True))
+    return decide(scalar(-gram), BoxDomain(box), 0.0, effort)

@@ -1,0 +1,89 @@
+"""Plans: the curve x*(t), its input u*(t), and how far it is from satisfying the dynamics.
+
+In: the trajectory of a specification. Out: a `Plan` that encloses itself over any window of time. The defect
+p = x*' - f(x*) - B(x*) u* is exact, as expressions of t. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from tubecert.enclosure.domain import Range
+from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import Expression, constant, derivatives, free_symbols, substitute
+from tubecert.expression.matrix import Matrix, column, combine, multiply
+from tubecert.model import TIME, ControlAffineModel
+
+
+@dataclass(frozen=True)
+class Plan:
+    """x*(t), shape (n,), and u*(t), shape (m,), as expressions of t over [0, horizon] in s.
+
+    `horizon` None means for ever, which only a constant plan can do.
+    """
+
+    x: tuple[Expression, ...]
+    u: tuple[Expression, ...]
+    horizon: Fraction | None
+
+    @cached_property
+    def is_constant(self) -> bool:
+        """Whether x* and u* do not move."""
+        return not free_symbols([*self.x, *self.u])
+
+    @cached_property
+    def time(self) -> dict[str, Range]:
+        """The range of t, empty for a constant plan (where time does not matter)."""
+        if self.is_constant:
+            return {}
+        if self.horizon is None:
+            raise ValueError("a moving plan needs a horizon")
+        return {TIME: (Fraction(0), self.horizon)}
+
+    @cached_property
+    def _tapes(self) -> tuple[Tape, Tape]:
+        both = [*self.x, *self.u]
+        return Tape(both, (TIME,)), Tape(derivatives(both, TIME), (TIME,))
+
+    def enclose(self, lo: Array, hi: Array) -> tuple[Interval, Interval]:
+        """x* (N, n) and u* (N, m) over windows [lo, hi] of time, each of shape (N,)."""
+        values, slopes = self._tapes
+        window = Interval(lo, hi)
+        natural = values.run([window], lo.shape)
+        middle = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
+        reach = np.nextafter(np.maximum(hi - middle, middle - lo), np.inf)
+        steep = slopes.run([window], lo.shape) * Interval(-reach, reach)
+        centred = (values.run([Interval(middle)], lo.shape) + steep).sanitised()
+        both = Interval(np.maximum(natural.lo, centred.lo).T, np.minimum(natural.hi, centred.hi).T)
+        n = len(self.x)
+        return both[:, :n], both[:, n:]
+
+    def on(self, model: ControlAffineModel, rows: Matrix) -> Matrix:
+        """A matrix of the model's expressions evaluated along the plan: expressions of t."""
+        values = dict(zip((*model.states, *model.inputs), (*self.x, *self.u), strict=True))
+        width = len(rows[0])
+        flat = substitute([e for row in rows for e in row], values)
+        return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
+
+    def defect(self, model: ControlAffineModel) -> Matrix:
+        """p(t) = x*' - f(x*) - B(x*) u*, (n, 1)."""
+        drift = self.on(model, combine(1, column(model.f), 1, multiply(model.B, column(inputs(model)))))
+        return combine(1, column(derivatives(self.x, TIME)), -1, drift)
+
+
+def inputs(model: ControlAffineModel) -> list[Expression]:
+    """The input names as symbols, standing for u*."""
+    from tubecert.expression import symbol
+
+    return [symbol(name) for name in model.inputs]
+
+
+def constant_plan(x: Sequence[Fraction], u: Sequence[Fraction], horizon: Fraction | None) -> Plan:
+    """A plan that stays at a point."""
+    return Plan(tuple(map(constant, x)), tuple(map(constant, u)), horizon)

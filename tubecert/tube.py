@@ -1,0 +1,187 @@
+"""The tube O(rho): all states within rho of the plan, as a domain that classifies boxes.
+
+In: a plan, a radius, a window of time. Out: for boxes in (x, u*, t): smaller boxes with the same points of the tube, or
+"outside"; for points: thin boxes proven inside. Trusted: yes. Implements: (omega_norm_ball), (full_tube), assumption 1.
+
+Time is a coordinate of the search. Within a window the plan lies in a box P; a state box X is cut to the ranges that a
+point within rho of P can have given the gaps between X and P in the other coordinates. No cover of the tube by boxes
+is ever fixed: a boxed ball would be up to sqrt(n) too wide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.interval import Array, Interval, down, up
+from tubecert.enclosure.objective import Estimate, scalar
+from tubecert.model import TIME
+from tubecert.trajectory import Plan
+
+_WINDOWS = 64
+
+
+class Tube:
+    """O(rho) as a `Domain` over states, inputs (standing for u*(t)), time, and further independent ranges."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        rho: float,
+        *,
+        states: tuple[str, ...],
+        inputs: tuple[str, ...],
+        time: Range | None,
+        extra: dict[str, Range] | None = None,
+    ) -> None:
+        self._plan, self._rho = plan, rho
+        self._states, self._inputs = states, inputs
+        self._free = BoxDomain({**({} if time is None else {TIME: time}), **(extra or {})})
+
+    def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
+        """The needed variables, and time if the plan moves."""
+        return needed if self._plan.is_constant or TIME in needed else (*needed, TIME)
+
+    def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
+        """Boxes around the plan, window by window of time."""
+        others = tuple(v for v in variables if v not in self._states and v not in self._inputs)
+        free_lo, free_hi = self._free.boxes(others)
+        if TIME in others:
+            column = others.index(TIME)
+            edges = np.linspace(free_lo[0, column], free_hi[0, column], _WINDOWS + 1)
+            free_lo, free_hi = np.repeat(free_lo, _WINDOWS, axis=0), np.repeat(free_hi, _WINDOWS, axis=0)
+            free_lo[:, column], free_hi[:, column] = edges[:-1], edges[1:]
+        lo, hi = np.full((len(free_lo), len(variables)), -np.inf), np.full((len(free_lo), len(variables)), np.inf)
+        for source, name in enumerate(others):
+            lo[:, variables.index(name)], hi[:, variables.index(name)] = free_lo[:, source], free_hi[:, source]
+        lo, hi, _ = self.contract(variables, lo, hi)
+        return lo, hi
+
+    def contract(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Cut boxes to what the tube can reach, and tell which may still meet it."""
+        x, u = self._window(variables, lo, hi)
+        state, tied, state_column, tied_column = self._columns(variables)
+        lo, hi = lo.copy(), hi.copy()
+        lo[:, tied] = np.maximum(lo[:, tied], u.lo[:, tied_column])
+        hi[:, tied] = np.minimum(hi[:, tied], u.hi[:, tied_column])
+        centre = x[:, state_column]
+        # squared gaps between box and plan, rounded down, coordinate by coordinate
+        gap = np.maximum(0.0, np.maximum(down(lo[:, state] - centre.hi), down(centre.lo - hi[:, state])))
+        square = np.maximum(0.0, down(gap * gap))
+        square = np.where(np.isfinite(square), square, 0.0)
+        others = square @ (1.0 - np.eye(len(state)))  # the gaps in all other coordinates
+        room = up(up(np.square(self._rho)) - down(others * (1 - 1e-14)))
+        alive = np.all(room >= 0, axis=1)
+        reach = up(np.sqrt(up(np.maximum(room, 0.0))) * (1 + 1e-15))
+        lo[:, state] = np.maximum(lo[:, state], down(centre.lo - reach))
+        hi[:, state] = np.minimum(hi[:, state], up(centre.hi + reach))
+        return lo, hi, alive & np.all(lo <= hi, axis=1)
+
+    def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
+        """The points, moved into the ball around the plan at their time where that can be proven."""
+        others = tuple(v for v in variables if v not in self._states and v not in self._inputs)
+        other = [variables.index(v) for v in others]
+        moved, _ = self._free.inside(others, points[:, other])
+        if len(moved) < len(points):
+            return points[:0], points[:0]
+        points = points.copy()
+        points[:, other] = moved
+        x, u = self._window(variables, points, points)
+        state, tied, state_column, tied_column = self._columns(variables)
+        centre = x[:, state_column]
+        offset = points[:, state] - centre.mid
+        length = np.sqrt(np.sum(offset * offset, axis=1, keepdims=True))
+        scale = np.minimum(1.0, self._rho * (1 - 1e-9) / np.maximum(length, 1e-300))
+        points[:, state] = centre.mid + scale * offset
+        distance = (Interval(points[:, state]) - centre) ** 2
+        total = distance.hi.sum(axis=1) * (1 + 1e-14)
+        ok = total <= down(np.square(self._rho))
+        lo, hi = points.copy(), points.copy()
+        lo[:, tied], hi[:, tied] = u.lo[:, tied_column], u.hi[:, tied_column]
+        return lo[ok], hi[ok]
+
+    def priorities(self, variables: tuple[str, ...], lo: Array, hi: Array, estimate: Estimate) -> Array:
+        """Split what causes the overestimate: curvature inside, the cut of the ball at its boundary, motion in time."""
+        x, _ = self._window(variables, lo, hi)
+        state, tied, state_column, _ = self._columns(variables)
+        centre = x[:, state_column]
+        far = np.maximum(np.abs(hi[:, state] - centre.lo), np.abs(lo[:, state] - centre.hi))
+        boundary = (np.sum(far * far, axis=1) > self._rho**2).astype(float)[:, None]
+        priority = estimate.caused.copy()
+        priority[:, state] += boundary * estimate.spread[:, state]
+        if TIME in variables and not self._plan.is_constant:
+            width = np.maximum(hi[:, state] - lo[:, state], 1e-300)
+            share = np.minimum(1.0, (centre.hi - centre.lo) / width)
+            moved = (boundary * estimate.spread[:, state] * share).sum(axis=1)
+            priority[:, variables.index(TIME)] += moved + (estimate.spread + estimate.caused)[:, tied].sum(axis=1)
+        priority[:, tied] = 0.0
+        return np.where(hi > lo, priority, 0.0)
+
+    def _window(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Interval, Interval]:
+        """x* and u* over the time windows of the boxes."""
+        if TIME in variables and not self._plan.is_constant:
+            column = variables.index(TIME)
+            return self._plan.enclose(lo[:, column], hi[:, column])
+        zero = np.zeros(len(lo))
+        return self._plan.enclose(zero, zero)
+
+    def _columns(self, variables: tuple[str, ...]) -> tuple[list[int], list[int], list[int], list[int]]:
+        """Columns of the boxes that are states and inputs, and which states and inputs they are."""
+        state = [i for i, v in enumerate(variables) if v in self._states]
+        tied = [i for i, v in enumerate(variables) if v in self._inputs]
+        which = [self._states.index(variables[i]) for i in state]
+        return state, tied, which, [self._inputs.index(variables[i]) for i in tied]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Containment:
+    """Whether O(rho) lies in the safe set (assumption 1): certified, refuted with place and time, or undecided."""
+
+    verdict: str
+    state: str = ""
+    side: str = ""
+    t: float = 0.0
+    x: tuple[float, ...] = ()
+    excess: float = 0.0
+
+
+def containment(
+    plan: Plan, rho: float, states: tuple[str, ...], safe_set: tuple[tuple[Fraction, Fraction], ...], effort: Effort
+) -> Containment:
+    """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
+    radius = Fraction(rho)
+    undecided: Containment | None = None
+    worst: Containment | None = None
+    for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
+        for side, sign, limit in (("upper", 1, highest), ("lower", -1, -lowest)):
+            exact = plan.x[i]
+            if exact.is_constant:
+                low = high = sign * exact.fraction
+                t = 0.0
+            else:
+                fine = Effort(gap=0.0, absolute=1e-7 * float(highest - lowest), budget=effort.budget)
+                found = supremum(scalar(sign * exact), BoxDomain(plan.time), fine)
+                low, high, t = Fraction(found.below), Fraction(found.above), found.at.get(TIME, 0.0)
+            if high + radius <= limit:
+                continue
+            here, _ = plan.enclose(np.array([t]), np.array([t]))
+            place = here.mid[0].copy()
+            place[i] += sign * rho
+            case = Containment(
+                verdict="refuted" if low + radius > limit else "undecided",
+                state=name,
+                side=side,
+                t=t,
+                x=tuple(float(value) for value in place),
+                excess=float(low + radius - limit),
+            )
+            if case.verdict == "refuted" and (worst is None or case.excess > worst.excess):
+                worst = case
+            elif case.verdict == "undecided":
+                undecided = case
+    return worst or undecided or Containment(verdict="certified")
