@@ -17,6 +17,7 @@ from tubecert.expression.graph import (
     ZERO,
     Expression,
     as_expression,
+    coefficient,
     constant,
     cos,
     derivative,
@@ -34,7 +35,7 @@ from tubecert.expression.graph import (
     topological,
 )
 from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
-from tubecert.expression.scan import FUNCTIONS, ExpressionError
+from tubecert.expression.scan import FUNCTIONS, ExpressionError, suggestion
 from tubecert.expression.text import number_text, to_text
 from tubecert.expression.zero import is_zero
 
@@ -48,6 +49,7 @@ __all__ = [
     "Obligation",
     "Parsed",
     "as_expression",
+    "coefficient",
     "constant",
     "cos",
     "derivative",
@@ -64,6 +66,7 @@ __all__ = [
     "sin",
     "sqrt",
     "substitute",
+    "suggestion",
     "symbol",
     "tan",
     "to_text",

@@ -1,0 +1,53 @@
+"""The specification: YAML in, a frozen `Spec` out, or every problem of the file as located findings.
+
+In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obligations). Trusted: yes.
+
+| module | what it does |
+|---|---|
+| `source` | reads the text within limits; lines and columns |
+| `document` | YAML events -> a tree that knows where each node stands |
+| `reader` | a cursor that answers with values or findings |
+| `names`, `system`, `plan`, `settings` | the sections of the file |
+| `algebra` | exact checks: definiteness, symmetry, rank |
+| `load` | puts the sections together |
+| `canonical` | the effective specification as plain data |
+| `codes`, `types` | finding codes; the values of a specification |
+"""
+
+from tubecert.spec.canonical import canonical
+from tubecert.spec.codes import CODES
+from tubecert.spec.load import apply_overrides, load, load_text
+from tubecert.spec.types import (
+    Adaptation,
+    Bounds,
+    Expectation,
+    Matrix,
+    Metric,
+    Spec,
+    Term,
+    TermMatrix,
+    Trajectory,
+    Tube,
+    Uncertainty,
+    Vector,
+)
+
+__all__ = [
+    "CODES",
+    "Adaptation",
+    "Bounds",
+    "Expectation",
+    "Matrix",
+    "Metric",
+    "Spec",
+    "Term",
+    "TermMatrix",
+    "Trajectory",
+    "Tube",
+    "Uncertainty",
+    "Vector",
+    "apply_overrides",
+    "canonical",
+    "load",
+    "load_text",
+]

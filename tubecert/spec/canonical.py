@@ -1,0 +1,94 @@
+"""`Spec` -> plain data: the effective specification, defaults written out, decimals exact, texts canonical.
+
+The same system written differently (spacing, order of commutative operands, 0.5 or 1/2) gives the same data,
+and the data is itself a specification: written as YAML or JSON it loads to the same system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+from tubecert.expression import number_text, to_text
+from tubecert.spec.load import VERSION
+from tubecert.spec.types import Matrix, Spec, Term
+
+
+def canonical(spec: Spec) -> dict[str, Any]:
+    """JSON-ready data of the effective specification."""
+    data: dict[str, Any] = {
+        "tubecert": VERSION,
+        "name": spec.name,
+        "system": _system(spec),
+        "safe_set": {name: _numbers(side) for name, side in zip(spec.states, spec.safe_set, strict=True)},
+        "uncertainty": _uncertainty(spec),
+        "trajectory": _trajectory(spec),
+        "initial_state": {"at": _numbers(spec.x0)},
+        "tube": _given(epsilon=spec.tube.epsilon, rho_a=spec.tube.rho_a),
+        "adaptation": {
+            "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),
+            "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
+        },
+        "conditions": {} if spec.kernel is None else {"kernel": spec.kernel},
+    }
+    if spec.metric is not None:
+        data["metric"] = _metric(spec)
+    if spec.expect is not None:
+        data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
+        if spec.expect.verdict is not None:
+            data["expect"]["verdict"] = spec.expect.verdict
+    return data
+
+
+def _system(spec: Spec) -> dict[str, Any]:
+    return {
+        "states": list(spec.states),
+        "inputs": list(spec.inputs),
+        "units": dict(spec.units),
+        "parameters": {name: number_text(value) for name, value in spec.parameters},
+        "f": _texts(spec.f),
+        "B": [_texts(row) for row in spec.B],
+    }
+
+
+def _uncertainty(spec: Spec) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    if spec.uncertainty.h is not None:
+        data["h"] = _texts(spec.uncertainty.h)
+    if (bounds := spec.uncertainty.bounds) is not None:
+        data["bounds"] = _given(h=bounds.h, h_x=bounds.h_x, h_t=bounds.h_t)
+    return data
+
+
+def _trajectory(spec: Spec) -> dict[str, Any]:
+    plan = spec.trajectory
+    x, u = ("at", "input") if plan.kind == "equilibrium" else ("x", "u")
+    return {"kind": plan.kind, x: _texts(plan.x), u: _texts(plan.u), **_given(horizon=plan.horizon)}
+
+
+def _metric(spec: Spec) -> dict[str, Any]:
+    assert spec.metric is not None  # noqa: S101
+    data: dict[str, Any] = {
+        "dual_metric": [_texts(row) for row in spec.metric.dual_metric],
+        "rate": number_text(spec.metric.rate),
+    }
+    if spec.metric.lower is not None:
+        data["bounds"] = _given(lower=spec.metric.lower, upper=spec.metric.upper)
+    return data
+
+
+def _texts(terms: Iterable[Term]) -> list[str]:
+    return [to_text(term.expression) for term in terms]
+
+
+def _numbers(values: Iterable[Fraction]) -> list[str]:
+    return [number_text(value) for value in values]
+
+
+def _matrix(matrix: Matrix) -> list[list[str]]:
+    return [_numbers(row) for row in matrix]
+
+
+def _given(**values: Fraction | None) -> dict[str, str]:
+    return {name: number_text(value) for name, value in values.items() if value is not None}

@@ -1,0 +1,172 @@
+"""A file -> `Spec`, or every problem of the file at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from types import MappingProxyType
+from typing import Final
+
+from tubecert.errors import SpecError
+from tubecert.expression import ExpressionError, parse_number
+from tubecert.findings import Finding, Location
+from tubecert.spec import codes
+from tubecert.spec.document import compose
+from tubecert.spec.names import Names, read_box, read_names, read_units
+from tubecert.spec.plan import read_initial_state, read_trajectory
+from tubecert.spec.reader import Field, Reader, root_field
+from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
+from tubecert.spec.source import Source, check_limits, read_source
+from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty
+from tubecert.spec.types import Spec, Tube
+
+VERSION: Final = 1
+MAX_FINDINGS: Final = 200
+
+_REQUIRED = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory")
+_OPTIONAL = ("initial_state", "metric", "tube", "adaptation", "conditions", "expect")
+_RESERVED = ("obstacles", "simulation")
+
+
+def load(path: str) -> Spec:
+    """The specification in a file.
+
+    Raises `TargetError` if the file cannot be read and `SpecError` with every problem, in the order of the
+    file.
+    """
+    return load_source(read_source(path))
+
+
+def load_text(text: str, file: str = "<text>") -> Spec:
+    """The specification in a text; `file` is what findings call it."""
+    return load_source(Source.of(file, text))
+
+
+def load_source(source: Source) -> Spec:
+    """The specification in a source."""
+    check_limits(source)
+    node, findings = compose(source)
+    reader = Reader(source)
+    reader.findings.extend(findings)
+    spec = None
+    if not any(finding.code in (codes.YAML_SYNTAX, codes.LIMIT) for finding in findings):
+        spec = _read(root_field(reader, node))
+    if reader.findings or spec is None:
+        raise SpecError(_ordered(reader.findings))
+    return spec
+
+
+def _ordered(findings: list[Finding]) -> list[Finding]:
+    def position(finding: Finding) -> tuple[int, int]:
+        return (finding.location.line, finding.location.column) if finding.location else (0, 0)
+
+    ordered = sorted(findings, key=position)
+    if len(ordered) > MAX_FINDINGS:
+        rest = len(ordered) - MAX_FINDINGS
+        more = Finding(code=codes.LIMIT, message=f"and {rest} more problems", location=ordered[-1].location)
+        return [*ordered[:MAX_FINDINGS], more]
+    return ordered
+
+
+def _read(root: Field) -> Spec | None:
+    entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL, reserved=_RESERVED)
+    if entries is None:
+        return None
+    _check_version(entries.get("tubecert"))
+    name = read_name(entries["name"]) if "name" in entries else None
+    system = (
+        entries["system"].mapping(required=("states", "inputs", "f", "B"), optional=("parameters", "units"))
+        if "system" in entries
+        else None
+    )
+    names = read_names(system) if system else None
+    if system is None or names is None:
+        return None  # without names nothing else can be read
+    return _read_named(root.reader, entries, system, name, names)
+
+
+def _read_named(
+    reader: Reader, entries: dict[str, Field], system: dict[str, Field], name: str | None, names: Names
+) -> Spec | None:
+    dynamics = read_dynamics(system.get("f"), system.get("B"), names)
+    units = read_units(system.get("units"), names)
+    box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
+    uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
+    trajectory = entries.get("trajectory")
+    plan = read_trajectory(trajectory, names) if trajectory else None
+    x0 = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    metric = read_metric(entries["metric"], names) if "metric" in entries else None
+    tube = read_tube(entries.get("tube"), names)
+    adaptation = read_adaptation(entries.get("adaptation"), names)
+    kernel, _ = read_kernel(entries.get("conditions"))
+    expect = read_expectation(entries.get("expect"), names)
+    if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
+        return None
+    if plan is None or x0 is None or tube is None or adaptation is None:
+        return None
+    return Spec(
+        name=name,
+        path=reader.source.file,
+        source=reader.source.text,
+        states=names.states,
+        inputs=names.inputs,
+        units=units,
+        parameters=names.parameters,
+        f=dynamics[0],
+        B=dynamics[1],
+        safe_set=box,
+        uncertainty=uncertainty,
+        trajectory=plan,
+        x0=x0,
+        metric=metric,
+        tube=tube,
+        adaptation=adaptation,
+        kernel=kernel,
+        expect=expect,
+        locations=MappingProxyType(dict(reader.places)),
+    )
+
+
+def _check_version(field: Field | None) -> None:
+    version = field.number({}) if field else None
+    if field is not None and version is not None and version != VERSION:
+        field.fail(codes.RANGE, f"version {version} of the format is unknown", f"write tubecert: {VERSION}")
+
+
+def apply_overrides(
+    spec: Spec, *, epsilon: str | Fraction | None = None, rho_a: str | Fraction | None = None
+) -> Spec:
+    """The specification with radii from the command line; raises `SpecError` naming the option."""
+    findings: list[Finding] = []
+    parameters = dict(spec.parameters)
+    given = {
+        "epsilon": _override("--epsilon", epsilon, parameters, findings),
+        "rho_a": _override("--rho-a", rho_a, parameters, findings),
+    }
+    if findings:
+        raise SpecError(findings)
+    tube = Tube(
+        epsilon=spec.tube.epsilon if given["epsilon"] is None else given["epsilon"],
+        rho_a=spec.tube.rho_a if given["rho_a"] is None else given["rho_a"],
+    )
+    return replace(spec, tube=tube)
+
+
+def _override(
+    option: str, given: str | Fraction | None, parameters: dict[str, Fraction], findings: list[Finding]
+) -> Fraction | None:
+    if given is None:
+        return None
+    text = str(given)
+    try:
+        value = given if isinstance(given, Fraction) else parse_number(text, parameters)
+    except ExpressionError as error:
+        place = Location(file=option, line=1, column=error.offset + 1, source=text, width=error.width)
+        findings.append(Finding(code=codes.NUMBER, message=error.message, location=place, help=error.help))
+        return None
+    if value <= 0:
+        place = Location(file=option, line=1, column=1, source=text, width=len(text))
+        findings.append(
+            Finding(code=codes.RANGE, message=f"{option} is {text[:40]}; it must be > 0", location=place)
+        )
+    return value

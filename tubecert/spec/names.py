@@ -1,0 +1,208 @@
+"""The names of a specification, and what each kind of expression may use of them."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from tubecert.expression import FUNCTIONS, Expression, constant, symbol
+from tubecert.spec import codes
+from tubecert.spec.document import Scalar
+from tubecert.spec.reader import Field, Scope
+
+TIME: Final = "t"
+MAX_STATES: Final = 32
+MAX_NAME_LENGTH: Final = 40
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+# Words of YAML and Python, and functions that the grammar may learn later.
+_RESERVED: Final = frozenset(
+    {TIME, "pi", *FUNCTIONS, *keyword.kwlist, *(word.lower() for word in keyword.kwlist)}
+    | {"nan", "inf", "null", "yes", "no", "on", "off"}
+    | {
+        "log",
+        "ln",
+        "asin",
+        "acos",
+        "atan",
+        "atan2",
+        "sinh",
+        "cosh",
+        "tanh",
+        "min",
+        "max",
+        "sign",
+        "floor",
+        "ceil",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Names:
+    """The names of a system and the values of its parameters."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    parameters: tuple[tuple[str, Fraction], ...]
+
+    @property
+    def values(self) -> dict[str, Fraction]:
+        """The parameters by name."""
+        return dict(self.parameters)
+
+    def of_state(self) -> Scope:
+        """For f, B and the dual metric: states and parameters."""
+        refused = {
+            TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
+            **self._inputs_refused(),
+        }
+        return Scope(symbols=self._constants() | _symbols(self.states), refused=refused)
+
+    def of_uncertainty(self) -> Scope:
+        """For h: states, time and parameters; abs and norm are allowed."""
+        symbols = self._constants() | _symbols((*self.states, TIME))
+        return Scope(symbols=symbols, refused=self._inputs_refused(), kinks=True)
+
+    def of_plan(self) -> Scope:
+        """For a trajectory: time and parameters."""
+        refused = {name: f"{name} is a state; a plan is a function of t alone" for name in self.states}
+        refused |= {name: f"{name} is an input; a plan is a function of t alone" for name in self.inputs}
+        return Scope(symbols=self._constants() | _symbols((TIME,)), refused=refused)
+
+    def _constants(self) -> dict[str, Expression]:
+        return {name: constant(value) for name, value in self.parameters}
+
+    def _inputs_refused(self) -> dict[str, str]:
+        return {
+            name: f"{name} is an input; inputs enter through B only (x' = f(x) + B(x) u)"
+            for name in self.inputs
+        }
+
+
+def _symbols(names: tuple[str, ...]) -> dict[str, Expression]:
+    return {name: symbol(name) for name in names}
+
+
+def read_names(system: Mapping[str, Field]) -> Names | None:
+    """States, inputs and parameters; None if the states or inputs are unusable."""
+    taken: dict[str, str] = {}
+    states = _name_list(system.get("states"), "state", taken)
+    inputs = _name_list(system.get("inputs"), "input", taken)
+    parameters = _read_parameters(system.get("parameters"), taken)
+    if states is None or inputs is None:
+        return None
+    if len(inputs) > len(states):
+        field = system["inputs"]
+        field.fail(
+            codes.WRONG_SHAPE,
+            f"{len(inputs)} inputs for {len(states)} states: B cannot have independent columns",
+        )
+        return None
+    return Names(states=states, inputs=inputs, parameters=parameters)
+
+
+def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[str, ...] | None:
+    items = field.items(None, f"{what} names") if field else None
+    if field is None or items is None:
+        return None
+    if not items:
+        field.fail(codes.WRONG_SHAPE, f"there is no {what}; at least one is needed")
+        return None
+    if len(items) > MAX_STATES:
+        field.fail(codes.LIMIT, f"{len(items)} {what}s; at most {MAX_STATES} are supported")
+        return None
+    names = [_name(item.text(f"the name of a {what}"), item, what, taken) for item in items]
+    return tuple(name for name in names if name) if all(names) else None
+
+
+def _name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> str | None:
+    """The name, if it may be used."""
+    if name is None:
+        return None
+    problem = _problem(name, taken)
+    if problem:
+        field.reader.report(codes.NAME, field.location, *problem)
+        return None
+    taken[name] = what
+    return name
+
+
+def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
+    if not name.isascii():
+        return f"the name {name[:60]} contains letters outside ASCII", "spell Greek letters out, e.g. theta"
+    if not _NAME.fullmatch(name) or len(name) > MAX_NAME_LENGTH:
+        rule = f"a name is a letter followed by letters, digits and _ (at most {MAX_NAME_LENGTH})"
+        return f"{name[:60]!r} is not a name", rule
+    if name == TIME:
+        return "t is the time; it cannot be a name", "choose another name"
+    if name in _RESERVED:
+        return f"{name} is a reserved word", f"choose another name, e.g. {name}_"
+    if name in taken:
+        return f"{name} is already the name of a {taken[name]}", "names are unique"
+    return None
+
+
+def _read_parameters(field: Field | None, taken: dict[str, str]) -> tuple[tuple[str, Fraction], ...]:
+    """Parameters in the order of the file; each may use those before it. An unreadable value stands as 1."""
+    values: dict[str, Fraction] = {}
+    if field is None:
+        return ()
+    for key, node in field.pairs("of names to numbers") or []:
+        entry = field.child(key.text, node)
+        name = _name(key.text, _key_field(field, key), "parameter", taken)
+        value = entry.number(values)
+        if name is not None:
+            values[name] = (
+                Fraction(1) if value is None else value
+            )  # the finding stands; users of it are not wrong too
+    return tuple(values.items())
+
+
+def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:
+    """Units of states and inputs, as printed."""
+    units: list[tuple[str, str]] = []
+    if field is None:
+        return ()
+    for key, node in field.pairs("of names to units") or []:
+        unit = field.child(key.text, node).text("a unit")
+        if key.text not in (*names.states, *names.inputs):
+            _key_field(field, key).fail(codes.UNKNOWN_KEY, f"{key.text[:60]} is neither a state nor an input")
+        elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
+            field.child(key.text, node).fail(
+                codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters"
+            )
+        elif unit is not None:
+            units.append((key.text, unit))
+    return tuple(units)
+
+
+def read_box(field: Field, names: Names) -> tuple[tuple[Fraction, Fraction], ...] | None:
+    """The safe set, in the order of the states."""
+    entries = field.mapping(required=names.states)
+    if entries is None:
+        return None
+    sides = [_side(entries.get(name), names) for name in names.states]
+    kept = tuple(side for side in sides if side)
+    return kept if len(kept) == len(names.states) else None
+
+
+def _side(field: Field | None, names: Names) -> tuple[Fraction, Fraction] | None:
+    side = field.numbers(2, names.values) if field else None
+    if field is None or side is None:
+        return None
+    lower, upper = side
+    if lower >= upper:
+        field.fail(
+            codes.RANGE, f"{field.path}: the lower end must be below the upper end", "write [lower, upper]"
+        )
+        return None
+    return lower, upper
+
+
+def _key_field(field: Field, key: Scalar) -> Field:
+    return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)

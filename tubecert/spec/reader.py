@@ -1,0 +1,291 @@
+"""A cursor over the tree: each question it answers is either a value or a located finding.
+
+A `Field` that cannot answer reports why and returns None; the sections go on, so that one run names every
+problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TypeVar
+
+from tubecert.expression import Expression, ExpressionError, parse, parse_number, suggestion
+from tubecert.findings import Finding, Location
+from tubecert.spec import codes
+from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
+from tubecert.spec.source import Mark, Source
+from tubecert.spec.types import Matrix, Term, TermMatrix
+
+Parameters = Mapping[str, Fraction]
+T = TypeVar("T")
+
+_CODE_OF_KIND = {
+    "syntax": codes.EXPRESSION,
+    "symbol": codes.UNKNOWN_SYMBOL,
+    "limit": codes.LIMIT,
+    "value": codes.EXPRESSION,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scope:
+    """The names that an expression may use here, and why other names of the file may not occur."""
+
+    symbols: Mapping[str, Expression]
+    refused: Mapping[str, str] = field(default_factory=dict)
+    kinks: bool = False
+
+
+class Reader:
+    """Collects the findings and the places of keys."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.findings: list[Finding] = []
+        self.places: dict[str, Location] = {}
+
+    def report(self, code: str, location: Location, message: str, help: str = "") -> None:
+        """Adds an error."""
+        self.findings.append(Finding(code=code, message=message, location=location, help=help))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """A node with its dotted path."""
+
+    reader: Reader = field(repr=False)
+    path: str
+    node: Node
+
+    @property
+    def location(self) -> Location:
+        """Where the value begins."""
+        width = len(self.node.text) if isinstance(self.node, Scalar) else 1
+        return self.reader.source.location(self.node.start, width)
+
+    def fail(self, code: str, message: str, help: str = "") -> None:
+        """Reports that this value will not do."""
+        self.reader.report(code, self.location, message, help)
+
+    def child(self, name: str, node: Node) -> Field:
+        """The value of a key, or an item (`name` then is `[i]`)."""
+        path = name if not self.path else f"{self.path}{name}" if name[0] == "[" else f"{self.path}.{name}"
+        below = Field(reader=self.reader, path=path, node=node)
+        self.reader.places[path] = below.location
+        return below
+
+    # collections
+
+    def mapping(
+        self,
+        *,
+        required: Sequence[str] = (),
+        optional: Sequence[str] = (),
+        reserved: Sequence[str] = (),
+    ) -> dict[str, Field] | None:
+        """The values of the known keys; unknown, reserved and missing keys are findings."""
+        pairs = self.pairs(f"with the keys {', '.join([*required, *optional][:8])}")
+        if pairs is None:
+            return None
+        fields, waiting = {}, False
+        for key, node in pairs:
+            if key.text in reserved:
+                waiting = True
+                self._at(codes.NOT_YET, key, f"{self._name(key.text)} is not yet supported", "remove it")
+            elif key.text in required or key.text in optional:
+                fields[key.text] = self.child(key.text, node)
+            else:
+                self._unknown(key, [*required, *optional])
+        missing = [key for key in required if key not in fields]
+        if missing and not waiting:  # a reserved key often stands in for required ones
+            words = ", ".join(missing)
+            self.fail(
+                codes.MISSING_KEY,
+                f"{self.path or 'the specification'} lacks {words}",
+                f"add {', '.join(f'{key}: ...' for key in missing)}",
+            )
+        return fields
+
+    def pairs(self, purpose: str = "") -> list[tuple[Scalar, Node]] | None:
+        """The keys and values of a mapping, without keys that occur twice."""
+        if not isinstance(self.node, MappingNode):
+            self._wrong_type(f"a mapping {purpose}".strip())
+            return None
+        seen: dict[str, Scalar] = {}
+        for key, _ in self.node.pairs:
+            if key.text == "<<" and not key.style:
+                self._at(codes.YAML_FEATURE, key, "merge keys are not allowed", "write the keys out")
+            elif first := seen.get(key.text):
+                line = first.start.line + 1
+                self._at(
+                    codes.DUPLICATE_KEY,
+                    key,
+                    f"{key.text[:60]} occurs twice (first in line {line})",
+                    "keep one",
+                )
+            seen.setdefault(key.text, key)
+        return [(key, node) for key, node in self.node.pairs if seen[key.text] is key and key.text != "<<"]
+
+    def items(self, count: int | None = None, what: str = "entries", help: str = "") -> list[Field] | None:
+        """The items of a list; another number of them than `count` is a finding."""
+        if not isinstance(self.node, ListNode):
+            self._wrong_type(f"a list of {f'{count} ' if count is not None else ''}{what}", help)
+            return None
+        found = [self.child(f"[{i}]", node) for i, node in enumerate(self.node.items)]
+        if count is not None and len(found) != count:
+            self.fail(
+                codes.WRONG_SHAPE, f"{self.path} has {len(found)} entries; {count} {what} are needed", help
+            )
+            return None
+        return found
+
+    # scalars
+
+    def text(self, what: str = "text") -> str | None:
+        """The text of a scalar."""
+        if not isinstance(self.node, Scalar):
+            self._wrong_type(what)
+            return None
+        return self.node.text
+
+    def word(self, choices: Sequence[str], not_yet: Sequence[str] = ()) -> str | None:
+        """One of the words."""
+        word = self.text(f"one of {', '.join(choices)}")
+        if word is None or word in choices:
+            return word
+        if word in not_yet:
+            self.fail(
+                codes.NOT_YET, f"{self.path}: {word} is not yet supported", f"use {' or '.join(choices)}"
+            )
+        else:
+            help = suggestion(word, choices, what="choices")
+            self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
+        return None
+
+    def number(
+        self,
+        parameters: Parameters,
+        *,
+        above: int | None = None,
+        least: int | None = None,
+        most: int | None = None,
+    ) -> Fraction | None:
+        """A rational number, in its range."""
+        if not isinstance(self.node, Scalar):
+            self._wrong_type("a number")
+            return None
+        try:
+            value = parse_number(self.node.text, parameters)
+        except ExpressionError as error:
+            self._expression_error(error, codes.NUMBER)
+            return None
+        bounds = [
+            f"{sign} {bound}"
+            for sign, bound in ((">", above), (">=", least), ("<=", most))
+            if bound is not None
+        ]
+        if (
+            (above is not None and value <= above)
+            or (least is not None and value < least)
+            or (most is not None and value > most)
+        ):
+            self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {' and '.join(bounds)}")
+            return None
+        return value
+
+    def numbers(self, count: int, parameters: Parameters) -> tuple[Fraction, ...] | None:
+        """A list of numbers."""
+        return _all([item.number(parameters) for item in self.items(count, "numbers") or []], count)
+
+    def matrix(self, n: int, parameters: Parameters) -> Matrix | None:
+        """A square matrix of numbers, or a number that stands for a multiple of the identity."""
+        if isinstance(self.node, Scalar):
+            value = self.number(parameters)
+            if value is None:
+                return None
+            return tuple(tuple(value if i == j else Fraction(0) for j in range(n)) for i in range(n))
+        rows = self.items(n, "rows", f"write one number, or {n} rows of {n} numbers")
+        return _all([row.numbers(n, parameters) for row in rows or []], n)
+
+    def term(self, scope: Scope) -> Term | None:
+        """An expression."""
+        if not isinstance(self.node, Scalar):
+            self._wrong_type("an expression", "put the expression in quotes")
+            return None
+        try:
+            parsed = parse(self.node.text, symbols=scope.symbols, kinks=scope.kinks, refused=scope.refused)
+        except ExpressionError as error:
+            self._expression_error(error, codes.EXPRESSION)
+            return None
+        return Term(
+            expression=parsed.expression,
+            obligations=parsed.obligations,
+            places=tuple(self.inside(owed.offset, owed.width) for owed in parsed.obligations),
+            text=self.node.text,
+            location=self.location,
+        )
+
+    def terms(self, count: int, scope: Scope, what: str = "expressions") -> tuple[Term, ...] | None:
+        """A list of expressions; the ones that are there are read even if their number is wrong."""
+        items = self.items(None, what)
+        if items is None:
+            return None
+        found = [item.term(scope) for item in items[: 2 * count + 8]]
+        if len(items) != count:
+            self.fail(codes.WRONG_SHAPE, f"{self.path} has {len(items)} entries; {count} {what} are needed")
+            return None
+        return _all(found, count)
+
+    def term_matrix(self, rows: int, columns: int, scope: Scope) -> TermMatrix | None:
+        """A matrix of expressions, row by row."""
+        example = f"write {rows} rows of {columns}: " + ", ".join(["[...]"] * min(rows, 3))
+        found = self.items(rows, "rows", example)
+        return _all([row.terms(columns, scope) for row in found or []], rows)
+
+    def inside(self, offset: int, width: int) -> Location:
+        """The place of a part of a scalar's text."""
+        assert isinstance(self.node, Scalar)  # noqa: S101
+        return self.reader.source.location(place_in(self.reader.source, self.node, offset), width)
+
+    # findings
+
+    def _expression_error(self, error: ExpressionError, ordinary: str) -> None:
+        special = _CODE_OF_KIND[error.kind]
+        code = ordinary if special == codes.EXPRESSION else special
+        self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
+
+    def _at(self, code: str, key: Scalar, message: str, help: str = "") -> None:
+        self.reader.report(code, self.reader.source.location(key.start, len(key.text)), message, help)
+
+    def _name(self, key: str) -> str:
+        return f"{self.path}.{key}" if self.path else key
+
+    def _unknown(self, key: Scalar, known: Sequence[str]) -> None:
+        shown = key.text[:60]
+        message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
+        if not key.text.isascii():
+            message += " (it contains letters outside ASCII)"
+        self._at(codes.UNKNOWN_KEY, key, message, suggestion(key.text, known, what="known keys"))
+
+    def _wrong_type(self, wanted: str, help: str = "") -> None:
+        if isinstance(self.node, BrokenNode):
+            return  # has been reported
+        found = "a list" if isinstance(self.node, ListNode) else "a mapping"
+        if isinstance(self.node, Scalar):
+            found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
+        name = self.path or "the specification"
+        self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", help)
+
+
+def root_field(reader: Reader, node: Node | None) -> Field:
+    """The whole document; an empty file is an empty text."""
+    start = Mark(line=0, column=0)
+    return Field(reader=reader, path="", node=node or Scalar(start=start, end=start, text=""))
+
+
+def _all(values: Sequence[T | None], count: int) -> tuple[T, ...] | None:
+    """The values, if none is missing."""
+    kept = tuple(value for value in values if value is not None)
+    return kept if len(kept) == len(values) == count else None

@@ -1,0 +1,146 @@
+"""The sections `tube`, `adaptation`, `conditions` and `expect`, and the name of the specification."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Final, Literal
+
+from tubecert.expression import number_text
+from tubecert.spec import codes
+from tubecert.spec.algebra import failing_pivot
+from tubecert.spec.document import Scalar
+from tubecert.spec.names import Names
+from tubecert.spec.reader import Field
+from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
+
+VERDICTS: Final = ("certified", "refuted", "undecided")
+RANGES: Final = ("rho", "bandwidth", "adaptation_rate", "sample_time")
+
+_SLUG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+
+def read_name(field: Field) -> str | None:
+    """The specification's name, which becomes part of file names."""
+    name = field.text("a name")
+    if name is None or _SLUG.fullmatch(name):
+        return name
+    field.fail(
+        codes.NAME, f"{name[:60]!r} cannot be a name", "use ASCII letters, digits, _ and -, at most 64"
+    )
+    return None
+
+
+def read_tube(field: Field | None, names: Names) -> Tube | None:
+    """The two radii, as far as they are given."""
+    entries = field.mapping(optional=("epsilon", "rho_a"), reserved=("weights",)) if field else {}
+    if entries is None:
+        return None
+    values = {key: entry.number(names.values, above=0) for key, entry in entries.items()}
+    if None in values.values():
+        return None
+    return Tube(epsilon=values.get("epsilon"), rho_a=values.get("rho_a"))
+
+
+def read_adaptation(field: Field | None, names: Names) -> Adaptation | None:
+    """The predictor matrix and the projection."""
+    entries = field.mapping(optional=("A_m", "Q", "projection")) if field else {}
+    if entries is None:
+        return None
+    A_m = _read_predictor(entries.get("A_m"), len(names.states), names)
+    sound = A_m is not None and _read_Q(entries.get("Q"), A_m, names)
+    smooth, readable = _read_projection(entries.get("projection"), names)
+    if A_m is None or not sound or not readable:
+        return None
+    return Adaptation(A_m=A_m, smooth=smooth)
+
+
+def _read_predictor(field: Field | None, n: int, names: Names) -> Literal["auto"] | Matrix | None:
+    if field is None or (isinstance(field.node, Scalar) and field.node.text == "auto"):
+        return "auto"
+    A_m = field.matrix(n, names.values)
+    if A_m is None:
+        return None
+    failing = failing_pivot(dissipation(A_m))
+    if failing is None:
+        return A_m
+    trace = sum((A_m[i][i] for i in range(n)), start=Fraction(0))
+    unstable = "it is not Hurwitz (its trace is not negative)" if trace >= 0 else f"pivot {failing[0]} fails"
+    field.fail(
+        codes.STABILITY,
+        f"A_m must satisfy A_m + A_m^T < 0, because P = I is used; {unstable}",
+        "write a negative number, e.g. -1 for minus the identity, or auto",
+    )
+    return None
+
+
+def dissipation(A_m: Matrix) -> Matrix:
+    """Q = -(A_m + A_m^T), which solves the Lyapunov equation with P = I."""
+    n = range(len(A_m))
+    return tuple(tuple(-(A_m[i][j] + A_m[j][i]) for j in n) for i in n)
+
+
+def _read_Q(field: Field | None, A_m: Literal["auto"] | Matrix, names: Names) -> bool:
+    """Q may be repeated for the reader; it must be the one that follows from A_m."""
+    if field is None:
+        return True
+    if A_m == "auto":
+        field.fail(codes.STABILITY, "Q follows from A_m; with A_m: auto it cannot be given", "remove Q")
+        return False
+    Q = field.matrix(len(names.states), names.values)
+    if Q is None:
+        return False
+    wanted = dissipation(A_m)
+    if wanted != Q:
+        rows = ", ".join("[" + ", ".join(number_text(q) for q in row) + "]" for row in wanted)
+        field.fail(
+            codes.STABILITY,
+            "Q must equal -(A_m + A_m^T), because P = I is used",
+            f"remove Q, or write [{rows}]" if len(rows) < 200 else "remove Q",
+        )
+        return False
+    return True
+
+
+def _read_projection(field: Field | None, names: Names) -> tuple[Fraction | None, bool]:
+    """The smooth layer (None for the hard projection), and whether what is written is sound."""
+    if field is None:
+        return None, True
+    if isinstance(field.node, Scalar):
+        return None, field.word(("hard",)) is not None
+    entries = field.mapping(required=("smooth",))
+    smooth = (
+        entries["smooth"].number(names.values, above=0, most=1) if entries and "smooth" in entries else None
+    )
+    return smooth, smooth is not None
+
+
+def read_kernel(field: Field | None) -> tuple[Literal["tight", "paper"] | None, bool]:
+    """The kernel of the conditions, and whether what is written is sound."""
+    entries = field.mapping(optional=("kernel",)) if field else {}
+    if entries is None:
+        return None, False
+    if "kernel" not in entries:
+        return None, True
+    match entries["kernel"].word(("tight", "paper")):
+        case "tight":
+            return "tight", True
+        case "paper":
+            return "paper", True
+    return None, False
+
+
+def read_expectation(field: Field | None, names: Names) -> Expectation | None:
+    """Locked results: a verdict, and [least, most] of numbers of the certificate."""
+    entries = field.mapping(optional=("verdict", *RANGES)) if field else None
+    if entries is None:
+        return None
+    verdict = entries["verdict"].word(VERDICTS) if "verdict" in entries else None
+    ranges = []
+    for key in RANGES:
+        limits = entries[key].numbers(2, names.values) if key in entries else None
+        if limits and limits[0] > limits[1]:
+            entries[key].fail(codes.RANGE, f"{entries[key].path}: the range is empty", "write [least, most]")
+        elif limits:
+            ranges.append((key, (limits[0], limits[1])))
+    return Expectation(verdict=verdict, ranges=tuple(ranges))

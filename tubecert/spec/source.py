@@ -1,0 +1,131 @@
+"""The text of a specification, read within limits and addressed by line and column."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final, NoReturn
+
+from tubecert.errors import SpecError, TargetError
+from tubecert.findings import Finding, Location
+from tubecert.spec import codes
+
+MAX_BYTES: Final = 1_000_000
+MAX_NESTING: Final = 50
+
+_BREAK = re.compile(r"\r\n|\r|\n")
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+_INDICATORS = re.compile(r"([ \t]*)((?:[-?:][ \t]+)*)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A place in a text; line and column count from 0."""
+
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A file's name and text, with its lines."""
+
+    file: str
+    text: str
+    lines: tuple[str, ...] = field(repr=False)
+    starts: tuple[int, ...] = field(repr=False)
+
+    @classmethod
+    def of(cls, file: str, text: str) -> Source:
+        """The source with its lines found."""
+        starts = (0, *(match.end() for match in _BREAK.finditer(text)))
+        return cls(file=file, text=text, lines=tuple(_BREAK.split(text)), starts=starts)
+
+    def location(self, mark: Mark, width: int = 1) -> Location:
+        """The place as a finding names it."""
+        line = self.lines[mark.line] if mark.line < len(self.lines) else ""
+        return Location(
+            file=self.file, line=mark.line + 1, column=mark.column + 1, source=line, width=max(1, width)
+        )
+
+    def index(self, mark: Mark) -> int:
+        """Position of the mark in the text."""
+        if mark.line >= len(self.starts):
+            return len(self.text)
+        return min(self.starts[mark.line] + mark.column, len(self.text))
+
+    def mark(self, index: int) -> Mark:
+        """The mark of a position in the text."""
+        low, high = 0, len(self.starts)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if self.starts[middle] <= index else (low, middle)
+        return Mark(line=low, column=index - self.starts[low])
+
+
+def read_source(path: str) -> Source:
+    """The file's text; raises `TargetError` if it cannot be read, `SpecError` if it breaks a limit."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        finding = Finding(
+            code=codes.UNREADABLE,
+            message=f"cannot read {path!r}: {reason}",
+            help="give the path of a specification (a YAML file)",
+        )
+        raise TargetError([finding]) from None
+    if len(data) > MAX_BYTES:
+        _refuse(Source.of(path, ""), 0, codes.LIMIT, f"the file is larger than {MAX_BYTES:,} bytes")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = Source.of(path, data[: error.start].decode("utf-8", "replace"))
+        _refuse(before, len(before.text), codes.UNREADABLE, "the file is not UTF-8", "save it as UTF-8")
+    return Source.of(path, text)
+
+
+def check_limits(source: Source) -> None:
+    """Raises `SpecError` for what no YAML parser should see: size, control characters, deep nesting."""
+    if len(source.text) > MAX_BYTES:
+        _refuse(source, 0, codes.LIMIT, f"the text is larger than {MAX_BYTES:,} bytes")
+    if match := _CONTROL.search(source.text):
+        name = f"U+{ord(match.group()):04X}"
+        _refuse(source, match.start(), codes.YAML_SYNTAX, f"the character {name} is not allowed", "remove it")
+    _check_brackets(source)
+    _check_indentation(source)
+
+
+def _check_brackets(source: Source) -> None:
+    # Brackets inside quotes and comments are counted too: this only has to be cheap, and no real file has so
+    # many.
+    depth = 0
+    for match in re.finditer(r"[\[\]{}]", source.text):
+        depth = depth + 1 if match.group() in "[{" else max(0, depth - 1)
+        if depth > MAX_NESTING:
+            _refuse(source, match.start(), codes.LIMIT, f"brackets are nested more than {MAX_NESTING} deep")
+
+
+def _check_indentation(source: Source) -> None:
+    """Block collections nest only where the text moves to the right, also within a line (`- - -`)."""
+    columns: list[int] = []
+    for number, line in enumerate(source.lines):
+        match = _INDICATORS.match(line)
+        if match is None or match.end() == len(line):
+            continue
+        steps = [match.end(1)]
+        steps += [match.start(2) + step.end() for step in re.finditer(r"[-?:][ \t]+", match.group(2))]
+        for column in steps:
+            while columns and columns[-1] > column:
+                columns.pop()
+            if not columns or columns[-1] < column:
+                columns.append(column)
+            if len(columns) > MAX_NESTING:
+                start = source.starts[number] + column
+                _refuse(source, start, codes.LIMIT, f"the text is nested more than {MAX_NESTING} deep")
+
+
+def _refuse(source: Source, index: int, code: str, message: str, help: str = "") -> NoReturn:
+    location = source.location(source.mark(index))
+    raise SpecError([Finding(code=code, message=message, location=location, help=help)])

@@ -1,0 +1,118 @@
+"""The sections `system` and `uncertainty`, and the metric: what the mathematics is about."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from tubecert.expression import to_text
+from tubecert.spec import codes
+from tubecert.spec.algebra import asymmetric_entry, dependent_columns
+from tubecert.spec.names import Names
+from tubecert.spec.reader import Field
+from tubecert.spec.types import Bounds, Metric, Term, TermMatrix, Uncertainty
+
+_SYMMETRY_BUDGET = 20_000
+
+
+def read_dynamics(
+    f: Field | None, B: Field | None, names: Names
+) -> tuple[tuple[Term, ...], TermMatrix] | None:
+    """F (n) and B (n, m)."""
+    n, m = len(names.states), len(names.inputs)
+    drift = f.terms(n, names.of_state(), "expressions, one per state") if f else None
+    inputs = B.term_matrix(n, m, names.of_state()) if B else None
+    if B is not None and inputs is not None and not _independent(B, inputs):
+        inputs = None
+    return (drift, inputs) if drift is not None and inputs is not None else None
+
+
+def _independent(field: Field, matrix: TermMatrix) -> bool:
+    if not dependent_columns([[term.expression for term in row] for row in matrix]):
+        return True
+    many = len(matrix[0]) > 1
+    message = "the columns of B are linearly dependent at every point" if many else "B is zero at every point"
+    field.fail(codes.RANK, message, "every input must act on the state independently of the others")
+    return False
+
+
+def read_uncertainty(field: Field, names: Names) -> Uncertainty | None:
+    """Expressions, declared bounds, or both."""
+    entries = field.mapping(optional=("h", "bounds"))
+    if entries is None:
+        return None
+    if not entries:
+        field.fail(
+            codes.MISSING_KEY,
+            "uncertainty needs h, bounds, or both",
+            'write h: ["0"] if there is no uncertainty, or bounds: {h: ..., h_x: ..., h_t: ...}',
+        )
+        return None
+    h = bounds = None
+    if "h" in entries:
+        h = entries["h"].terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input")
+    if "bounds" in entries:
+        bounds = _read_bounds(entries["bounds"], names, complete="h" not in entries)
+    if ("h" in entries and h is None) or ("bounds" in entries and bounds is None):
+        return None
+    return Uncertainty(h=h, bounds=bounds)
+
+
+def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None:
+    """Declared bounds; all three of them if there is no expression to derive the others from."""
+    keys = ("h", "h_x", "h_t")
+    entries = field.mapping(required=keys if complete else (), optional=() if complete else keys)
+    if entries is None:
+        return None
+    values = {key: entry.number(names.values, least=0) for key, entry in entries.items()}
+    if None in values.values():
+        return None
+    return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))
+
+
+def read_metric(field: Field, names: Names) -> Metric | None:
+    """The dual metric with its rate, and declared bounds of the metric."""
+    entries = field.mapping(required=("dual_metric", "rate"), optional=("bounds",), reserved=("synthesise",))
+    if entries is None:
+        return None
+    n = len(names.states)
+    rate = entries["rate"].number(names.values, above=0) if "rate" in entries else None
+    dual = entries["dual_metric"].term_matrix(n, n, names.of_state()) if "dual_metric" in entries else None
+    if dual is not None and not _symmetric(entries["dual_metric"], dual):
+        dual = None
+    bounds = _metric_bounds(entries["bounds"], names) if "bounds" in entries else (None, None)
+    if rate is None or dual is None or bounds is None:
+        return None
+    return Metric(dual_metric=dual, rate=rate, lower=bounds[0], upper=bounds[1])
+
+
+def _symmetric(field: Field, matrix: TermMatrix) -> bool:
+    found = asymmetric_entry([[term.expression for term in row] for row in matrix], _SYMMETRY_BUDGET)
+    if found is None:
+        return True
+    i, j, proven = found
+    above, below = (to_text(matrix[k][l].expression)[:60] for k, l in ((i, j), (j, i)))
+    where = f"({i + 1},{j + 1}) = {above} and ({j + 1},{i + 1}) = {below}"
+    relation = "differ" if proven else "could not be proven equal"
+    field.reader.report(
+        codes.SYMMETRY,
+        matrix[j][i].location,
+        f"dual_metric is not symmetric: {where} {relation}",
+        "write the same expression in both places",
+    )
+    return False
+
+
+def _metric_bounds(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
+    entries = field.mapping(required=("lower", "upper"))
+    if entries is None or len(entries) < 2:
+        return None
+    lower = entries["lower"].number(names.values, above=0)
+    upper = entries["upper"].number(names.values, above=0)
+    if lower is None or upper is None:
+        return None
+    if lower > upper:
+        field.fail(
+            codes.RANGE, f"{field.path}: lower must not exceed upper", "they bound the eigenvalues of W^-1"
+        )
+        return None
+    return lower, upper

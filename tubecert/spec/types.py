@@ -1,0 +1,140 @@
+"""What a specification says, as values: exact numbers, expressions with their obligations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from tubecert.expression import Expression, Obligation
+from tubecert.findings import Location
+
+Vector = tuple[Fraction, ...]
+Matrix = tuple[Vector, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Term:
+    """An expression of the file; each of its `obligations` has the location of the same index in `places`."""
+
+    expression: Expression
+    obligations: tuple[Obligation, ...]
+    places: tuple[Location, ...] = field(repr=False)
+    text: str
+    location: Location = field(repr=False)
+
+    def __post_init__(self) -> None:
+        assert len(self.obligations) == len(self.places)  # noqa: S101
+
+    def owed(self) -> Iterator[tuple[Obligation, Location]]:
+        """The obligations with where each stands."""
+        return zip(self.obligations, self.places, strict=True)
+
+
+TermMatrix = tuple[tuple[Term, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Declared bounds of |h|, of a Lipschitz constant of h in x, and of |dh/dt|."""
+
+    h: Fraction | None = None
+    h_x: Fraction | None = None
+    h_t: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Uncertainty:
+    """The matched uncertainty: expressions (m), or declared bounds, or both; never neither."""
+
+    h: tuple[Term, ...] | None
+    bounds: Bounds | None
+
+    def __post_init__(self) -> None:
+        assert self.h is not None or self.bounds is not None  # noqa: S101
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """The plan: x (n) and u (m) as expressions of t (constants for an equilibrium), horizon in s."""
+
+    kind: Literal["equilibrium", "expressions"]
+    x: tuple[Term, ...]
+    u: tuple[Term, ...]
+    horizon: Fraction | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metric:
+    """The dual metric W (n, n), the rate in 1/s, and declared bounds `lower` I <= W^-1 <= `upper` I."""
+
+    dual_metric: TermMatrix
+    rate: Fraction
+    lower: Fraction | None = None
+    upper: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tube:
+    """The tube's two radii; either may come from the command line instead."""
+
+    epsilon: Fraction | None = None
+    rho_a: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adaptation:
+    """The predictor matrix (n, n), A_m + A_m^T < 0 as P = I; the smooth projection's layer, None if hard."""
+
+    A_m: Literal["auto"] | Matrix = "auto"
+    smooth: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expectation:
+    """A locked result: a verdict and ranges in the certificate's own words."""
+
+    verdict: str | None
+    ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec:
+    """A system, its safe set, uncertainty, plan, metric and options; everything exact.
+
+    f (n), B (n, m), `safe_set` (n pairs) and x0 (n) are in the order of `states`. Parameters are substituted
+    in every expression. `locations` says where a key's value stands, by dotted path (`metric.rate`,
+    `system.f[0]`).
+    """
+
+    name: str
+    path: str
+    source: str = field(repr=False)
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    units: tuple[tuple[str, str], ...]
+    parameters: tuple[tuple[str, Fraction], ...]
+    f: tuple[Term, ...]
+    B: TermMatrix
+    safe_set: tuple[tuple[Fraction, Fraction], ...]
+    uncertainty: Uncertainty
+    trajectory: Trajectory
+    x0: Vector
+    metric: Metric | None
+    tube: Tube
+    adaptation: Adaptation
+    kernel: Literal["tight", "paper"] | None
+    expect: Expectation | None
+    locations: Mapping[str, Location] = field(repr=False, compare=False, hash=False)
+
+    def __post_init__(self) -> None:
+        n, m = len(self.states), len(self.inputs)
+        assert len(self.f) == len(self.B) == len(self.safe_set) == len(self.x0) == n  # noqa: S101
+        assert all(len(row) == m for row in self.B)  # noqa: S101
+
+    def location(self, path: str) -> Location | None:
+        """Where the value of `path` stands, or the nearest enclosing key that is in the file."""
+        while path and path not in self.locations:
+            path = path[: max(path.rfind("."), path.rfind("["), 0)]
+        return self.locations.get(path)
