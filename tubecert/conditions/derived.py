@@ -1,0 +1,122 @@
+"""Derived constants of certificate A: everything in (26a)-(26c) that does not depend on omega or Gamma.
+
+Two variants with one result: the corrected formulas (theory section 2) and the paper's own (as printed). The
+docs/theory page says which lines differ and why.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic
+
+from tubecert.conditions.arithmetic import T, quiet, sqrt
+from tubecert.conditions.kernels import Kernel, paper_kernel, tight_kernel
+from tubecert.conditions.predictor import Predictor
+from tubecert.conditions.problem import Drift, Numbers, TubeProblem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateTerms(Generic[T]):
+    """(26a)-(26c) as functions of omega: zeta_1 = weight1 k, zeta_2 = weight2 k, zeta_3 = third/omega."""
+
+    speed: T  # Dxdot, bound of |xdot|
+    s1: T  # bound of |dh/dt| along the closed loop
+    hs: T  # bound of |sigma_hat - h|, (1 + r_H) Dh
+    psi_x: T
+    geodesic_rate: T
+    psi_rate: T
+    E0: T
+    zeta_p: T
+    weight1: T
+    weight2: T
+    third: T
+
+
+def rate_terms(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+    """The derived constants in the formulas that the problem asks for."""
+    return _printed(problem, n) if problem.as_printed else _corrected(problem, n)
+
+
+def known_drift(problem: TubeProblem, n: Numbers[T]) -> T:
+    """The bound of |f + B u*| over the tube that the problem asks for."""
+    return n.phi if problem.drift is Drift.PLAN else n.Df + n.DB * n.Dus
+
+
+@quiet
+def _corrected(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+    hs = n.Dh + n.R
+    kmax = sqrt(n.a) * n.rho * n.du
+    speed = known_drift(problem, n) + n.DB * (hs + kmax)
+    geodesic_rate = sqrt(n.A / n.a) * (n.Dfx + (hs + n.Dus + kmax) * n.Dbx + n.Dhx * n.DB) + (
+        sqrt(n.A) * n.du * n.DB
+    )
+    terms = _common(n, speed, geodesic_rate)
+    return RateTerms(
+        **terms,
+        hs=hs,
+        E0=n.d0**2,
+        zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),
+        third=n.Dhx * (4.0 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,
+    )
+
+
+@quiet
+def _printed(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+    du = n.excess / (2.0 * n.smin)  # no bound of the feedback, and may be negative
+    speed = known_drift(problem, n) + n.DB * (2.0 * n.Dh + n.rho * du)
+    geodesic_rate = sqrt(n.A / n.a) * (
+        n.Dfx + (n.Dh + n.Dus + n.rho * du) * n.Dbx + (n.Dhx + sqrt(n.a) * du / sqrt(n.A)) * n.DB
+    )
+    terms = _common(n, speed, geodesic_rate)
+    return RateTerms(
+        **terms,
+        hs=2.0 * n.Dh,
+        E0=n.A * n.offset**2,
+        zeta_p=0.0 * n.rho,
+        third=n.A * n.Dhx * (4.0 * n.lam * n.DB + terms["psi_rate"]) / n.lam,
+    )
+
+
+def _common(n: Numbers[T], speed: T, geodesic_rate: T) -> dict[str, T]:
+    """What both variants share."""
+    psi_x = 2.0 * n.DBx + n.DB * n.DMx / n.a
+    psi_rate = n.A * (n.DB * geodesic_rate + n.DB * n.DMx * speed / sqrt(n.A * n.a) + n.DBx * speed)
+    return {
+        "speed": speed,
+        "s1": n.Dht + n.Dhx * speed,
+        "psi_x": psi_x,
+        "geodesic_rate": geodesic_rate,
+        "psi_rate": psi_rate,
+        "weight1": 2.0 * n.rho * n.DB * (n.A / n.a),
+        "weight2": n.A * psi_x,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Zetas(Generic[T]):
+    """zeta_1, zeta_2, zeta_3 at one omega."""
+
+    zeta1: T
+    zeta2: T
+    zeta3: T
+
+
+@quiet
+def zetas(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T) -> Zetas[T]:
+    """(zeta_1) to (zeta_3) with the kernel that the problem asks for."""
+    kernel = paper_kernel if problem.active_kernel is Kernel.PAPER else tight_kernel
+    k = kernel(2.0 * n.lam, omega, n.Dh, terms.s1)
+    return Zetas(zeta1=terms.weight1 * k, zeta2=terms.weight2 * k, zeta3=terms.third / omega)
+
+
+@quiet
+def prediction_error(hs: T, s1: T, q: T) -> T:
+    """Dxt = sqrt(2 (1+r_H) Dh s1/q + ((1+r_H) Dh)^2): |xhat - x| <= Dxt/sqrt(Gamma), for P = I."""
+    return sqrt(2.0 * hs * s1 / q + hs**2)
+
+
+@quiet
+def filter_error(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, p: Predictor[T]) -> T:
+    """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt."""
+    gain = n.DBpx * terms.speed + (float(problem.filter_factor) * omega + p.norm) * n.DBp
+    return gain * prediction_error(terms.hs, terms.s1, p.q)

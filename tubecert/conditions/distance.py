@@ -1,0 +1,173 @@
+"""Certificate B: the Riemannian distance d(x*, x) bounded directly. Trusted.
+
+THEOREM B. If Y > phi + DB[du dbar + min((1+r_H) Dh, max(H0, S) + e)] with S >= (Dht + Dhx Y)/omega and e >=
+Deta(omega, g, Y)/sqrt(Gamma), then dbar = sqrt(a) rho > sup D implies |x - x*| < rho over the horizon. A
+proof is a recipe, a tuple of decimals for which these inequalities are verified; a recipe that fails
+refutes nothing but itself. What refutes gains is `distance_ceiling`: every Y that serves is at least the
+least fixed point, whatever the constants are within their enclosures. Implements: theory section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Generic
+
+import numpy as np
+
+from tubecert.conditions.arithmetic import Array, T, least_solution, maximum, minimum, quiet, sqrt, vector
+from tubecert.conditions.derived import prediction_error
+from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.predictor import Predictor, predictor
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.enclosure.interval import Interval
+
+_RISES = 200  # iterations towards the least fixed point from below; any number of them is sound
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceRecipe:
+    """The proof of theorem B at printed gains: `speed` is Y, `prediction_error` e, `uncertainty` S."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+    projection_radius: Fraction
+    speed: Fraction
+    prediction_error: Fraction
+    uncertainty: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceState(Generic[T]):
+    """Y, e and S of theorem B in one arithmetic."""
+
+    Y: T
+    e: T
+    S: T
+
+
+def reach(n: Numbers[T]) -> T:
+    """The distance that cannot be reached inside the tube: dbar = sqrt(a) rho."""
+    return sqrt(n.a) * n.rho
+
+
+@quiet
+def drift_bound(n: Numbers[T]) -> T:
+    """What |xdot| is at most without the uncertainty: phi + DB du dbar."""
+    return n.phi + n.DB * (n.du * reach(n))
+
+
+@quiet
+def speed_needed(n: Numbers[T], S: T, e: T) -> T:
+    """What Y has to exceed: phi + DB[du dbar + min((1+r_H) Dh, max(H0, S) + e)]."""
+    return drift_bound(n) + n.DB * minimum(n.Dh + n.R, maximum(n.H0, S) + e)
+
+
+@quiet
+def least_speed(n: Numbers[T], omega: T, e: T) -> T:
+    """The least Y for S = (Dht + Dhx Y)/omega and a given e, in closed form."""
+    drift = drift_bound(n)
+    crude = drift + n.DB * (n.Dh + n.R)
+    settled = least_solution(drift + n.DB * (e + n.Dht / omega), n.DB * n.Dhx / omega)
+    return minimum(crude, maximum(drift + n.DB * (n.H0 + e), settled))
+
+
+@quiet
+def uncertainty(n: Numbers[T], Y: T, omega: T) -> T:
+    """What the filter leaves of h: S = (Dht + Dhx Y)/omega."""
+    return (n.Dht + n.Dhx * Y) / omega
+
+
+@quiet
+def filter_error(n: Numbers[T], Y: T, omega: T, p: Predictor[T]) -> T:
+    """Deta of certificate B: (DBpx Y + DBp (omega + |A_m + omega I|)) Dxt."""
+    gain = n.DBpx * Y + n.DBp * (omega + p.shifted)
+    return gain * prediction_error(n.Dh + n.R, n.Dht + n.Dhx * Y, p.q)
+
+
+def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
+    """D(t) of theorem B."""
+    return DistanceBound(
+        d0=n.d0, beta=n.beta, H0=n.H0, S=S, e=e, delta=n.delta, lam=n.lam, omega=omega, horizon=n.horizon
+    )
+
+
+def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
+    """The margin (dbar - sup D)/dbar of one recipe, scalar; its lower end is -inf if the recipe is invalid."""
+    return margin_distance_along(problem, [recipe])[0]
+
+
+@quiet
+def margin_distance_along(problem: TubeProblem, recipes: Sequence[DistanceRecipe]) -> Interval:
+    """Margins of many recipes at once, shape `(len(recipes),)`; recipes share the projection radius."""
+    R_H = recipes[0].projection_radius
+    serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H)
+    omega, Gamma = vector([r.bandwidth for r in recipes]), vector([r.adaptation_rate for r in recipes])
+    gains = [r.predictor_gain for r in recipes if r.predictor_gain is not None]
+    state = DistanceState(
+        Y=vector([r.speed for r in recipes]),
+        e=vector([r.prediction_error for r in recipes]),
+        S=vector([r.uncertainty for r in recipes]),
+    )
+    p = predictor(problem.A_m, omega, vector(gains) if gains else None)
+    n = problem.proven(R_H)
+    valid = serves & _is_valid(n, omega, Gamma, p, state)
+    low = _margin(n, omega, state).lo
+    high = _margin(problem.enclosed(R_H), omega, state).hi
+    return Interval(np.where(valid, low, -np.inf), np.maximum(low, high))
+
+
+def _is_valid(
+    n: Numbers[Interval], omega: Interval, Gamma: Interval, p: Predictor[Interval], s: DistanceState[Interval]
+) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """The side conditions of theorem B on Y, e and S, proven."""
+    speed = speed_needed(n, s.S, s.e).hi < s.Y.lo
+    prediction = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo
+    filtered = uncertainty(n, s.Y, omega).hi <= s.S.lo
+    return speed & prediction & filtered
+
+
+def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -> Interval:
+    return (1.0 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
+
+
+@quiet
+def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
+    """An upper bound of the margin that any Y, e, S can prove at the recipe's gains; <= 0 refutes the gains.
+
+    Y is replaced by a lower bound of the least fixed point, approached from below; sup D rises with e and S,
+    they with Y. The bound holds for all constants within their enclosures.
+    """
+    n = problem.enclosed(recipe.projection_radius)
+    omega, root = Interval.of(recipe.bandwidth), sqrt(Interval.of(recipe.adaptation_rate))
+    g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
+    p = predictor(problem.A_m, omega, g)
+
+    def errors(Y: Interval) -> tuple[Interval, Interval]:
+        S = uncertainty(n, Y, omega).sanitised()
+        e = (filter_error(n, Y, omega, p) / root).sanitised()
+        return Interval(np.maximum(S.lo, 0.0)), Interval(np.maximum(e.lo, 0.0))
+
+    Y = least_from_below(lambda Y: speed_needed(n, *errors(Y)))
+    S, e = errors(Y)
+    return float((1.0 - distance_bound(n, omega, S, e).supremum() / reach(n)).sanitised().hi)
+
+
+def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
+    """A lower bound of every Y >= needed(Y), for a nondecreasing `needed`: iterates from 0, rounded down."""
+    Y = Interval(0.0)
+    for _ in range(_RISES):
+        raised: Array = np.maximum(Y.lo, needed(Y).sanitised().lo)
+        if raised <= Y.lo * (1 + 1e-13):
+            break
+        Y = Interval(raised)
+    return Y
+
+
+def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float:
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven."""
+    n = problem.proven(recipe.projection_radius)
+    S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
+    return float((distance_bound(n, Interval.of(recipe.bandwidth), S, e).ultimate() / sqrt(n.a)).hi)

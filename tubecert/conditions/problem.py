@@ -1,0 +1,226 @@
+"""The question that the conditions answer: constants over a tube, its radii, and the options of the loop.
+
+A `TubeProblem` is exact data. `Numbers` is the same data in one arithmetic: as floats on the safe side
+(search), as point intervals on the safe side (what is proven), or as full enclosures (what cannot be
+excluded).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from fractions import Fraction
+from typing import Generic
+
+import numpy as np
+
+from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.conditions.arithmetic import Array, T
+from tubecert.conditions.decimals import next_up, round_up
+from tubecert.conditions.kernels import Kernel
+from tubecert.conditions.predictor import Matrix, damping, scalar_gain
+from tubecert.enclosure.interval import Interval
+from tubecert.errors import TubecertError
+from tubecert.findings import Finding
+
+Exact = Fraction | float  # a float means its binary value
+
+_ROUNDING = 1 + Fraction(1, 10**9)  # what a caller who rounds rho may miss; `proven` corrects for it
+_LEAST_RADIUS = 1e-12  # of R_H where h vanishes: keeps every quotient defined
+RADIUS_DIGITS = 6  # of R_H: more than for the gains, because every digit dropped makes every constant larger
+
+
+class Formulas(StrEnum):
+    """Whose formulas: the corrected ones (theory) or the paper's own text."""
+
+    CORRECTED = "corrected"
+    AS_PRINTED = "as-printed"
+
+
+class Drift(StrEnum):
+    """How the known part of |xdot| is bounded: sup |f + B u*| or sup |f| + sup |B| sup |u*|."""
+
+    PLAN = "plan"
+    SUM = "sum"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers(Generic[T]):
+    """Constants, radii and options as numbers of one arithmetic; names are the paper's symbols."""
+
+    a: T
+    A: T
+    Df: T
+    Dfx: T
+    DB: T
+    DBx: T
+    Dbx: T
+    DBp: T
+    DBpx: T
+    DMx: T
+    Dus: T
+    Dh: T
+    Dhx: T
+    Dht: T
+    du: T
+    beta: T
+    phi: T
+    d0: T
+    delta: T
+    smin: T  # inf of the smallest singular value of Theta B (as printed only)
+    excess: T  # sup lmax(F~) (as printed only)
+    H0: T
+    R: T  # the radius of the projection
+    lam: T
+    rho: T
+    rho_a: T
+    rho_r: T
+    offset: T  # |x*(0) - x(0)| (as printed only)
+    horizon: T | None
+
+
+# symbol -> field of BoundConstants; `a` and `smin` are infima, the others suprema
+_FIELDS = {
+    "a": "lower",
+    "A": "upper",
+    "Df": "f",
+    "Dfx": "f_x",
+    "DB": "B",
+    "DBx": "B_x",
+    "Dbx": "b_x",
+    "DBp": "B_pinv",
+    "DBpx": "B_pinv_x",
+    "DMx": "M_x",
+    "Dus": "u_star",
+    "Dh": "h",
+    "Dhx": "h_x",
+    "Dht": "h_t",
+    "H0": "h_initial",
+    "du": "feedback_gain",
+    "beta": "metric_input_gain",
+    "phi": "drift_on_plan",
+    "d0": "initial_distance",
+    "delta": "plan_defect_metric",
+    "smin": "input_gain_least",
+    "excess": "contraction_excess",
+}
+_INFIMA = {"a", "smin"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TubeProblem:
+    """Constants that hold over O(rho), and everything else that the conditions need.
+
+    `A_m` is None for `auto` (each certificate takes its best -g I). P = I throughout, Q = -(A_m + A_m').
+    `smooth` is the boundary layer nu of a smooth projection, None for the hard one. `rho_r` may be any
+    number with rho_r + rho_a <= rho.
+    `filter_factor` is |sC|/omega: 2; the published gains need the wrong value 1.
+    Raises `TubecertError`
+    TC501 if A_m + A_m' is not negative definite, `ValueError` for inconsistent radii.
+    """
+
+    constants: BoundConstants
+    rate: Fraction
+    epsilon: Fraction
+    rho_a: Fraction
+    rho_r: Interval | Exact
+    rho: Exact
+    initial_offset: Interval | Exact = 0.0
+    horizon: Fraction | None = None
+    A_m: Matrix | None = None
+    smooth: Fraction | None = None
+    formulas: Formulas = Formulas.CORRECTED
+    kernel: Kernel | None = None
+    drift: Drift = Drift.PLAN
+    filter_factor: int = 2
+
+    def __post_init__(self) -> None:
+        if min(self.rate, self.rho_a, self.epsilon) <= 0:
+            raise ValueError("rate, epsilon and rho_a must be positive")
+        if Fraction(float(_interval(self.rho_r).lo)) + self.rho_a > Fraction(self.rho) * _ROUNDING:
+            raise ValueError("rho must be at least rho_r + rho_a")
+        if self.constants.lower.below <= 0:
+            raise ValueError("the metric must be positive definite on the tube")
+        if self.A_m is not None and not damping(self.A_m).lo > 0:
+            raise TubecertError([_NOT_DAMPED])
+
+    @property
+    def as_printed(self) -> bool:
+        """Whether the paper's own formulas are to be reproduced."""
+        return self.formulas is Formulas.AS_PRINTED
+
+    @property
+    def active_kernel(self) -> Kernel:
+        """The kernel in use: tight for corrected formulas and the paper's for printed ones, unless chosen."""
+        if self.kernel is not None:
+            return self.kernel
+        return Kernel.PAPER if self.as_printed else Kernel.TIGHT
+
+    @property
+    def predictor_gain(self) -> Fraction | None:
+        """The g of a given A_m = -g I, else None."""
+        return None if self.A_m is None else scalar_gain(self.A_m)
+
+    @property
+    def projection_radius(self) -> Fraction:
+        """R_H: a decimal >= sqrt(1 + nu) Dh, the least that the projection of A and B needs."""
+        least = np.sqrt(float(1 + (self.smooth or 0))) * self.constants.h.above
+        radius = round_up(max(least, _LEAST_RADIUS), RADIUS_DIGITS)
+        return radius if self.radius_serves(radius) else next_up(radius, RADIUS_DIGITS)
+
+    @property
+    def clipping_radius(self) -> Fraction:
+        """R_H of certificate C, which clips: a decimal >= Dh."""
+        return round_up(max(self.constants.h.above, _LEAST_RADIUS), RADIUS_DIGITS)
+
+    def radius_serves(self, R_H: Fraction, *, clips: bool = False) -> bool:
+        """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly."""
+        layer = Fraction(0) if clips or self.smooth is None else self.smooth
+        return R_H > 0 and (1 + layer) * Fraction(self.constants.h.above) ** 2 <= R_H**2
+
+    def floats(self, R_H: Fraction | None = None) -> Numbers[Array]:
+        """The safe side in floats, for the search."""
+        safe = self.proven(R_H)
+        values = {
+            name: None if (x := getattr(safe, name)) is None else (x.lo if name in _SMALL_IS_SAFE else x.hi)
+            for name in Numbers.__slots__
+        }
+        return Numbers(**values)
+
+    def proven(self, R_H: Fraction | None = None) -> Numbers[Interval]:
+        """The safe side: the theorems hold with these numbers, because each bounds its constant."""
+        safe = self._numbers(lambda name, c: Interval(c.below if name in _INFIMA else c.above), R_H)
+        rho_r = np.minimum(safe.rho_r.lo, (safe.rho - safe.rho_a).lo)  # the proof needs rho_r + rho_a <= rho
+        return replace(safe, rho_r=Interval(rho_r), offset=Interval(safe.offset.hi))
+
+    def enclosed(self, R_H: Fraction | None = None) -> Numbers[Interval]:
+        """Enclosures of the constants themselves, for what cannot be excluded."""
+        return self._numbers(lambda _, c: Interval(c.below, c.above), R_H)
+
+    def _numbers(self, side: Callable[[str, Constant], Interval], R_H: Fraction | None) -> Numbers[Interval]:
+        named = {symbol: side(symbol, getattr(self.constants, field)) for symbol, field in _FIELDS.items()}
+        radius = self.projection_radius if R_H is None else R_H
+        return Numbers(
+            **named,
+            R=Interval.of(radius),
+            lam=Interval.of(self.rate),
+            rho=_interval(self.rho),
+            rho_a=Interval.of(self.rho_a),
+            rho_r=_interval(self.rho_r),
+            offset=_interval(self.initial_offset),
+            horizon=None if self.horizon is None else Interval.of(self.horizon),
+        )
+
+
+_SMALL_IS_SAFE = _INFIMA | {"rho_r", "rho_a", "lam"}
+
+_NOT_DAMPED = Finding(
+    code="TC501",
+    message="A_m + A_m' is not negative definite, so P = I is no Lyapunov matrix of the predictor",
+    help="choose A_m = -g I with g > 0, or `auto`",
+)
+
+
+def _interval(value: Interval | Exact) -> Interval:
+    return value if isinstance(value, Interval) else Interval.of(value)

@@ -1,0 +1,119 @@
+"""Certificate A: the margins of the paper's conditions (26a), (26b), (26c) at given gains. Trusted.
+
+A margin is (allowed - needed)/allowed. Its lower end is proven: it is evaluated at numbers for which the
+theorem holds. Its upper end bounds the margin for the constants themselves, whatever they are within their
+enclosures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.bounds.constants import Constant
+from tubecert.conditions.arithmetic import T, choose, number, quiet, sqrt, vector
+from tubecert.conditions.derived import (
+    RateTerms,
+    filter_error,
+    prediction_error,
+    rate_terms,
+    zetas,
+)
+from tubecert.conditions.predictor import predictor
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.enclosure.interval import Interval
+
+Margins = dict[str, Interval]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateRecipe:
+    """Everything that the conditions (26) are checked at; `predictor_gain` is None for a general A_m."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+    projection_radius: Fraction
+
+
+def margins_26(problem: TubeProblem, recipe: RateRecipe) -> Margins:
+    """Margins of (26a), (26b), (26c), scalars. Implements: (26a)-(26c)."""
+    many = margins_26_along(problem, [recipe])
+    return {claim: margin[0] for claim, margin in many.items()}
+
+
+@quiet
+def margins_26_along(problem: TubeProblem, recipes: Sequence[RateRecipe]) -> Margins:
+    """Margins at many gains at once, shape `(len(recipes),)`; recipes share the projection radius."""
+    R_H = recipes[0].projection_radius
+    serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H)
+    omega = vector([r.bandwidth for r in recipes])
+    Gamma = vector([r.adaptation_rate for r in recipes])
+    gains = [r.predictor_gain for r in recipes if r.predictor_gain is not None]
+    g = vector(gains) if gains else None
+    proven = rate_margins(problem, problem.proven(R_H), omega, Gamma, g)
+    possible = rate_margins(problem, problem.enclosed(R_H), omega, Gamma, g)
+    return {
+        claim: Interval(low if serves else np.full_like(low, -np.inf), np.maximum(low, possible[claim].hi))
+        for claim, low in ((claim, margin.lo) for claim, margin in proven.items())
+    }
+
+
+def rate_margins(problem: TubeProblem, n: Numbers[T], omega: T, Gamma: T, g: T | None) -> dict[str, T]:
+    """The three margins in one arithmetic; (26c) is -inf where (26b) leaves nothing to divide by."""
+    terms = rate_terms(problem, n)
+    z = zetas(problem, n, terms, omega)
+    first = 1.0 - (terms.E0 / n.a + z.zeta1 + terms.zeta_p) / n.rho_r**2
+    rest = n.a - z.zeta2 - z.zeta3
+    needed = theta(problem, n, terms, omega, g) / (n.rho_a * rest)
+    third = choose(rest, 1.0 - needed / sqrt(Gamma), number(-np.inf, rest))
+    return {"26a": _known(first), "26b": _known(rest / n.a), "26c": _known(third)}
+
+
+def _known(x: T) -> T:
+    return x.sanitised() if isinstance(x, Interval) else x
+
+
+def theta(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, g: T | None) -> T:
+    """Dtheta = DB A Deta/lambda."""
+    Deta = filter_error(problem, n, terms, omega, predictor(problem.A_m, omega, g))
+    return n.DB * n.A * Deta / n.lam
+
+
+def derived_constants(problem: TubeProblem, recipe: RateRecipe) -> dict[str, Constant]:
+    """The derived constants at the printed gains as enclosures, by their names in the certificate."""
+    omega = Interval.of(recipe.bandwidth)
+    g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
+    below, above = (
+        _derived(problem, n, omega, g)
+        for n in (problem.enclosed(recipe.projection_radius), problem.proven(recipe.projection_radius))
+    )
+    return {
+        name: Constant(below=float(below[name].lo), above=float(np.maximum(above[name].hi, below[name].lo)))
+        for name in below
+    }
+
+
+@quiet
+def _derived(
+    problem: TubeProblem, n: Numbers[Interval], omega: Interval, g: Interval | None
+) -> dict[str, Interval]:
+    terms = rate_terms(problem, n)
+    z = zetas(problem, n, terms, omega)
+    p = predictor(problem.A_m, omega, g)
+    return {
+        "speed": terms.speed,
+        "uncertainty_rate": terms.s1,
+        "prediction_error": prediction_error(terms.hs, terms.s1, p.q),
+        "filter_error": filter_error(problem, n, terms, omega, p),
+        "theta": theta(problem, n, terms, omega, g),
+        "Psi_x": terms.psi_x,
+        "geodesic_rate": terms.geodesic_rate,
+        "Psi_rate": terms.psi_rate,
+        "zeta_1": z.zeta1.sanitised(),
+        "zeta_2": z.zeta2.sanitised(),
+        "zeta_3": z.zeta3.sanitised(),
+    }

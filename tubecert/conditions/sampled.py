@@ -1,0 +1,178 @@
+"""Certificate C: piecewise-constant adaptation with sample time Ts. Trusted.
+
+THEOREM C. If Y > phi + DB[du dbar + min((1+r_H) Dh, max(H1, S_T))], then dbar > max(d0, d1, sup D) with
+(d0, H0, S, e) := (d1, H1, S_T, 0) implies |x - x*| < rho over the horizon. The estimate is
+clipped to R_H >= Dh. Implements: theory section 4b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Generic
+
+import numpy as np
+
+from tubecert.conditions.arithmetic import (
+    T,
+    confined,
+    decay_mean,
+    exp,
+    expm1,
+    least_solution,
+    maximum,
+    minimum,
+    number,
+    quiet,
+    sqrt,
+    vector,
+)
+from tubecert.conditions.distance import drift_bound, least_from_below, reach
+from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.enclosure.interval import Interval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledRecipe:
+    """The proof of theorem C at printed gains: `speed` is Y."""
+
+    sample_time: Fraction
+    bandwidth: Fraction
+    predictor_gain: Fraction
+    projection_radius: Fraction
+    speed: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ages(Generic[T]):
+    """How old what the filter sees is: m, the mean age of an estimate, and w = Ts/(1 - e^(-omega Ts))."""
+
+    m: T
+    w: T
+
+
+@quiet
+def ages(Ts: T, omega: T, g: T) -> Ages[T]:
+    """Mean age m = 1/g - Ts/(e^(g Ts) - 1) in [0, Ts/2], and the filter's share w."""
+    y = g * Ts
+    line = 0.5 - y / 12.0
+    mean = 1.0 / y - 1.0 / expm1(y)
+    if isinstance(mean, Interval) and isinstance(line, Interval):
+        # the series 1/2 - y/12 + y^3/720 - ... envelopes the mean: free of the cancellation at small y
+        mean = confined(
+            mean, maximum(line, number(0.0, line)), minimum(line + y**3 / 720.0, number(0.5, line))
+        )
+    else:
+        mean = np.where(y < 1e-3, line, mean)
+    return Ages(m=Ts * mean, w=1.0 / (omega * decay_mean(omega * Ts)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledState(Generic[T]):
+    """H1, S_T and d1 of theorem C at one Y."""
+
+    H1: T
+    S_T: T
+    d1: T
+
+
+@quiet
+def sampled_state(n: Numbers[T], Ts: T, age: Ages[T], Y: T) -> SampledState[T]:
+    """H1 = min(Dh, H0 + s1 Ts), S_T = s1 w + m (s1 + b Y), d1 = the distance after the first sample."""
+    s1 = n.Dht + n.Dhx * Y
+    b = _gain_drift(n)
+    H1 = minimum(n.Dh, n.H0 + s1 * Ts)
+    S_T = s1 * age.w + age.m * (s1 + b * Y)
+    d1 = n.d0 * exp(-n.lam * Ts) + (n.beta * H1 + n.delta) * Ts * decay_mean(n.lam * Ts)
+    return SampledState(H1=H1, S_T=S_T, d1=d1)
+
+
+def _gain_drift(n: Numbers[T]) -> T:
+    """How fast B^+ B drifts: b = min(DBp DBx, DBpx DB) Dh, per unit of |xdot|; 0 for a constant B."""
+    return minimum(n.DBp * n.DBx, n.DBpx * n.DB) * n.Dh
+
+
+@quiet
+def speed_needed(n: Numbers[T], s: SampledState[T]) -> T:
+    """What Y has to exceed."""
+    return drift_bound(n) + n.DB * minimum(n.Dh + n.R, maximum(s.H1, s.S_T))
+
+
+@quiet
+def least_speed(n: Numbers[T], Ts: T, age: Ages[T]) -> T:
+    """The least Y, in closed form: every term of the minimum and maximum is affine in Y."""
+    drift, b = drift_bound(n), _gain_drift(n)
+    crude = drift + n.DB * (n.Dh + n.R)
+    first = minimum(
+        drift + n.DB * n.Dh, least_solution(drift + n.DB * (n.H0 + n.Dht * Ts), n.DB * n.Dhx * Ts)
+    )
+    lag = age.w + age.m
+    later = least_solution(drift + n.DB * n.Dht * lag, n.DB * (n.Dhx * lag + b * age.m))
+    return minimum(crude, maximum(first, later))
+
+
+@quiet
+def sampled_supremum(n: Numbers[T], Ts: T, omega: T, age: Ages[T], Y: T) -> T:
+    """max(d0, d1, sup D): what dbar has to exceed."""
+    s = sampled_state(n, Ts, age, Y)
+    return maximum(maximum(n.d0, s.d1), _bound(n, omega, s).supremum())
+
+
+def _bound(n: Numbers[T], omega: T, s: SampledState[T]) -> DistanceBound[T]:
+    return DistanceBound(
+        d0=s.d1,
+        beta=n.beta,
+        H0=s.H1,
+        S=s.S_T,
+        e=number(0.0, n.d0),
+        delta=n.delta,
+        lam=n.lam,
+        omega=omega,
+        horizon=n.horizon,
+    )
+
+
+def margin_sampled(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
+    """The margin (dbar - max(d0, d1, sup D))/dbar of one recipe; its lower end is -inf if Y fails."""
+    return margin_sampled_along(problem, [recipe])[0]
+
+
+@quiet
+def margin_sampled_along(problem: TubeProblem, recipes: Sequence[SampledRecipe]) -> Interval:
+    """Margins of many recipes at once, shape `(len(recipes),)`; recipes share the projection radius."""
+    R_H = recipes[0].projection_radius
+    serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H, clips=True)
+    Ts, omega = vector([r.sample_time for r in recipes]), vector([r.bandwidth for r in recipes])
+    age = ages(Ts, omega, vector([r.predictor_gain for r in recipes]))
+    Y = vector([r.speed for r in recipes])
+    n = problem.proven(R_H)
+    valid = serves & (speed_needed(n, sampled_state(n, Ts, age, Y)).hi < Y.lo)
+    low = _margin(n, Ts, omega, age, Y).lo
+    high = _margin(problem.enclosed(R_H), Ts, omega, age, Y).hi
+    return Interval(np.where(valid, low, -np.inf), np.maximum(low, high))
+
+
+def _margin(
+    n: Numbers[Interval], Ts: Interval, omega: Interval, age: Ages[Interval], Y: Interval
+) -> Interval:
+    return (1.0 - sampled_supremum(n, Ts, omega, age, Y) / reach(n)).sanitised()
+
+
+@quiet
+def sampled_ceiling(problem: TubeProblem, recipe: SampledRecipe) -> float:
+    """An upper bound of the margin that any Y can prove at the recipe's gains; <= 0 refutes these gains."""
+    n = problem.enclosed(recipe.projection_radius)
+    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
+    age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
+    Y = least_from_below(lambda Y: speed_needed(n, sampled_state(n, Ts, age, Y)))
+    return float(_margin(n, Ts, omega, age, Y).hi)
+
+
+def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float:
+    """|x - x*| is at most this in the long run, proven."""
+    n = problem.proven(recipe.projection_radius)
+    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
+    s = sampled_state(n, Ts, ages(Ts, omega, Interval.of(recipe.predictor_gain)), Interval.of(recipe.speed))
+    return float((_bound(n, omega, s).ultimate() / sqrt(n.a)).hi)
