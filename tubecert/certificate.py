@@ -1,0 +1,121 @@
+"""The certificate as data: sealed with a hash, written atomically, mapped to an exit code.
+
+In: the `result` of a certification. Out: canonical JSON. The hash is of the canonical bytes of `result` (UTF-8, sorted
+keys, no spaces, no NaN), so that any change of what was proven shows. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tubecert.errors import ExitCode, TargetError
+from tubecert.findings import Finding
+
+FORMAT = "tubecert-certificate/1"
+STDOUT = "-"
+
+_CODES = {
+    "certified": ExitCode.CERTIFIED,
+    "refuted": ExitCode.NOT_CERTIFIED,
+    "undecided": ExitCode.UNDECIDED,
+}
+
+
+def canonical_bytes(data: Any) -> bytes:
+    """The bytes that are hashed. Raises `ValueError` for NaN or infinity."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.encode()
+
+
+def digest(data: Any) -> str:
+    """`sha256:` and the hash of the canonical bytes."""
+    return "sha256:" + hashlib.sha256(canonical_bytes(data)).hexdigest()
+
+
+def seal(result: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
+    """The certificate: what was proven, its hash, and how it was made (versions, times, command line)."""
+    return {"format": FORMAT, "hash": digest(result), "result": dict(result), "run": dict(run)}
+
+
+def exit_code(result: Mapping[str, Any]) -> ExitCode:
+    """What a verdict means to the shell."""
+    return _CODES[result["verdict"]]
+
+
+def dump(certificate: Mapping[str, Any]) -> str:
+    """The file's text: sorted keys, indented."""
+    return json.dumps(certificate, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def check_target(target: str) -> None:
+    """Raise `TargetError` now if `target` cannot become a file, before any work is done."""
+    if target == STDOUT:
+        return
+    path = Path(target)
+    if path.is_dir():
+        raise _unwritable(target, "it is a folder")
+    if not path.parent.is_dir():
+        raise _unwritable(target, f"there is no folder {path.parent}")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise _unwritable(target, "permission denied")
+
+
+def write(target: str, certificate: Mapping[str, Any]) -> None:
+    """Write the certificate to a temporary file and rename it; `-` is stdout, devices are written to directly.
+
+    Raises `TargetError`; then nothing is left behind and an older file is untouched.
+    """
+    text = dump(certificate)
+    if target == STDOUT:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
+    check_target(target)
+    path = Path(target)
+    try:
+        if path.exists() and not path.is_file():
+            with path.open("w", encoding="utf-8") as device:
+                device.write(text)
+        else:
+            _replace(path, text)
+    except OSError as error:
+        raise _unwritable(target, error.strerror or str(error)) from error
+
+
+def _replace(path: Path, text: str) -> None:
+    # a link keeps pointing where it points: the file it names is replaced
+    path = path.resolve()
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(temporary).unlink()
+        raise
+
+
+def _unwritable(target: str, why: str) -> TargetError:
+    return TargetError(
+        [
+            Finding(
+                code="TC120",
+                message=f"cannot write {target}: {why}",
+                help="choose another file with -o FILE, or -o - for stdout",
+            )
+        ]
+    )

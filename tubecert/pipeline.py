@@ -1,0 +1,533 @@
+"""Certification from a specification to a result: the rooms in their order.
+
+In: a `Spec` and `Options`. Out: the `result` object of a certificate (docs and design name its keys), for every verdict.
+A claim that fails ends the work: what rests on it is not computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from tubecert.bounds.compute import Radius, bound_constants, least_radius, time_range
+from tubecert.bounds.constants import TABLE, BoundConstants, Constant, Meaning, Witness
+from tubecert.bounds.suprema import Suprema
+from tubecert.certificate import digest
+from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.enclosure.domain import Range
+from tubecert.errors import SpecError
+from tubecert.findings import Finding, Severity
+from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.model import ControlAffineModel, build, domain_findings, rank_decision, time_period
+from tubecert.search import Answer, answer
+from tubecert.spec import Spec, canonical
+from tubecert.trajectory import Plan
+
+Result = dict[str, Any]
+CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the command line asks for beside the specification."""
+
+    rho_a: Fraction | None = None
+    epsilon: Fraction | None = None
+    metric: Path | None = None
+    conditions: str = "26"
+    formulas: str = "corrected"
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    gap: Fraction = Fraction(1, 100)
+    budget: int = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """Progress: what is being bounded, boxes so far, and the bounds so far."""
+
+    name: str
+    boxes: int
+    below: float
+    above: float
+
+
+Progress = Callable[[Step], None]
+
+
+def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
+    """What is wrong with the mathematics of a specification, without certifying it."""
+    findings, time = _time(spec)
+    if findings:
+        return findings
+    effort = Effort(budget=budget)
+    findings = domain_findings(spec, time, effort)
+    if findings:
+        return findings
+    decision = rank_decision(build(spec), spec.safe_set, effort)
+    if decision.verdict == "refuted":
+        point = ", ".join(f"{name} = {value:.6g}" for name, value in decision.at.items()) or "every point"
+        findings.append(
+            Finding(
+                code="TC203",
+                message=f"B loses rank in the safe set, at {point}",
+                location=spec.location("system.B"),
+                help="shrink the safe set, or remove an input that does nothing there",
+            )
+        )
+    return findings
+
+
+def certify(spec: Spec, options: Options, progress: Progress | None = None) -> Result:
+    """The result for a specification; raises `SpecError` for what makes the question meaningless."""
+    spec = _overridden(spec, options)
+    findings, time = _time(spec)
+    findings += _complete(spec, options)
+    if not findings:
+        findings = domain_findings(spec, time, Effort(budget=options.budget))
+    if any(item.severity is Severity.ERROR for item in findings):
+        raise SpecError(findings)
+    return _Certification(spec, options, time, progress).run()
+
+
+class _Certification:
+    """One run; `result` grows as the rooms answer."""
+
+    def __init__(self, spec: Spec, options: Options, time: Range | None, progress: Progress | None) -> None:
+        self.spec, self.options, self.time = spec, options, time
+        self.model: ControlAffineModel = build(spec)
+        self.plan = Plan(
+            tuple(term.expression for term in spec.trajectory.x),
+            tuple(term.expression for term in spec.trajectory.u),
+            spec.trajectory.horizon,
+        )
+        self.progress = progress
+        self.effort = Effort(gap=float(options.gap), budget=options.budget)
+        text = canonical(spec)
+        self.result: Result = {
+            "formulas": options.formulas,
+            "spec": {
+                "effective": text,
+                "effective_hash": digest(text),
+                "file_hash": "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
+            },
+            "overrides": _overrides(options),
+            "plan": {"kind": spec.trajectory.kind, "interpolation": "exact"},
+            "safe_set": {
+                name: [_decimal(low), _decimal(high)]
+                for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
+            },
+            "assumptions": _assumptions(spec, self.model),
+            "declared": _declared(spec),
+            "reasons": [],
+            "proof": {},
+        }
+
+    def run(self) -> Result:
+        """Every claim in its order; the first that fails decides."""
+        if self._rank() and self._metric():
+            radius = self._radius()
+            if radius is not None:
+                self._conditions(radius)
+        return self.result
+
+    # -- claims ------------------------------------------------------------------------------------------------
+
+    def _rank(self) -> bool:
+        decision = rank_decision(self.model, self.spec.safe_set, self.effort)
+        if decision.verdict == "proven":
+            return True
+        x = tuple(decision.at.get(name, 0.0) for name in self.model.states)
+        word = "loses rank in the safe set" if decision.verdict == "refuted" else "could not be proven of full rank"
+        return self._stop("rank of B", decision.verdict, f"B {word}", Witness(x=x))
+
+    def _metric(self) -> bool:
+        proof = verify_metric(self.model, self.spec.safe_set, self._effort("metric"))
+        self.result["metric"] = _metric_data(self.spec, proof)
+        if proof.verdict != "certified":
+            at = proof.at if proof.verdict == "refuted" else None
+            return self._stop(f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof))
+        return self._declared_metric(proof)
+
+    def _relax_metric(self, proof: MetricProof) -> str:
+        if proof.largest_rate is None:
+            return "give another dual metric"
+        return f"lower metric.rate to {_floor(proof.largest_rate.below)}, or give another dual metric"
+
+    def _declared_metric(self, proof: MetricProof) -> bool:
+        """The bounds a, A that a specification may declare must hold on the safe set."""
+        metric = self.spec.metric
+        assert metric is not None
+        assert proof.lower_on_set is not None
+        assert proof.upper_on_set is not None
+        claim = "declared bounds of the metric"
+        if metric.lower is not None and Fraction(proof.lower_on_set.below) < metric.lower:
+            refuted = Fraction(proof.lower_on_set.above) < metric.lower
+            return self._stop(
+                claim,
+                "refuted" if refuted else "undecided",
+                f"metric.bounds.lower is {float(metric.lower):g}, but lmin(M) reaches {proof.lower_on_set.above:.8g}",
+                proof.lower_on_set.at,
+                f"declare lower: {_floor(proof.lower_on_set.below)}",
+            )
+        if metric.upper is not None and Fraction(proof.upper_on_set.above) > metric.upper:
+            refuted = Fraction(proof.upper_on_set.below) > metric.upper
+            return self._stop(
+                claim,
+                "refuted" if refuted else "undecided",
+                f"metric.bounds.upper is {float(metric.upper):g}, but lmax(M) reaches {proof.upper_on_set.below:.8g}",
+                proof.upper_on_set.at,
+                f"declare upper: {_ceiling(proof.upper_on_set.above)}",
+            )
+        return True
+
+    def _suprema(self, rho: float) -> Suprema:
+        report = None
+        if self.progress is not None:
+            show = self.progress
+
+            def report(name: str, boxes: int, below: float, above: float) -> None:
+                show(Step(name=name, boxes=boxes, below=below, above=above))
+
+        return Suprema(self.model, self.plan, rho, self.time, self.effort, report)
+
+    def _radius(self) -> Radius | None:
+        tube = self.spec.tube
+        assert tube.epsilon is not None
+        assert tube.rho_a is not None
+        suprema = self._suprema(1.0)
+        declared = _declared_pair(self.spec)
+        width = tube.epsilon + tube.rho_a
+        radius = least_radius(
+            suprema, self.spec.safe_set, suprema.initial_offset(self.spec.x0), width, declared
+        )
+        contained = radius.contained
+        if contained.verdict == "certified":
+            return radius
+        self.result["tube"] = {"epsilon": _decimal(tube.epsilon), "rho_a": _decimal(tube.rho_a), "rho": radius.rho}
+        lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
+        self._stop(
+            "assumption 1: the tube lies in the safe set",
+            contained.verdict,
+            f"the tube of radius {radius.rho:.6g} {lies} the safe set through the {contained.side} bound of "
+            f"{contained.state}, at t = {contained.t:.6g}, by {contained.excess:.3g}",
+            Witness(t=contained.t, x=contained.x),
+            "reduce epsilon, rho_a or the initial error, or enlarge the safe set",
+        )
+        return None
+
+    def _conditions(self, radius: Radius) -> None:
+        assert radius.lower is not None
+        assert radius.upper is not None
+        suprema = self._suprema(radius.rho)
+        declared = _declared_uncertainty(self.spec)
+        constants = bound_constants(suprema, self.spec.x0, (radius.lower, radius.upper), declared)
+        self.result["metric"] |= {"lower": _pair(constants.lower), "upper": _pair(constants.upper)}
+        self.result["constants"] = {name: _constant(value, meaning) for name, value, meaning in constants.items()}
+        if not (self._finite(constants) and self._declared_holds(suprema, declared)):
+            return
+        found = answer(
+            self._problem(suprema, radius, constants),
+            bandwidth=self.options.bandwidth,
+            adaptation_rate=self.options.adaptation_rate,
+        )
+        self._tube(suprema, radius, found)
+        self._collect(found)
+
+    def _finite(self, constants: BoundConstants) -> bool:
+        for name, value, meaning in constants.items():
+            if not math.isfinite(value.above):
+                return self._stop(
+                    f"bound of {name}",
+                    "undecided",
+                    f"{meaning.words} ({meaning.symbol}) could not be bounded within the budget of boxes",
+                    value.at,
+                    "raise --budget, or shrink the safe set",
+                )
+        return True
+
+    def _declared_holds(self, suprema: Suprema, declared: Mapping[str, Constant]) -> bool:
+        """Declared bounds of h must cover the h that is given as expressions."""
+        if not declared or self.model.h is None:
+            return True
+        for name, derived in zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True):
+            if name in declared and derived.above > declared[name].above:
+                broken = derived.below > declared[name].above
+                return self._stop(
+                    f"declared bound of {name}",
+                    "refuted" if broken else "undecided",
+                    f"uncertainty.bounds.{name} is {declared[name].above:g}, but the expression reaches "
+                    f"{derived.below:.8g} on the tube",
+                    derived.at,
+                    f"declare {name}: {_ceiling(derived.above)}",
+                )
+        return True
+
+    def _problem(self, suprema: Suprema, radius: Radius, constants: BoundConstants) -> TubeProblem:
+        tube, adaptation = self.spec.tube, self.spec.adaptation
+        assert tube.epsilon is not None
+        assert tube.rho_a is not None
+        rho = Fraction(repr(radius.rho))
+        printed = self.options.formulas == "as-printed"
+        return TubeProblem(
+            constants=constants,
+            rate=self.model.rate,
+            epsilon=tube.epsilon,
+            rho_a=tube.rho_a,
+            rho_r=rho - tube.rho_a,
+            rho=rho,
+            initial_offset=suprema.initial_offset(self.spec.x0),
+            horizon=self.spec.trajectory.horizon,
+            A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
+            smooth=adaptation.smooth,
+            formulas=Formulas(self.options.formulas),
+            kernel=self.spec.kernel,
+            drift=Drift.SUM if printed else Drift.PLAN,
+            initial_uncertainty=constants.h_initial,
+        )
+
+    # -- result ------------------------------------------------------------------------------------------------
+
+    def _tube(self, suprema: Suprema, radius: Radius, found: Answer) -> None:
+        tube = self.spec.tube
+        assert tube.rho_a is not None
+        rho = Fraction(repr(radius.rho))
+        reach = found.distance_reach  # sup D of the certified pair, or dbar
+        widths = {
+            name: printable_above(min(width.above * reach, radius.rho))
+            for name, width in zip(self.spec.states, suprema.half_widths(), strict=True)
+        }
+        self.result["tube"] = {
+            "epsilon": _decimal(tube.epsilon),
+            "rho_a": _decimal(tube.rho_a),
+            "rho_r": _decimal(rho - tube.rho_a),
+            "rho": radius.rho,
+            "half_widths": widths,
+        }
+
+    def _collect(self, found: Answer) -> None:
+        """Put the three certificates together; those that were chosen decide the verdict."""
+        for name, (value, meaning) in found.derived.items():
+            self.result["constants"][name] = _constant(value, meaning)
+        self.result |= found.to_dict()
+        chosen = list(CONDITIONS) if self.options.conditions == "all" else [self.options.conditions]
+        self.result["decided_by"] = [CONDITIONS[key] for key in chosen]
+        self.result["reasons"] += found.reasons
+        if self.options.formulas == "as-printed":
+            self.result["reasons"].append(
+                {
+                    "claim": "as-printed",
+                    "verdict": "undecided",
+                    "message": "the paper's printed formulas are reproduced; several are wrong, so nothing is certified",
+                }
+            )
+            self.result["verdict"] = "undecided"
+            return
+        verdicts = {self.result[CONDITIONS[key]]["verdict"] for key in chosen}
+        order = ("refuted", "undecided", "certified")
+        self.result["verdict"] = next(word for word in order if word in verdicts)
+
+    def _stop(
+        self, claim: str, verdict: str, message: str, at: Witness | None = None, relax: str = ""
+    ) -> bool:
+        """Record a claim that is not proven, as the verdict."""
+        reason: Result = {"claim": claim, "verdict": verdict, "message": message}
+        if at is not None:
+            reason["at"] = _witness(at)
+        if relax:
+            reason["relax"] = relax
+        self.result["reasons"].append(reason)
+        self.result["verdict"] = verdict
+        return False
+
+    def _effort(self, name: str) -> Effort:
+        if self.progress is None:
+            return self.effort
+        show = self.progress
+        return replace(
+            self.effort,
+            progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
+        )
+
+
+def _overridden(spec: Spec, options: Options) -> Spec:
+    tube = replace(
+        spec.tube,
+        epsilon=spec.tube.epsilon if options.epsilon is None else options.epsilon,
+        rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
+    )
+    return replace(spec, tube=tube)
+
+
+def _complete(spec: Spec, options: Options) -> list[Finding]:
+    """What a certification needs and a specification may lack."""
+    del options
+    missing = []
+    if spec.metric is None:
+        missing.append(("metric", "give metric.dual_metric and metric.rate, or --metric FILE"))
+    if spec.tube.epsilon is None:
+        missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
+    if spec.tube.rho_a is None:
+        missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
+    findings = [
+        Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
+        for key, remedy in missing
+    ]
+    if not all(e.expression.is_constant for row in spec.B for e in row):
+        findings.append(
+            Finding(
+                code="TC113",
+                message="an input matrix B that is not constant and rational cannot be certified yet",
+                location=spec.location("system.B"),
+                help="use a constant B of rational numbers",
+            )
+        )
+    return findings
+
+
+def _time(spec: Spec) -> tuple[list[Finding], Range | None]:
+    """The range of time that matters for h, or why there is none."""
+    h = spec.uncertainty.h
+    period = time_period(term.expression for term in h or ())
+    try:
+        return [], time_range(spec.trajectory.horizon, period)
+    except ValueError as error:
+        finding = Finding(
+            code="TC204",
+            message=str(error),
+            location=spec.location("uncertainty.h"),
+            help="add trajectory.horizon, in seconds",
+        )
+        return [finding], None
+
+
+def _declared_pair(spec: Spec) -> tuple[Constant, Constant] | None:
+    """The declared (a, A), if both are declared."""
+    metric = spec.metric
+    if metric is None or metric.lower is None or metric.upper is None:
+        return None
+    return _exactly(metric.lower), _exactly(metric.upper)
+
+
+def _declared_uncertainty(spec: Spec) -> dict[str, Constant]:
+    bounds = spec.uncertainty.bounds
+    if bounds is None:
+        return {}
+    values = {"h": bounds.h, "h_x": bounds.h_x, "h_t": bounds.h_t}
+    return {name: _exactly(value) for name, value in values.items() if value is not None}
+
+
+def _exactly(value: Fraction) -> Constant:
+    return Constant(below=printable_below(value), above=printable_above(value))
+
+
+def _declared(spec: Spec) -> Result:
+    """What is believed, not proven: bounds of an h that is not given as expressions."""
+    if spec.uncertainty.h is not None or spec.uncertainty.bounds is None:
+        return {}
+    return {name: constant.above for name, constant in _declared_uncertainty(spec).items()}
+
+
+def _overrides(options: Options) -> Result:
+    given = {
+        "rho_a": options.rho_a,
+        "epsilon": options.epsilon,
+        "bandwidth": options.bandwidth,
+        "adaptation_rate": options.adaptation_rate,
+    }
+    result: Result = {name: _decimal(value) for name, value in given.items() if value is not None}
+    if options.metric is not None:
+        result["metric"] = options.metric.name
+    return result
+
+
+def _metric_data(spec: Spec, proof: MetricProof) -> Result:
+    metric = spec.metric
+    assert metric is not None
+    data: Result = {
+        "rate": _decimal(metric.rate),
+        "dual_metric": canonical(spec)["metric"]["dual_metric"],
+        "verdict": proof.verdict,
+    }
+    for name in ("margin", "largest_rate", "lower_on_set", "upper_on_set"):
+        if (value := getattr(proof, name)) is not None:
+            data[name] = _pair(value.printable())
+    return data
+
+
+def _constant(value: Constant, meaning: Meaning) -> Result:
+    data: Result = {
+        "below": _number(value.below),
+        "above": _number(value.above),
+        "symbol": meaning.symbol,
+        "equation": meaning.equation,
+        "unit": meaning.unit,
+        "meaning": meaning.words,
+    }
+    if value.at is not None:
+        data["at"] = _witness(value.at)
+    return data
+
+
+def _witness(at: Witness) -> Result:
+    return {**({} if at.t is None else {"t": at.t}), "x": list(at.x)}
+
+
+def _pair(value: Constant) -> list[float | None]:
+    return [_number(value.below), _number(value.above)]
+
+
+def _number(value: float) -> float | None:
+    """A bound for JSON: null where there is none."""
+    return value if math.isfinite(value) else None
+
+
+def _decimal(value: Fraction | None) -> float | str | None:
+    """An exact number: a JSON number where one of at most 15 digits is exact, else a text `p/q`."""
+    if value is None:
+        return None
+    near = float(value)
+    return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
+
+
+def _floor(value: float) -> str:
+    digits = 6
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
+    return f"{math.floor(value / step) * step:.{digits}g}"
+
+
+def _ceiling(value: float) -> str:
+    return _floor(-value).lstrip("-")
+
+
+def _assumptions(spec: Spec, model: ControlAffineModel) -> list[str]:
+    """Everything that is not proven here (theory, section 5)."""
+    flat = all(e.is_constant for row in model.W for e in row)
+    smooth = spec.adaptation.smooth
+    horizon = spec.trajectory.horizon
+    return [
+        "the controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
+        "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
+        "minimising geodesics are straight lines, which the constant metric makes unique"
+        if flat
+        else "the controller finds the minimising geodesic exactly, and it is unique in the tube (not proven here)",
+        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
+        "the projection is hard" if smooth is None else f"the projection is smooth with layer {float(smooth):g}",
+        "the full state is measured without noise or delay, and inputs do not saturate",
+        "the filter is first order, C(s) = omega/(s + omega)",
+        f"the claim is for 0 <= t <= {float(horizon):g} s" if horizon is not None else "the claim is for all t >= 0",
+        "the uncertainty obeys its declared bounds on the tube"
+        if spec.uncertainty.h is None
+        else "the uncertainty is the expression of the specification"
+        + (", or any other within the declared bounds" if spec.uncertainty.bounds else ""),
+    ]
+
+
+__all__ = ["CONDITIONS", "TABLE", "Options", "Progress", "Step", "certify", "inspect"]
