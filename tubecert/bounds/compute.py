@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.suprema import Suprema
+from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.model import TIME
 from tubecert.tube import Containment, containment
@@ -18,7 +19,7 @@ _ROUNDS = 60
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Radius:
-    """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, exactly the float over which every constant is taken.
+    """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a; as a decimal it is not above the float over which constants are taken.
 
     `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused.
     """
@@ -40,7 +41,7 @@ def least_radius(
 
     def needed(a: Constant, A: Constant) -> float:
         overshoot = sqrt(Interval(A.above) / Interval(a.below))
-        return float((overshoot * offset + Interval.of(width)).hi)
+        return printable_above(float((overshoot * offset + Interval.of(width)).hi))
 
     def check(rho: float) -> Containment:
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
@@ -48,7 +49,7 @@ def least_radius(
     if declared is not None:
         rho = needed(*declared)
         return Radius(rho=rho, lower=declared[0], upper=declared[1], contained=check(rho))
-    rho = float((offset + Interval.of(width)).hi)
+    rho = printable_above(float((offset + Interval.of(width)).hi))
     for _ in range(_ROUNDS):
         contained = check(rho)
         if contained.verdict != "certified":
@@ -57,7 +58,7 @@ def least_radius(
         right = needed(a, A)
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
-        rho = right * (1 + 1e-6) if right < rho * (1 + 1e-4) else right
+        rho = printable_above(right * (1 + 1e-6)) if right < rho * (1 + 1e-4) else right
     raise ValueError("the radius did not settle")
 
 
@@ -81,7 +82,7 @@ def bound_constants(
     if "h" in declared and model.h is not None:
         uncertainty["h_initial"] = declared["h"]
     delta_p, delta = suprema.plan_defect()
-    return BoundConstants(
+    constants = BoundConstants(
         lower=metric[0],
         upper=metric[1],
         f=suprema.norms("f", [tuple((e,) for e in model.f)]),
@@ -103,6 +104,7 @@ def bound_constants(
         input_gain_least=suprema.input_gain_least(),
         contraction_excess=suprema.contraction_excess(),
     )
+    return constants.printable()
 
 
 def time_range(horizon: Fraction | None, period: Interval | None) -> tuple[Fraction | float, Fraction | float] | None:

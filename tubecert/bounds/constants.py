@@ -69,6 +69,10 @@ class BoundConstants:
         metadata=_of("lmax(F~)", "bounds:delta_u", "1/s", "sup of the largest eigenvalue of the pencil (F, W)")
     )
 
+    def printable(self) -> BoundConstants:
+        """The same with every enclosure widened to printable bounds."""
+        return BoundConstants(**{name: value.printable() for name, value, _ in self.items()})
+
     def items(self) -> list[tuple[str, Constant, Meaning]]:
         """`(name, value, meaning)` of every constant, in the order of the table."""
         return [(item.name, getattr(self, item.name), item.metadata["meaning"]) for item in fields(self)]

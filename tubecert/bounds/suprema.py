@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Witness
+from tubecert.bounds.feedback import ClosedFormGain
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, sqrt
@@ -128,9 +129,12 @@ class Suprema:
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
         objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra=(MU,), weights=_mu_weights)
         found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
-        return Constant(
-            below=max(0.0, found.below), above=max(0.0, found.above), at=self._witness(found)
-        )
+        above = min(found.above, self.feedback_gain_closed_form())
+        return Constant(below=max(0.0, found.below), above=max(0.0, above), at=self._witness(found))
+
+    def feedback_gain_closed_form(self) -> float:
+        """A bound of du in closed form: looser, but it needs no search over mu."""
+        return self._over_tube("feedback_gain", ClosedFormGain(self.model)).above
 
     def contraction_excess(self) -> Constant:
         """sup lmax of the pencil (F, W), as in the printed (bounds:delta_u)."""

@@ -51,6 +51,14 @@ def congruence(t: Array, mid: Array, rad: Array) -> tuple[Array, Array]:
     return t @ mid @ tt, abs_t @ error @ abs_tt * (1 + _gamma(2 * t.shape[-1])) + _TINY
 
 
+def product(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Midpoint and radius of A B for all A, B within their midpoints and radii; shapes broadcast."""
+    (m, r), (n, s) = a, b
+    slack = _gamma(m.shape[-1])
+    error = np.abs(m) @ s + r @ (np.abs(n) + s) + slack * (np.abs(m) @ np.abs(n))
+    return m @ n, error * (1 + 2 * slack) + _TINY
+
+
 def _departure(v: Array) -> Array:
     """An upper bound of |V'V - I|."""
     n = v.shape[-1]

@@ -1,0 +1,78 @@
+"""The feedback gain du in closed form: a bound of the exact constant that needs no search over mu.
+
+In coordinates in which W is near the identity, v = R r + N n with R, N bases of range(B~') and null(B~); where
+v'F~v <= 0 on the null space (C2, certified before), v'F~v <= |r| |v| sqrt(4 |N'F~R|^2 + max(0, lmax(R'F~R))^2), so
+    du <= sqrt(|N'F~R|^2 + max(0, lmax(R'F~R))^2/4)/smin(B~).
+It is up to ten times the exact constant for several inputs, and a fallback where the exact search runs out of boxes.
+Implements: theory section 2, feedback gain, closed form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.linalg import eigenvalues_midrad, midrad, product, spectral_norm_midrad, whitening
+from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.taylor import MatrixFunction
+from tubecert.model import ControlAffineModel
+
+Ball = tuple[Array, Array]  # midpoints and radii of matrices
+
+
+class ClosedFormGain:
+    """The closed form over boxes, for a constant B whose metric satisfies C2 at the model's rate."""
+
+    def __init__(self, model: ControlAffineModel) -> None:
+        self._function = MatrixFunction([model.F, model.W])
+        self.variables = self._function.variables
+        inputs = MatrixFunction([model.B, *([model.annihilator] if model.annihilator else [])])
+        nothing = np.zeros((1, 0))
+        self._B, *rest = (midrad(value) for value in inputs.at(nothing, nothing))
+        self._annihilator: Ball | None = rest[0] if rest else None
+
+    def bound(self, lo: Array, hi: Array) -> Array:
+        """An upper bound over each box, (N,); inf where the box is too wide."""
+        F, W = (midrad(value) for value in self._function.at(lo, hi))
+        t = whitening(W[0])
+        T: Ball = (t, np.zeros_like(t))
+        scaled = eigenvalues_midrad(*product(T, product(W, _transposed(T))))
+        image = product(T, self._B)  # R = T B
+        G = product(_transposed(image), image)
+        back = product(_transposed(T), image)
+        k = whitening(G[0])
+        Kr: Ball = (k, np.zeros_like(k))
+        least_g = eigenvalues_midrad(*product(Kr, product(G, _transposed(Kr)))).lo[:, 0]
+        right = product(F, product(back, _transposed(Kr)))
+        own = product(_transposed(product(back, _transposed(Kr))), right)
+        push = np.maximum(eigenvalues_midrad(*own).hi[:, -1], 0.0) / least_g
+        cross = np.zeros(len(lo))
+        if self._annihilator is not None:
+            N = self._annihilator
+            H = product(_transposed(N), product(W, N))
+            kn = whitening(H[0])
+            Kn: Ball = (kn, np.zeros_like(kn))
+            # N'(T'T)^-1 N >= H/lmax(T W T')
+            least_h = eigenvalues_midrad(*product(Kn, product(H, _transposed(Kn)))).lo[:, 0] / scaled.hi[:, -1]
+            mixed = product(Kn, product(_transposed(N), right))
+            cross = spectral_norm_midrad(*mixed).hi / np.sqrt(np.where(least_h > 0, least_h * least_g, np.nan))
+        smallest = eigenvalues_midrad(*G).lo[:, 0] * scaled.lo[:, 0]
+        valid = (least_g > 0) & (smallest > 0) & (scaled.lo[:, 0] > 0)
+        value = np.sqrt((cross**2 + push**2 / 4) / np.where(valid, smallest, np.nan)) * (1 + 1e-13)
+        return np.where(valid & ~np.isnan(value), value, np.inf)
+
+    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+        """The bound; it converges linearly, so every variable counts by its width."""
+        width = hi - lo
+        return Estimate(self.bound(lo, hi), 0.5 * (lo + hi), width, width)
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Values at points, to steer by: the closed form is a bound, nobody needs it from below."""
+        value = self.bound(lo, hi)
+        return np.where(np.isfinite(value), value * (1 - 1e-9), -np.inf)
+
+
+def _transposed(ball: Ball) -> Ball:
+    return np.swapaxes(ball[0], -1, -2), np.swapaxes(ball[1], -1, -2)
+
+
