@@ -95,7 +95,7 @@ def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
 
 
 def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
-    """The margin (dbar - sup D)/dbar of one recipe, scalar; its lower end is -inf if the recipe is invalid."""
+    """The margin (dbar - sup D)/dbar of one recipe; its lower end is -inf if the recipe is invalid."""
     return margin_distance_along(problem, [recipe])[0]
 
 

@@ -113,11 +113,10 @@ class TubeProblem:
     """Constants that hold over O(rho), and everything else that the conditions need.
 
     `A_m` is None for `auto` (each certificate takes its best -g I). P = I throughout, Q = -(A_m + A_m').
-    `smooth` is the boundary layer nu of a smooth projection, None for the hard one. `rho_r` may be any
-    number with rho_r + rho_a <= rho.
-    `filter_factor` is |sC|/omega: 2; the published gains need the wrong value 1.
-    Raises `TubecertError`
-    TC501 if A_m + A_m' is not negative definite, `ValueError` for inconsistent radii.
+    `smooth` is the boundary layer nu of a smooth projection, None for the hard one. `states` is n. `rho_r`
+    may be any number with rho_r + rho_a <= rho. `filter_factor` is |sC|/omega: 2; the published gains need
+    the wrong value 1. Raises `TubecertError` TC501 if A_m + A_m' is not negative definite, `ValueError` for
+    inconsistent radii.
     """
 
     constants: BoundConstants
@@ -128,6 +127,7 @@ class TubeProblem:
     rho: Exact
     initial_offset: Interval | Exact = 0.0
     horizon: Fraction | None = None
+    states: int = 1
     A_m: Matrix | None = None
     smooth: Fraction | None = None
     formulas: Formulas = Formulas.CORRECTED

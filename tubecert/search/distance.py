@@ -1,0 +1,309 @@
+"""Search of certificate B: the split pair, the pair of least Gamma, the curve Gamma(omega), gains asked for.
+
+For given (omega, e) the least Y is closed; sup D rises with e, so the largest admissible e is a boundary,
+and Gamma = (Deta/e)^2. Implements: theory section 4, "Search and proof".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.conditions import distance as theorem_b
+from tubecert.conditions.arithmetic import Array, quiet
+from tubecert.conditions.decimals import next_up, round_up
+from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.predictor import Predictor, predictor
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.verdict import Shortfall, Verdict, verdict
+from tubecert.enclosure.interval import Interval
+from tubecert.search.results import DistancePair, DistanceResult
+from tubecert.search.scan import boundary, minimum_lanes, minimum_log, smallest
+
+DIGITS = 4
+CURVE_POINTS = 25
+_SLACK = 1e-12  # the search is in floats: stay this far inside
+_ENDLESS = Fraction(10) ** 100  # an adaptation rate that leaves no estimation error
+_LOWEST, _HIGHEST = 1e-3, 1e9  # the bandwidths considered, in units of the rate
+
+
+@quiet
+def best_gain(n: Numbers[Array], omega: Array, Y: Array) -> Array:
+    """The g of A_m = -g I with the smallest Deta: omega for a constant B."""
+    r = (n.Dht + n.Dhx * Y) / (n.Dh + n.R)
+    k = n.DBpx * Y / n.DBp
+    return np.fmax(omega, (np.sqrt(r * (r + 8.0 * k)) - r) / 4.0)
+
+
+def _predictor(problem: TubeProblem, n: Numbers[Array], omega: Array, Y: Array) -> Predictor[Array]:
+    if problem.A_m is None:
+        return Predictor.of_gain(best_gain(n, omega, Y), omega)
+    g = problem.predictor_gain
+    return predictor(problem.A_m, omega, None if g is None else np.asarray(float(g)))
+
+
+@quiet
+def least_rate(
+    problem: TubeProblem, n: Numbers[Array], omega: Array, gain: Array | None = None
+) -> tuple[Array, Array]:
+    """The least Gamma per bandwidth, infinite where none serves, and its e; all of shape (lanes,)."""
+
+    def inside(e: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        Y = theorem_b.least_speed(n, omega, e)
+        return theorem_b.distance_bound(
+            n, omega, theorem_b.uncertainty(n, Y, omega), e
+        ).supremum() < theorem_b.reach(n)
+
+    most = np.broadcast_to((theorem_b.reach(n) * n.lam - n.delta) / n.beta, omega.shape)
+    zero = np.zeros_like(omega)
+    feasible = (most > 0) & inside(zero)
+    e_max = boundary(inside, zero, np.where(feasible, most, 0.0)) * (1 - _SLACK)
+
+    def rate(e: Array) -> Array:
+        Y = theorem_b.least_speed(n, omega, e)
+        p = _predictor(problem, n, omega, Y) if gain is None else Predictor.of_gain(gain, omega)
+        return np.where(feasible & (e > 0), (theorem_b.filter_error(n, Y, omega, p) / e) ** 2, np.inf)
+
+    if not np.any(n.DBpx > 0):
+        return rate(e_max), e_max
+    # Deta grows with Y(e): the least may lie inside
+    return minimum_lanes(rate, np.maximum(1e-4 * e_max, 1e-300), np.maximum(e_max, 1e-300))
+
+
+@quiet
+def smallest_bandwidth(n: Numbers[Array], distance: Array) -> float:
+    """The smallest omega with sup D < distance at e = 0 (Gamma without bound), or inf."""
+
+    def inside(omega: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        zero = np.zeros_like(omega)
+        S = theorem_b.uncertainty(n, theorem_b.least_speed(n, omega, zero), omega)
+        return theorem_b.distance_bound(n, omega, S, zero).supremum() < distance
+
+    return smallest(inside, float(n.lam) * _LOWEST, float(n.lam) * _HIGHEST)
+
+
+@quiet
+def recipes_at(
+    problem: TubeProblem,
+    bandwidths: Sequence[Fraction],
+    rates: Sequence[Fraction],
+    gains: Sequence[Fraction | None],
+    inflation: float = 1e-9,
+) -> list[DistanceRecipe]:
+    """Recipes at given gains: the least fixed point Y, e, S in floats, inflated, as decimals."""
+    R_H = problem.projection_radius
+    n = problem.floats(R_H)
+    omega, root = (np.array([float(x) for x in xs]) for xs in (bandwidths, rates))
+    root = np.sqrt(root)
+    given = [float(g) for g in gains if g is not None]
+    p = predictor(problem.A_m, omega, np.array(given) if given else None)
+    Y = np.broadcast_to(theorem_b.drift_bound(n), omega.shape)
+    for _ in range(400):
+        S, e = theorem_b.uncertainty(n, Y, omega), theorem_b.filter_error(n, Y, omega, p) / root
+        raised = theorem_b.speed_needed(n, S, e)
+        settled = np.all(raised <= Y * (1 + 1e-15))
+        Y = raised
+        if settled:
+            break
+    Y = Y * (1 + inflation)
+    e = theorem_b.filter_error(n, Y, omega, p) / root * (1 + 1e-12)
+    S = theorem_b.uncertainty(n, Y, omega) * (1 + 1e-12) + 1e-12 * n.H0 + 1e-30
+    return [
+        DistanceRecipe(
+            bandwidth=bandwidths[i],
+            adaptation_rate=rates[i],
+            predictor_gain=gains[i],
+            projection_radius=R_H,
+            speed=round_up(float(Y[i]), 13),
+            prediction_error=round_up(float(e[i]), 13),
+            uncertainty=round_up(float(S[i]), 13),
+        )
+        for i in range(len(bandwidths))
+    ]
+
+
+def prove(
+    problem: TubeProblem,
+    bandwidths: Sequence[Fraction],
+    rates: Sequence[Fraction],
+    gains: Sequence[Fraction | None],
+) -> list[DistancePair]:
+    """The best recipe found at each pair of gains, with its margin (-inf below if no recipe is valid)."""
+    for inflation in (1e-9, 1e-6, 1e-3):
+        recipes = recipes_at(problem, bandwidths, rates, gains, inflation)
+        margin = theorem_b.margin_distance_along(problem, recipes)
+        if np.all(margin.lo > -np.inf):
+            break
+    return [DistancePair(recipe=recipe, margin=margin[i]) for i, recipe in enumerate(recipes)]
+
+
+def judged(problem: TubeProblem, omega: Fraction, Gamma: Fraction, g: Fraction | None) -> DistancePair:
+    """One pair of gains: margin proven below by a recipe and bounded above for every recipe."""
+    pair = prove(problem, [omega], [Gamma], [g])[0]
+    ceiling = max(theorem_b.distance_ceiling(problem, pair.recipe), float(pair.margin.lo))
+    radius = theorem_b.ultimate_radius(problem, pair.recipe) if pair.margin.lo > 0 else None
+    return replace(pair, margin=Interval(pair.margin.lo, np.asarray(ceiling)), ultimate_radius=radius)
+
+
+def printed_gain(problem: TubeProblem, n: Numbers[Array], omega: Fraction, e: float) -> Fraction | None:
+    """The predictor gain at a printed bandwidth: the one given, or the best one to 4 digits."""
+    if problem.A_m is not None:
+        return problem.predictor_gain
+    w = np.asarray(float(omega))
+    g = float(best_gain(n, w, theorem_b.least_speed(n, w, np.asarray(e))))
+    return omega if g <= float(omega) else round_up(g, DIGITS)
+
+
+def printed_rates(
+    problem: TubeProblem, bandwidths: Sequence[Fraction]
+) -> list[tuple[Fraction, Fraction, Fraction | None]]:
+    """(omega, Gamma, g) at printed bandwidths: g first, then Gamma for the printed g, rounded up."""
+    n = problem.floats(problem.projection_radius)
+    omega = np.array([float(w) for w in bandwidths])
+    e = least_rate(problem, n, omega)[1]
+    gains = [printed_gain(problem, n, w, float(e[i])) for i, w in enumerate(bandwidths)]
+    given = [float(g) for g in gains if g is not None]
+    Gamma = least_rate(problem, n, omega, np.array(given) if given else None)[0]
+    return [
+        (w, round_up(max(float(G) * (1 + _SLACK), 1e-12), DIGITS), g)
+        for w, G, g in zip(bandwidths, Gamma, gains, strict=True)
+        if np.isfinite(G)
+    ]
+
+
+def proven_at(problem: TubeProblem, omega: Fraction) -> DistancePair | None:
+    """The pair of least Gamma at a printed bandwidth, or None if no Gamma serves there."""
+    for w, Gamma, g in printed_rates(problem, [omega]):
+        for rate in (Gamma, next_up(Gamma, DIGITS), round_up(1.01 * float(Gamma), DIGITS)):
+            pair = judged(problem, w, rate, g)
+            if pair.margin.lo > 0:
+                return pair
+    return None
+
+
+def pair_from(problem: TubeProblem, omega: float, high: float = np.inf) -> DistancePair | None:
+    """The pair at the first printed bandwidth that is proven; more digits only if 4 overshoot `high`."""
+    if not np.isfinite(omega):
+        return None
+    for digits in range(DIGITS, 13):
+        w = round_up(omega * (1 + _SLACK), digits)
+        if float(w) <= high and (pair := proven_at(problem, w)) is not None:
+            return pair
+    return None
+
+
+def _curve(problem: TubeProblem, low: float) -> tuple[DistancePair, ...]:
+    bandwidths = [round_up(w, DIGITS) for w in np.geomspace(1.02 * low, 20 * low, CURVE_POINTS)]
+    points = printed_rates(problem, bandwidths)
+    if not points:
+        return ()
+    pairs = prove(problem, [w for w, _, _ in points], [G for _, G, _ in points], [g for _, _, g in points])
+    return tuple(pair for pair in pairs if pair.margin.lo > 0)
+
+
+def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
+    return tuple(
+        item
+        for n in [(problem.proven(), problem.enclosed())]
+        for item in (
+            _obstacle("dbar <= d0", theorem_b.reach(n[0]), n[0].d0, theorem_b.reach(n[1]), n[1].d0),
+            _obstacle(
+                "dbar <= delta/lambda",
+                theorem_b.reach(n[0]),
+                _residual(n[0]),
+                theorem_b.reach(n[1]),
+                _residual(n[1]),
+            ),
+        )
+        if item is not None
+    )
+
+
+def _residual(n: Numbers[Interval]) -> Interval:
+    """What a plan defect alone leads to: delta/lambda, or what of it the horizon allows."""
+    still = DistanceBound(
+        d0=0.0 * n.d0,
+        beta=n.beta,
+        H0=0.0 * n.H0,
+        S=0.0 * n.H0,
+        e=0.0 * n.H0,
+        delta=n.delta,
+        lam=n.lam,
+        omega=2.0 * n.lam,
+        horizon=n.horizon,
+    )
+    return still.supremum()
+
+
+def _obstacle(
+    claim: str, allowed: Interval, needed: Interval, allowed_all: Interval, needed_all: Interval
+) -> Shortfall | None:
+    low = 1.0 - needed / allowed
+    if low.lo > 0:
+        return None
+    margin = Interval(low.lo, np.maximum(low.lo, (1.0 - needed_all / allowed_all).hi))
+    return Shortfall(claim=claim, margin=margin, allowed=float(allowed.lo), needed=float(needed.hi))
+
+
+def _asked(problem: TubeProblem, bandwidth: Fraction | None, rate: Fraction | None) -> DistancePair | None:
+    """The pair for gains asked for; what is not asked for is chosen as small as possible."""
+    n = problem.floats(problem.projection_radius)
+    if bandwidth is None and rate is not None:
+        low = smallest_bandwidth(n, theorem_b.reach(n))
+        if not np.isfinite(low):
+            return None
+        best = minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low)
+
+        def serves(w: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+            return (least_rate(problem, n, w.ravel())[0] <= float(rate)).reshape(w.shape)
+
+        at = smallest(serves, low, best, 60)
+        bandwidth = round_up((at if np.isfinite(at) else best) * (1 + _SLACK), DIGITS)
+    assert bandwidth is not None  # noqa: S101 - one of the two is asked for
+    if rate is None:
+        return proven_at(problem, bandwidth)
+    e = least_rate(problem, n, np.array([float(bandwidth)]))[1]
+    return judged(problem, bandwidth, rate, printed_gain(problem, n, bandwidth, float(e[0])))
+
+
+def search_distance(
+    problem: TubeProblem, *, bandwidth: Fraction | None = None, adaptation_rate: Fraction | None = None
+) -> DistanceResult:
+    """Certificate B: proven pairs, the curve, and the verdict on the gains asked for, if any."""
+    blocked = obstacles(problem)
+    if blocked:
+        return DistanceResult(verdict=verdict(item.margin for item in blocked), shortfalls=blocked)
+    n = problem.floats(problem.projection_radius)
+    low = smallest_bandwidth(n, theorem_b.reach(n))
+    split = pair_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r))
+    best = minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low) if np.isfinite(low) else np.inf
+    result = DistanceResult(
+        verdict=Verdict.UNDECIDED,
+        split=split,
+        least_adaptation=pair_from(problem, best),
+        curve=_curve(problem, low) if np.isfinite(low) else (),
+    )
+    if bandwidth is None and adaptation_rate is None:
+        return replace(result, verdict=Verdict.CERTIFIED) if result.decisive else result
+    asked = _asked(problem, bandwidth, adaptation_rate)
+    return _decided(problem, replace(result, asked=asked), bandwidth)
+
+
+def _decided(problem: TubeProblem, result: DistanceResult, bandwidth: Fraction | None) -> DistanceResult:
+    """The verdict on the pair asked for; without one, the ceiling of an arbitrarily large rate decides."""
+    asked = result.asked
+    if asked is None and bandwidth is not None:
+        g = bandwidth if problem.A_m is None else problem.predictor_gain
+        margin = judged(problem, bandwidth, _ENDLESS, g).margin
+        return replace(
+            result, verdict=verdict([margin]), shortfalls=(Shortfall(claim="distance", margin=margin),)
+        )
+    if asked is None:
+        return result
+    short = () if asked.margin.lo > 0 else (Shortfall(claim="distance", margin=asked.margin),)
+    return replace(result, verdict=verdict([asked.margin]), shortfalls=short)
