@@ -35,7 +35,7 @@ from tubecert.expression.graph import (
     topological,
 )
 from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
-from tubecert.expression.scan import FUNCTIONS, ExpressionError, suggestion
+from tubecert.expression.scan import FUNCTIONS, ExpressionError, near, suggestion
 from tubecert.expression.text import number_text, to_text
 from tubecert.expression.zero import is_zero
 
@@ -57,6 +57,7 @@ __all__ = [
     "exp",
     "free_symbols",
     "is_zero",
+    "near",
     "norm",
     "number_text",
     "parse",

@@ -183,7 +183,9 @@ def power(base: Expression, exponent: int) -> Expression:
     if base.op == "pow":
         return power(base.args[0], int(str(base.value)) * exponent)
     p, rest = coefficient(base)
-    return mul(constant(p**exponent), _node("pow", (rest,), exponent))
+    if p != 1:
+        return mul(constant(p**exponent), power(rest, exponent))  # rest may be a power itself
+    return _node("pow", (base,), exponent)
 
 
 def sqrt(e: Expression) -> Expression:

@@ -8,6 +8,7 @@ poles.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -23,6 +24,7 @@ MAX_BITS: Final = 5_000
 
 _UNARY = {"sin": graph.sin, "cos": graph.cos, "tan": graph.tan, "exp": graph.exp, "sqrt": graph.sqrt}
 _NOT_FINITE = frozenset({"nan", "inf", "infinity"})
+_FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
 _NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
 
 
@@ -82,8 +84,14 @@ def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fr
         raise ExpressionError(
             what, offset=start, width=width, kind="value", help="write a number such as 0.1 or 1e-3"
         )
-    known = {name: graph.constant(value) for name, value in (symbols or {}).items()}
-    value = parse(text, symbols=known).expression
+    if _FOREIGN_NUMBER.fullmatch(word):
+        advice = (
+            "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
+        )
+        raise ExpressionError(
+            f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
+        )
+    value = _constant(text, symbols or {})
     if not value.is_constant:
         raise ExpressionError(
             f"{word[:60]} is not a rational number",
@@ -93,6 +101,17 @@ def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fr
             help="write it as a decimal or a fraction; numbers here are exact",
         )
     return value.fraction
+
+
+def _constant(text: str, symbols: Mapping[str, Fraction]) -> Expression:
+    known = {name: graph.constant(value) for name, value in symbols.items()}
+    try:
+        return parse(text, symbols=known).expression
+    except ExpressionError as error:
+        if error.kind == "symbol":
+            names = f"known: {', '.join(sorted(known)[:20])}" if known else "there are none"
+            error.help = f"a number has no unit and may use parameters only ({names})"
+        raise
 
 
 def _tree(line: str) -> ast.expr:
@@ -213,7 +232,7 @@ class _Lowering:
             raise self._error(
                 node.right,
                 f"the exponent {words} is beyond {MAX_EXPONENT}",
-                help="write a product",
+                help="write a product such as x**12*x",
                 kind="limit",
             )
         return value.fraction.numerator

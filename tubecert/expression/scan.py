@@ -280,7 +280,10 @@ class _Walk:
     def _sign(self, token: _Token) -> None:
         if token.text not in "+-":
             if token.text == ")" and self.last and self.last.text == "(":
-                raise token.error("there is nothing between the parentheses")
+                called = self.open[-1][1]
+                raise token.error(
+                    "an argument is missing" if called else "there is nothing in the parentheses"
+                )
             raise token.error(f"a value is missing before {token.text}")
         self.signs += 1
         if self.signs > MAX_SIGNS:
@@ -319,10 +322,15 @@ class _Walk:
 _QUOTE = "text with commas inside [ ] or { } must stand in quotes in YAML"
 
 
+def near(name: str, known: Collection[str]) -> list[str]:
+    """The known word that is closest to `name`, if one is close."""
+    lower = {word.lower(): word for word in sorted(known, reverse=True)}
+    return [lower[word] for word in get_close_matches(name.lower()[:60], lower, n=1, cutoff=0.6)]
+
+
 def suggestion(name: str, known: Collection[str], *, what: str = "known names") -> str:
     """A did-you-mean, and the list of what is known."""
     words = sorted(set(known))
-    lower = {word.lower(): word for word in reversed(words)}
-    near = get_close_matches(name.lower()[:60], lower, n=1, cutoff=0.6)
     shown = ", ".join(words[:20]) + (", ..." if len(words) > 20 else "")
-    return f"did you mean {lower[near[0]]}? {what}: {shown}" if near else f"{what}: {shown}"
+    meant = "".join(f"did you mean {word}? " for word in near(name, words))
+    return f"{meant}{what}: {shown}"

@@ -15,16 +15,16 @@ _POINTS = 3
 _LARGEST_SYMBOLIC = 4  # columns up to which det(B^T B) is expanded
 
 
-def failing_pivot(matrix: Matrix) -> tuple[int, Fraction] | None:
-    """The first pivot (from 1) of a symmetric matrix that is not positive; None: positive definite."""
+def is_positive_definite(matrix: Matrix) -> bool:
+    """Whether a symmetric matrix is positive definite: every pivot of the elimination is positive."""
     rows = [list(row) for row in matrix]
     for k, row in enumerate(rows):
         if row[k] <= 0:
-            return k + 1, row[k]
+            return False
         for below in rows[k + 1 :]:
             ratio = below[k] / row[k]
             below[k:] = [b - ratio * r for b, r in zip(below[k:], row[k:], strict=True)]
-    return None
+    return True
 
 
 def rank(matrix: Sequence[Sequence[Fraction]]) -> int:

@@ -7,6 +7,7 @@ an explicit stack, so that depth is checked before it can hurt.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -51,6 +52,8 @@ class BrokenNode:
     start: Mark
 
 
+_PLAIN_TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "seq", "map"))
+
 Node = Scalar | ListNode | MappingNode | BrokenNode
 
 
@@ -60,6 +63,7 @@ class _Open:
 
     start: Mark
     mapping: bool
+    broken: bool
     children: list[Node] = field(default_factory=list)
 
 
@@ -93,6 +97,7 @@ class _Composer:
         self.root: Node | None = None
         self.documents = 0
         self.stack: list[_Open] = []
+        self.extras: Counter[str] = Counter()
 
     @property
     def depth(self) -> int:
@@ -110,34 +115,33 @@ class _Composer:
             if self.documents == 2:
                 self.report(codes.YAML_FEATURE, event, "a file holds one document", "remove what follows ---")
         elif isinstance(event, yaml.AliasEvent):
-            self.report(
-                codes.YAML_FEATURE,
-                event,
-                "aliases are not allowed",
-                "quote text that begins with *, or repeat it",
-            )
+            self._refuse("aliases", event, "quote text that begins with *, or repeat what it stands for")
             self._place(BrokenNode(start=_mark(event.start_mark)))
         elif isinstance(event, yaml.NodeEvent):
-            self._refuse_extras(event)
+            broken = self._refuse_extras(event)
             if isinstance(event, yaml.ScalarEvent):
-                self._place(_scalar(event))
+                self._place(BrokenNode(start=_mark(event.start_mark)) if broken else _scalar(event))
             else:
                 mapping = isinstance(event, yaml.MappingStartEvent)
-                self.stack.append(_Open(start=_mark(event.start_mark), mapping=mapping))
+                self.stack.append(_Open(start=_mark(event.start_mark), mapping=mapping, broken=broken))
         elif isinstance(event, yaml.CollectionEndEvent):
             self._place(self._close(self.stack.pop()))
 
-    def _refuse_extras(self, event: yaml.NodeEvent) -> None:
+    def _refuse_extras(self, event: yaml.NodeEvent) -> bool:
+        """Reports anchors and tags; returns whether a tag changes what the node means."""
         if event.anchor is not None:
-            self.report(
-                codes.YAML_FEATURE,
-                event,
-                "anchors are not allowed",
-                "remove &... (or quote text that begins with &)",
-            )
-        tag = getattr(event, "tag", None)
-        if tag is not None:
-            self.report(codes.YAML_FEATURE, event, f"tags are not allowed: {tag[:40]}", "remove the tag")
+            self._refuse("anchors", event, "remove it, or quote text that begins with &")
+        tag: str | None = getattr(event, "tag", None)
+        if tag is None:
+            return False
+        self._refuse("tags", event, "remove it, or quote text that begins with !")
+        return tag not in _PLAIN_TAGS
+
+    def _refuse(self, what: str, event: yaml.Event, help: str) -> None:
+        """One finding for each kind of thing, at its first occurrence: a bomb holds thousands."""
+        self.extras[what] += 1
+        if self.extras[what] == 1:
+            self.report(codes.YAML_FEATURE, event, f"{what} are not allowed", help)
 
     def _place(self, node: Node) -> None:
         if self.stack:
@@ -146,6 +150,8 @@ class _Composer:
             self.root = node
 
     def _close(self, open_: _Open) -> Node:
+        if open_.broken:
+            return BrokenNode(start=open_.start)
         if not open_.mapping:
             return ListNode(start=open_.start, items=tuple(open_.children))
         pairs: list[tuple[Scalar, Node]] = []
@@ -174,18 +180,18 @@ def _syntax(source: Source, error: yaml.YAMLError) -> Finding:
     context = getattr(error, "context", None)
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     words = " ".join(str(problem).split())[:200]
+    location = source.location(_mark(mark))
+    tab = source.text[source.index(_mark(mark)) :].startswith("\t")
     return Finding(
         code=codes.YAML_SYNTAX,
         message=f"this is not YAML: {words}"
         + (f" ({' '.join(str(context).split())[:100]})" if context else ""),
-        location=source.location(_mark(mark)),
-        help=_remedy(words),
+        location=location,
+        help="indent with spaces, not tabs" if tab else _remedy(words),
     )
 
 
 def _remedy(problem: str) -> str:
-    if "\\t" in problem or "tab" in problem:
-        return "indent with spaces"
     if "mapping values" in problem:
         return "one key per line; quote text that contains ': '"
     if "cannot start any token" in problem:

@@ -11,7 +11,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import ExpressionError, parse_number
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
-from tubecert.spec.document import compose
+from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.plan import read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
@@ -69,6 +69,9 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
 
 
 def _read(root: Field) -> Spec | None:
+    if isinstance(root.node, Scalar) and not root.node.text:
+        root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
+        return None
     entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL, reserved=_RESERVED)
     if entries is None:
         return None

@@ -153,7 +153,7 @@ def _read_parameters(field: Field | None, taken: dict[str, str]) -> tuple[tuple[
     if field is None:
         return ()
     for key, node in field.pairs("of names to numbers") or []:
-        entry = field.child(key.text, node)
+        entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "parameter", taken)
         value = entry.number(values)
         if name is not None:
@@ -169,11 +169,11 @@ def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]
     if field is None:
         return ()
     for key, node in field.pairs("of names to units") or []:
-        unit = field.child(key.text, node).text("a unit")
+        unit = field.child(key, node).text("a unit")
         if key.text not in (*names.states, *names.inputs):
             _key_field(field, key).fail(codes.UNKNOWN_KEY, f"{key.text[:60]} is neither a state nor an input")
         elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
-            field.child(key.text, node).fail(
+            field.child(key, node).fail(
                 codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters"
             )
         elif unit is not None:

@@ -28,11 +28,11 @@ def _kind(field: Field) -> str | None:
     pairs = field.pairs("with a kind: equilibrium or expressions")
     if pairs is None:
         return None
-    node = next((node for key, node in pairs if key.text == "kind"), None)
-    if node is None:
+    kind = next((field.child(key, node) for key, node in pairs if key.text == "kind"), None)
+    if kind is None:
         field.fail(codes.MISSING_KEY, "trajectory lacks kind", f"add kind: {' or '.join(KINDS)}")
         return None
-    return field.child("kind", node).word(KINDS, LATER_KINDS)
+    return kind.word(KINDS, LATER_KINDS)
 
 
 def _equilibrium(field: Field, names: Names) -> Trajectory | None:

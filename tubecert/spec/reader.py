@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TypeVar
 
-from tubecert.expression import Expression, ExpressionError, parse, parse_number, suggestion
+from tubecert.expression import Expression, ExpressionError, near, parse, parse_number, suggestion
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
@@ -58,6 +58,7 @@ class Field:
     reader: Reader = field(repr=False)
     path: str
     node: Node
+    key: Scalar | None = None  # the key whose value this is
 
     @property
     def location(self) -> Location:
@@ -69,9 +70,15 @@ class Field:
         """Reports that this value will not do."""
         self.reader.report(code, self.location, message, help)
 
-    def child(self, name: str, node: Node) -> Field:
-        """The value of a key, or an item (`name` then is `[i]`)."""
-        path = name if not self.path else f"{self.path}{name}" if name[0] == "[" else f"{self.path}.{name}"
+    def child(self, key: Scalar, node: Node) -> Field:
+        """The value of a key."""
+        below = Field(reader=self.reader, path=self._name(key.text), node=node, key=key)
+        self.reader.places[below.path] = below.location
+        return below
+
+    def item(self, index: int, node: Node) -> Field:
+        """An item of a list."""
+        path = f"{self.path}[{index}]"
         below = Field(reader=self.reader, path=path, node=node)
         self.reader.places[path] = below.location
         return below
@@ -86,26 +93,26 @@ class Field:
         reserved: Sequence[str] = (),
     ) -> dict[str, Field] | None:
         """The values of the known keys; unknown, reserved and missing keys are findings."""
-        pairs = self.pairs(f"with the keys {', '.join([*required, *optional][:8])}")
+        pairs = self.pairs(f"with the keys {', '.join([*(required or optional)][:8])}")
         if pairs is None:
             return None
-        fields, waiting = {}, False
-        for key, node in pairs:
+        known = [*required, *optional]
+        fields = {key.text: self.child(key, node) for key, node in pairs if key.text in known}
+        meant: set[str] = set()  # required keys that a reserved or a misspelt one stands for
+        for key, _ in pairs:
             if key.text in reserved:
-                waiting = True
+                meant.update(required)
                 self._at(codes.NOT_YET, key, f"{self._name(key.text)} is not yet supported", "remove it")
-            elif key.text in required or key.text in optional:
-                fields[key.text] = self.child(key.text, node)
+            elif key.text not in fields:
+                meant.update(self._unknown(key, known))
+        missing = [key for key in required if key not in fields and key not in meant]
+        if missing:
+            message = f"{self.path or 'the specification'} lacks {', '.join(missing)}"
+            help = f"add {', '.join(f'{key}: ...' for key in missing)}"
+            if self.key is None:
+                self.fail(codes.MISSING_KEY, message, help)
             else:
-                self._unknown(key, [*required, *optional])
-        missing = [key for key in required if key not in fields]
-        if missing and not waiting:  # a reserved key often stands in for required ones
-            words = ", ".join(missing)
-            self.fail(
-                codes.MISSING_KEY,
-                f"{self.path or 'the specification'} lacks {words}",
-                f"add {', '.join(f'{key}: ...' for key in missing)}",
-            )
+                self._at(codes.MISSING_KEY, self.key, message, help)
         return fields
 
     def pairs(self, purpose: str = "") -> list[tuple[Scalar, Node]] | None:
@@ -133,11 +140,9 @@ class Field:
         if not isinstance(self.node, ListNode):
             self._wrong_type(f"a list of {f'{count} ' if count is not None else ''}{what}", help)
             return None
-        found = [self.child(f"[{i}]", node) for i, node in enumerate(self.node.items)]
+        found = [self.item(i, node) for i, node in enumerate(self.node.items)]
         if count is not None and len(found) != count:
-            self.fail(
-                codes.WRONG_SHAPE, f"{self.path} has {len(found)} entries; {count} {what} are needed", help
-            )
+            self._wrong_count(len(found), count, what, help)
             return None
         return found
 
@@ -234,14 +239,18 @@ class Field:
             return None
         found = [item.term(scope) for item in items[: 2 * count + 8]]
         if len(items) != count:
-            self.fail(codes.WRONG_SHAPE, f"{self.path} has {len(items)} entries; {count} {what} are needed")
+            self._wrong_count(len(items), count, what)
             return None
         return _all(found, count)
 
     def term_matrix(self, rows: int, columns: int, scope: Scope) -> TermMatrix | None:
         """A matrix of expressions, row by row."""
-        example = f"write {rows} rows of {columns}: " + ", ".join(["[...]"] * min(rows, 3))
-        found = self.items(rows, "rows", example)
+        row = f"[{', '.join(['...'] * columns)}]"
+        shape = f"[{', '.join([row] * rows)}]" if rows * columns <= 9 else f"{rows} rows of {columns}"
+        if isinstance(self.node, ListNode) and all(isinstance(node, Scalar) for node in self.node.items):
+            self.fail(codes.WRONG_SHAPE, f"{self.path} must be a list of rows", f"write {shape}")
+            return None
+        found = self.items(rows, "rows", f"write {shape}")
         return _all([row.terms(columns, scope) for row in found or []], rows)
 
     def inside(self, offset: int, width: int) -> Location:
@@ -262,12 +271,18 @@ class Field:
     def _name(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key
 
-    def _unknown(self, key: Scalar, known: Sequence[str]) -> None:
+    def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
+        entries = "1 entry" if found == 1 else f"{found} entries"
+        self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {wanted} {what}", help)
+
+    def _unknown(self, key: Scalar, known: Sequence[str]) -> list[str]:
+        """Reports an unknown key; returns the known ones that it may stand for."""
         shown = key.text[:60]
         message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
         if not key.text.isascii():
             message += " (it contains letters outside ASCII)"
         self._at(codes.UNKNOWN_KEY, key, message, suggestion(key.text, known, what="known keys"))
+        return near(key.text, known)
 
     def _wrong_type(self, wanted: str, help: str = "") -> None:
         if isinstance(self.node, BrokenNode):

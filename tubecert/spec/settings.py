@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from tubecert.expression import number_text
 from tubecert.spec import codes
-from tubecert.spec.algebra import failing_pivot
+from tubecert.spec.algebra import is_positive_definite
 from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
@@ -61,11 +61,14 @@ def _read_predictor(field: Field | None, n: int, names: Names) -> Literal["auto"
     A_m = field.matrix(n, names.values)
     if A_m is None:
         return None
-    failing = failing_pivot(dissipation(A_m))
-    if failing is None:
+    if is_positive_definite(dissipation(A_m)):
         return A_m
     trace = sum((A_m[i][i] for i in range(n)), start=Fraction(0))
-    unstable = "it is not Hurwitz (its trace is not negative)" if trace >= 0 else f"pivot {failing[0]} fails"
+    unstable = (
+        "it is not Hurwitz (its trace is not negative)"
+        if trace >= 0
+        else "an eigenvalue of the sum is not negative"
+    )
     field.fail(
         codes.STABILITY,
         f"A_m must satisfy A_m + A_m^T < 0, because P = I is used; {unstable}",

@@ -44,6 +44,7 @@ class Source:
     def location(self, mark: Mark, width: int = 1) -> Location:
         """The place as a finding names it."""
         line = self.lines[mark.line] if mark.line < len(self.lines) else ""
+        line = "".join(c if c.isprintable() else " " for c in line)  # nothing here may steer a terminal
         return Location(
             file=self.file, line=mark.line + 1, column=mark.column + 1, source=line, width=max(1, width)
         )
