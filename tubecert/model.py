@@ -33,6 +33,7 @@ from tubecert.expression.matrix import (
     combine,
     determinant,
     differentiate,
+    identity,
     jacobian,
     multiply,
     null_space,
@@ -73,8 +74,8 @@ class ControlAffineModel:
 
     @cached_property
     def constant_input(self) -> bool:
-        """Whether B does not depend on the state."""
-        return not free_symbols(e for row in self.B for e in row)
+        """Whether B is a matrix of rational numbers."""
+        return all(e.is_constant for row in self.B for e in row)
 
     @cached_property
     def B_x(self) -> list[Matrix]:
@@ -129,6 +130,11 @@ class ControlAffineModel:
 
         basis = null_space([[e.fraction for e in column] for column in self.columns])
         return transpose(constants(basis)) if basis else ()
+
+    @cached_property
+    def projector(self) -> Matrix:
+        """I - B B^+, (n, n): its columns span {v : B'v = 0}."""
+        return combine(1, identity(len(self.states)), -1, multiply(self.B, self.B_pinv))
 
     def killing_defect(self, j: int) -> Matrix:
         """d_bj W - (b_j)_x W - W (b_j)_x', (n, n): zero where C3 holds for input j."""

@@ -129,7 +129,9 @@ class Suprema:
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
         objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra=(MU,), weights=_mu_weights)
         found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
-        above = min(found.above, self.feedback_gain_closed_form())
+        above = found.above
+        if self.model.constant_input:
+            above = min(above, self.feedback_gain_closed_form())
         return Constant(below=max(0.0, found.below), above=max(0.0, above), at=self._witness(found))
 
     def feedback_gain_closed_form(self) -> float:

@@ -8,8 +8,9 @@ Implements: (CCM_1), (CCM_2) and (CCM_3) in dual form. Trusted: yes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import combinations
 
 import numpy as np
 
@@ -17,11 +18,12 @@ from tubecert.enclosure.branch_and_bound import Effort, Supremum, decide, suprem
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
-from tubecert.enclosure.objective import Pencil
+from tubecert.enclosure.objective import Objective, Pencil, scalar
+from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
-from tubecert.expression import ZERO, is_zero
-from tubecert.expression.matrix import Matrix, identity, multiply, transpose
-from tubecert.model import ControlAffineModel
+from tubecert.expression import ONE, ZERO, Expression, is_zero
+from tubecert.expression.matrix import Matrix, adjugate, determinant, identity, multiply, transpose
+from tubecert.model import ControlAffineModel, divide
 
 Box = Sequence[tuple[Fraction, Fraction]]
 _FINEST = 1e-10  # relative to the rate
@@ -74,7 +76,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     if (failed := _killing(model, domain)) is not None:
         verdict, reason, at = failed
         return MetricProof(verdict=verdict, condition="C3", reason=reason, at=place(at), **on_set)
-    if not model.annihilator:
+    if len(model.inputs) == len(model.states):
         return MetricProof(verdict="certified", **on_set)  # as many inputs as states: C2 is void
     found = _largest_rate(model, domain, effort)
     below, above = -found.above / 2, -found.below / 2
@@ -94,7 +96,12 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
 
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
     """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the margin is known to a hundredth."""
-    objective = Pencil(_restrict(model.drift_form, model.annihilator), [_restrict(model.W, model.annihilator)])
+    basis = model.annihilator if model.constant_input else _moving_annihilator(model, domain, effort)
+    objective: Objective
+    if basis is not None:
+        objective = Pencil(_restrict(model.drift_form, basis), [_restrict(model.W, basis)])
+    else:
+        objective = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
     rate = float(model.rate)
     precision = 1e-2
     while True:
@@ -107,6 +114,33 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
         if not found.reached:
             return found
         precision /= 100
+
+
+def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Matrix | None:
+    """B_perp(x) by m pivot rows of B that are proven independent on the whole set, if there are such rows.
+
+    With B_1 the pivot rows and B_2 the others, v = (v_1, v_2) has B'v = 0 iff v_1 = -(B_2 B_1^-1)' v_2.
+    """
+    n, m = len(model.states), len(model.inputs)
+    for rows in combinations(range(n), m):
+        pivot = determinant([model.B[i] for i in rows])
+        if not any(
+            decide(scalar(sign * pivot), domain, 0.0, replace(effort, budget=2_000)).verdict == "proven"
+            for sign in (1, -1)
+        ):
+            continue
+        others = [i for i in range(n) if i not in rows]
+        gain = divide(
+            multiply([model.B[i] for i in others], adjugate([model.B[i] for i in rows])), pivot
+        )  # B_2 B_1^-1, (n - m, m)
+        basis: list[tuple[Expression, ...]] = []
+        for i in range(n):
+            if i in rows:
+                basis.append(tuple(-row[rows.index(i)] for row in gain))
+            else:
+                basis.append(tuple(ONE if i == j else ZERO for j in others))
+        return tuple(basis)
+    return None
 
 
 def _restrict(a: Matrix, basis: Matrix) -> Matrix:
