@@ -41,14 +41,17 @@ class Expansion:
 
 
 class MatrixFunction:
-    """Matrices of expressions in `variables`, with tapes for values, slopes and curvature."""
+    """Matrices of expressions in `variables`, with tapes for values, slopes and curvature.
 
-    def __init__(self, matrices: Sequence[Matrix]) -> None:
+    `order` limits the order of the expansion (2: vertex form, 1: mean value form, 0: natural extension).
+    """
+
+    def __init__(self, matrices: Sequence[Matrix], order: int = 2) -> None:
         entries = [e for matrix in matrices for row in matrix for e in row]
         self.shapes = [(len(matrix), len(matrix[0])) for matrix in matrices]
         self.variables = tuple(sorted(free_symbols(entries)))
         ops = {node.op for node in topological(entries)}
-        self._order = 0 if "direction" in ops else 1 if "norm" in ops else 2
+        self._order = min(order, 0 if "direction" in ops else 1 if "norm" in ops else 2)
         first = {v: derivatives(entries, v) for v in self.variables} if self._order else {}
         self._affine, self._curved = self._classify(first)
         self._values = _Table(entries, self.variables)
