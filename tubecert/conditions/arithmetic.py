@@ -94,6 +94,7 @@ def confined(x: T, lowest: T, highest: T) -> T:
     return x
 
 
+@quiet
 def log1p_ratio(x: T) -> T:
     """log(1 + x)/x with value 1 at 0, decreasing on x > -1; unknown (interval) or NaN (float) at x <= -1."""
     if isinstance(x, Interval):
@@ -113,6 +114,7 @@ def _ratio_at(x: Array) -> Interval:
     )
 
 
+@quiet
 def decay_mean(y: T) -> T:
     """(1 - e^(-y))/y, the mean of e^(-s) over [0, y]: decreasing, 1 at 0."""
     if isinstance(y, Interval):
@@ -132,6 +134,7 @@ def _decay_mean_at(y: Array) -> Interval:
     )
 
 
+@quiet
 def least_solution(constant: T, slope: T) -> T:
     """The least Y >= 0 with constant + slope Y <= Y: constant/(1 - slope), infinite if slope >= 1.
 

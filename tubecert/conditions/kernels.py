@@ -108,12 +108,11 @@ def _end(D: DistanceBound[Any], side: str) -> DistanceBound[Interval]:
 
 
 def _at(D: DistanceBound[T], t: T) -> T:
-    """D(t), with K(t) = e^(-lam t) t (1 - e^(-y))/y, y = (omega - lam) t, free of cancellation."""
-    y = (D.omega - D.lam) * t
-    decay = exp(-D.lam * t)
-    K = decay * t * decay_mean(y)
-    A1 = D.ultimate()
-    return D.d0 * decay - A1 * expm1(-D.lam * t) + D.beta * (D.H0 - D.S) * K
+    """D(t), with K(t) = e^(-m t) t (1 - e^(-y))/y, m = min(lam, omega), y = |omega - lam| t."""
+    slower = minimum(D.lam, D.omega)
+    K = exp(-slower * t) * t * decay_mean(absolute(D.omega - D.lam) * t)
+    rest = D.d0 * exp(-D.lam * t) - D.ultimate() * expm1(-D.lam * t)
+    return rest + D.beta * (D.H0 - D.S) * K
 
 
 def _supremum(D: DistanceBound[T]) -> T:

@@ -81,7 +81,7 @@ class Numbers(Generic[T]):
 
 
 # symbol -> field of BoundConstants; `a` and `smin` are infima, the others suprema
-_FIELDS = {
+FIELDS = {
     "a": "lower",
     "A": "upper",
     "Df": "f",
@@ -199,7 +199,7 @@ class TubeProblem:
         return self._numbers(lambda _, c: Interval(c.below, c.above), R_H)
 
     def _numbers(self, side: Callable[[str, Constant], Interval], R_H: Fraction | None) -> Numbers[Interval]:
-        named = {symbol: side(symbol, getattr(self.constants, field)) for symbol, field in _FIELDS.items()}
+        named = {symbol: side(symbol, getattr(self.constants, field)) for symbol, field in FIELDS.items()}
         radius = self.projection_radius if R_H is None else R_H
         return Numbers(
             **named,

@@ -325,7 +325,7 @@ def search_26(
         A_m=problem.A_m,
         least_adaptation=least_pair(s, found),
         curve=curve(s, found[0].low) if found else (),
-        infimum=whole[0].low if whole else None,
+        infimum=float(whole[0].low) if whole else None,
         binds=found[0].binds if found else None,
     )
     if bandwidth is not None or adaptation_rate is not None:

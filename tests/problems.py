@@ -1,0 +1,123 @@
+"""Constants of the reference systems for tests of conditions and search: sampled or stated, never proven."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from tubecert.bounds.constants import TABLE, BoundConstants, Constant
+from tubecert.conditions.problem import TubeProblem
+
+W_CONSTANT = np.array(
+    [[0.20365, 0.00015, -0.00566], [0.00015, 0.21671, -0.00566], [-0.00566, -0.00566, 0.21607]]
+)
+W_LINEAR = np.array([[0, -0.4073, -0.00133], [-0.4073, -0.00061, 0.00998], [-0.00133, 0.00998, 0.06785]])
+W_SQUARE = np.array([[0, 0, 0.00053], [0, 0.81459, 0.00308], [0.00053, 0.00308, 0.00343]])
+X0 = np.array([0.01, -0.01, 0.01])
+
+
+def constants(**values: float | tuple[float, float]) -> BoundConstants:
+    """Constants by name; a pair is an enclosure, what is not named is 0 (1 where 0 makes no sense)."""
+    default = dict.fromkeys(TABLE, 0.0) | {"lower": 1.0, "upper": 1.0, "input_gain_least": 1.0}
+    if "h_initial" not in values:
+        values = values | {"h_initial": values.get("h", 0.0)}
+    pairs = {
+        name: value if isinstance(value, tuple) else (value, value)
+        for name, value in (default | values).items()
+    }
+    return BoundConstants(**{name: Constant(below=lo, above=hi) for name, (lo, hi) in pairs.items()})
+
+
+def scalar_predictor(g: str, n: int) -> tuple[tuple[Fraction, ...], ...]:
+    """A_m = -g I."""
+    return tuple(tuple(-Fraction(g) if i == j else Fraction(0) for j in range(n)) for i in range(n))
+
+
+def two_state(**options: Any) -> TubeProblem:
+    """The function-level row of the two-state system, eps = .6, rho_a = .1."""
+    values = {
+        "lower": 0.20086,
+        "upper": 0.32823,
+        "f": 19.87,
+        "f_x": 60.0,
+        "B": float(np.hypot(0.5, 2.0)),
+        "B_pinv": float(1 / np.hypot(0.5, 2.0)),
+        "u_star": 3.03,
+        "h": 2.511177,
+        "h_x": 0.1,
+        "h_t": 4.0,
+        "feedback_gain": 6.29599,
+        "metric_input_gain": 1.03048,
+        "drift_on_plan": 19.4787,
+    } | options.pop("values", {})
+    defaults = {
+        "rate": Fraction("1.74"),
+        "epsilon": Fraction("0.6"),
+        "rho_a": Fraction("0.1"),
+        "rho_r": Fraction("0.6"),
+        "rho": Fraction("0.7"),
+        "states": 2,
+    }
+    return TubeProblem(constants=constants(**values), **(defaults | options))
+
+
+def _metric(x: np.ndarray) -> np.ndarray:
+    x1 = x[..., 0, None, None]
+    return np.linalg.inv(W_CONSTANT + W_LINEAR * x1 + W_SQUARE * x1**2)
+
+
+def _f(x: np.ndarray) -> np.ndarray:
+    x1, x2, x3 = x[..., 0], x[..., 1], x[..., 2]
+    return np.stack([-x1 + x3, x1**2 - 2 * x1 * x3 - x2 + x3, -x2], axis=-1)
+
+
+def _segment_length(x: np.ndarray) -> float:
+    s = (np.arange(2000) + 0.5) / 2000
+    M = _metric(s[:, None] * x)
+    return float(np.mean(np.sqrt(np.einsum("i,kij,j->k", x, M, x))))
+
+
+def three_state(**options: Any) -> TubeProblem:
+    """The three-state system of the paper: eps = rho_a = .01, a = 3.85 and A = 5.88 declared, lambda = .9999.
+
+    |h_x| = 0, so |xdot| and the feedback gain do not reach the gains.
+    """
+    a, A = 3.85, 5.88
+    offset = float(np.linalg.norm(X0))
+    rho_r = np.sqrt(A / a) * offset + 0.01
+    rho = rho_r + 0.01
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(4000, 3))
+    x = rho * np.vstack([directions / np.linalg.norm(directions, axis=1)[:, None], np.eye(3), -np.eye(3)])
+    M = _metric(x)
+    x1 = x[:, 0, None, None]
+    M_x = M @ (W_LINEAR + 2 * x1 * W_SQUARE) @ M
+    values = {
+        "lower": a,
+        "upper": A,
+        "f": float(np.linalg.norm(_f(x), axis=1).max()),
+        "f_x": 2.0,
+        "B": 1.0,
+        "B_pinv": 1.0,
+        "M_x": float(np.linalg.norm(M_x, 2, axis=(1, 2)).max()),
+        "h": 0.1,
+        "h_t": 0.2,
+        "feedback_gain": 0.7,
+        "metric_input_gain": float(np.sqrt(_metric(np.zeros(3))[2, 2])),
+        "drift_on_plan": float(np.linalg.norm(_f(x), axis=1).max()),
+        "initial_distance": _segment_length(X0),
+        "input_gain_least": 2.0,
+        "contraction_excess": 2.0,
+    } | options.pop("values", {})
+    defaults = {
+        "rate": Fraction("0.9999"),
+        "epsilon": Fraction("0.01"),
+        "rho_a": Fraction("0.01"),
+        "rho_r": rho_r,
+        "rho": rho * (1 + 1e-12),
+        "initial_offset": offset,
+        "states": 3,
+    }
+    return TubeProblem(constants=constants(**values), **(defaults | options))

@@ -1,0 +1,245 @@
+"""Kernels and sup D against dense grids, ODE integration and high precision."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from tubecert.conditions.arithmetic import decay_mean, least_solution, log1p_ratio
+from tubecert.conditions.kernels import DistanceBound, kappa, paper_kernel, tight_kernel
+from tubecert.enclosure.interval import Interval
+
+RNG = np.random.default_rng(7)
+
+
+def scalar(x: float) -> np.ndarray:
+    return np.asarray(float(x))
+
+
+def difference_kernel(c: float, w: float, t: np.ndarray) -> np.ndarray:
+    """(e^-ct - e^-wt)/(w - c)."""
+    x = abs(w - c) * t
+    mean = np.where(x < 1e-10, 1 - x / 2, -np.expm1(-x) / np.where(x == 0, 1.0, x))
+    return np.exp(-min(c, w) * t) * t * mean
+
+
+def joint_expression(c: float, w: float, s0: float, s1: float, t: np.ndarray) -> np.ndarray:
+    """s0 phi + (s1/w) ((1 - e^-ct)/c - phi), whose supremum is J."""
+    phi = difference_kernel(c, w, t)
+    return s0 * phi + s1 / w * (-np.expm1(-c * t) / c - phi)
+
+
+def random_kernel_case() -> tuple[float, float, float, float]:
+    c, s0, s1 = np.exp(RNG.uniform(-3, 3, 3))
+    kind = RNG.integers(4)
+    w = c * (1 + [0.0, 1e-14, -1e-9, 0.0][kind]) if kind < 3 else np.exp(RNG.uniform(-3, 4))
+    return float(c), float(w), float(s0), float(s1)
+
+
+def test_tight_kernel_is_the_supremum_over_time():
+    for _ in range(400):
+        c, w, s0, s1 = random_kernel_case()
+        t = np.concatenate([np.geomspace(1e-6, 60, 20001) / c, np.geomspace(1e-6, 60, 20001) / w])
+        brute = joint_expression(c, w, s0, s1, t).max()
+        J = float(tight_kernel(*map(scalar, (c, w, s0, s1))))
+        assert brute <= J * (1 + 1e-9)
+        assert brute * (1 + 1e-4) >= J
+        assert float(paper_kernel(*map(scalar, (c, w, s0, s1)))) * (1 + 1e-9) >= J
+
+
+def test_values_of_the_three_state_example():
+    arguments = [scalar(x) for x in (2.0, 50.0, 0.1, 0.2)]
+    assert float(paper_kernel(*arguments)) == pytest.approx(4.083e-3, rel=2e-4)
+    assert 0.1 * float(kappa(*arguments[:2])) + 0.2 / 100 == pytest.approx(3.749e-3, rel=2e-4)
+    assert float(tight_kernel(*arguments)) == pytest.approx(2.0e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1 + 1e-15, 1 - 1e-12, 0.3, 5.0])
+def test_kappa_is_the_supremum_and_stable_at_equal_rates(ratio):
+    c = 2.0
+    with mpmath.workdps(60):
+        C, w = mpmath.mpf(c), mpmath.mpf(c * ratio)
+        exact = 1 / (mpmath.e * C) if w == C else (C / w) ** (w / (w - C)) / C
+        value = kappa(Interval(c), Interval(c * ratio))
+        assert value.lo <= exact <= value.hi
+        assert value.hi - value.lo < 1e-13
+
+
+def test_tight_kernel_interval_contains_the_value_at_high_precision():
+    with mpmath.workdps(80):
+        for _ in range(300):
+            c, w, s0, s1 = random_kernel_case()
+            C, W, S0, S1 = map(mpmath.mpf, (c, w, s0, s1))
+            if min(C, W) * S0 <= S1:
+                exact = S1 / (C * W)
+            else:
+                p, q = W * S0 - S1, C * S0 - S1
+                power = mpmath.exp(-C * S0 / q) if W == C else (q / p) ** (C / (W - C))
+                exact = (S1 + q * power) / (C * W)
+            J = tight_kernel(*(Interval(x) for x in (c, w, s0, s1)))
+            assert J.lo <= exact <= J.hi
+            assert J.hi - J.lo <= 1e-11 * float(exact)
+
+
+def random_bound(horizon: bool = False) -> dict[str, float]:
+    d0, beta, H0, S, e, delta, lam = np.exp(RNG.uniform(-2.5, 1.5, 7))
+    d0, e, delta, S, H0 = (x * (RNG.random() > 0.2) for x in (d0, e, delta, S, H0))
+    omega = lam * [1.0, 1 + 1e-13, 0.2, 3.0, 40.0][RNG.integers(5)]
+    case = {"d0": d0, "beta": beta, "H0": H0, "S": S, "e": e, "delta": delta, "lam": lam, "omega": omega}
+    if horizon:
+        case["horizon"] = float(np.exp(RNG.uniform(-3, 2))) / lam
+    return {name: float(value) for name, value in case.items()}
+
+
+def D_of_t(case: dict[str, float], t: np.ndarray) -> np.ndarray:
+    lam, omega = case["lam"], case["omega"]
+    K = difference_kernel(lam, omega, t)
+    A1 = (case["beta"] * (case["S"] + case["e"]) + case["delta"]) / lam
+    return A1 + (case["d0"] - A1) * np.exp(-lam * t) + case["beta"] * (case["H0"] - case["S"]) * K
+
+
+@pytest.mark.parametrize("horizon", [False, True])
+def test_sup_D_against_dense_grids(horizon):
+    for _ in range(500):
+        case = random_bound(horizon)
+        end = case.get("horizon", 200 / min(case["lam"], case["omega"]))
+        t = np.concatenate([[0.0], np.geomspace(1e-6 * end, end, 30001)])
+        brute = D_of_t(case, t).max()
+        exact = float(DistanceBound(**{k: scalar(v) for k, v in case.items()}).supremum())
+        enclosed = DistanceBound(**{k: Interval(v) for k, v in case.items()}).supremum()
+        assert brute <= exact * (1 + 1e-9) + 1e-12
+        assert exact <= brute * (1 + 1e-4) + 1e-12
+        assert enclosed.lo <= exact * (1 + 1e-12) + 1e-15
+        assert exact * (1 - 1e-12) - 1e-15 <= enclosed.hi
+
+
+def test_D_is_the_solution_of_its_differential_equation():
+    for _ in range(12):
+        case = random_bound()
+
+        def rate(t, D, case=case):
+            decay = np.exp(-case["omega"] * t)
+            xi = decay * case["H0"] + (1 - decay) * case["S"] + case["e"]
+            return -case["lam"] * D + case["beta"] * xi + case["delta"]
+
+        end = 12 / min(case["lam"], case["omega"])
+        t = np.linspace(0, end, 4001)
+        path = solve_ivp(rate, (0, end), [case["d0"]], t_eval=t, rtol=1e-10, atol=1e-12, method="LSODA").y[0]
+        bound = DistanceBound(**{k: scalar(v) for k, v in case.items()})
+        assert path.max() == pytest.approx(float(bound.supremum()), rel=2e-3)
+        assert path.max() <= float(bound.supremum()) * (1 + 1e-8)
+
+
+def test_sup_D_interval_contains_the_value_at_high_precision():
+    narrow = 0
+    with mpmath.workdps(80):
+        for _ in range(400):
+            case = random_bound()
+            exact = sup_D_exact({name: mpmath.mpf(value) for name, value in case.items()})
+            value = DistanceBound(**{k: Interval(v) for k, v in case.items()}).supremum()
+            assert value.lo <= exact <= value.hi
+            narrow += bool(value.hi - value.lo <= 1e-11 * float(exact) + 1e-300)
+    assert narrow > 380  # undecided branches cost width, but only where rounding decides
+
+
+def sup_D_exact(v: dict[str, mpmath.mpf]) -> mpmath.mpf:
+    """By the stationary point e^(-(omega - lam) t) = (lam/omega) (1 + (d0 - A1)(omega - lam)/C1)."""
+    lam, omega, d0 = v["lam"], v["omega"], v["d0"]
+    A1 = (v["beta"] * (v["S"] + v["e"]) + v["delta"]) / lam
+    C1 = v["beta"] * (v["H0"] - v["S"])
+    best = max(d0, A1)
+    if C1 == 0:
+        return best
+    if omega == lam:
+        t1 = 1 / lam - (d0 - A1) / C1
+    else:
+        inner = 1 + (d0 - A1) * (omega - lam) / C1
+        if inner <= 0:
+            return best
+        t1 = -mpmath.log(lam / omega * inner) / (omega - lam)
+    if t1 <= 0:
+        return best
+    same = omega == lam
+    K = (
+        t1 * mpmath.exp(-lam * t1)
+        if same
+        else (mpmath.exp(-lam * t1) - mpmath.exp(-omega * t1)) / (omega - lam)
+    )
+    return max(best, A1 + (d0 - A1) * mpmath.exp(-lam * t1) + C1 * K)
+
+
+sizes = st.floats(0.0, 5.0)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.tuples(*[sizes] * 6), st.tuples(*[st.floats(0, 0.5)] * 6), st.floats(0.2, 5), st.floats(0.05, 50))
+def test_sup_D_rises_with_every_size_and_intervals_include(low, extra, lam, omega):
+    names = ("d0", "beta", "H0", "S", "e", "delta")
+    high = [x + y for x, y in zip(low, extra, strict=True)]
+    rates = {"lam": Interval(lam), "omega": Interval(omega)}
+    below = DistanceBound(**dict(zip(names, map(Interval, low), strict=True)), **rates).supremum()
+    above = DistanceBound(**dict(zip(names, map(Interval, high), strict=True)), **rates).supremum()
+    hull = DistanceBound(**{k: Interval(a, b) for k, a, b in zip(names, low, high, strict=True)}, **rates)
+    wide = hull.supremum()
+    assert below.lo <= above.hi
+    assert wide.lo <= below.hi
+    assert above.lo <= wide.hi
+
+
+def test_sup_D_is_not_the_weak_form():
+    # theory, F6: the weak form falls with S for d0 > A1 (.634 -> .580); sup D rises (.528 -> .552)
+    def sup(S: float) -> float:
+        values = {"d0": 0.5, "beta": 1, "H0": 1, "S": S, "e": 0, "delta": 0, "lam": 1, "omega": 5}
+        return float(DistanceBound(**{k: scalar(v) for k, v in values.items()}).supremum())
+
+    assert sup(0.0) == pytest.approx(0.528, abs=6e-4)
+    assert sup(0.4) == pytest.approx(0.552, abs=6e-4)
+
+
+def test_J_is_sup_D_without_initial_distance():
+    for _ in range(100):
+        c, w, s0, s1 = random_kernel_case()
+        values = {"d0": 0, "beta": 1, "H0": s0, "S": s1 / w, "e": 0, "delta": 0, "lam": c, "omega": w}
+        sup = float(DistanceBound(**{k: scalar(v) for k, v in values.items()}).supremum())
+        assert sup == pytest.approx(float(tight_kernel(*map(scalar, (c, w, s0, s1)))), rel=1e-9)
+
+
+@pytest.mark.parametrize("function", ["r", "mean"])
+def test_removable_singularities_at_high_precision(function):
+    points = [0.0, 1e-300, -1e-12, 1e-6, 9.9e-6, 1.1e-5, -1e-5, 0.3, -0.9, 25.0]
+    with mpmath.workdps(60):
+        for x in points:
+            X = mpmath.mpf(x)
+            if function == "r":
+                exact = mpmath.log1p(X) / X if x else mpmath.mpf(1)
+                value, near = log1p_ratio(Interval(x)), log1p_ratio(scalar(x))
+            else:
+                exact = -mpmath.expm1(-X) / X if x else mpmath.mpf(1)
+                value, near = decay_mean(Interval(x)), decay_mean(scalar(x))
+            assert value.lo <= exact <= value.hi
+            assert value.hi - value.lo < 1e-9
+            assert float(near) == pytest.approx(float(exact), rel=1e-10)
+
+
+def test_undecided_signs_widen_but_never_exclude():
+    # q may have either sign: the interval must hold both kernels
+    wide = tight_kernel(Interval(1.0), Interval(2.0), Interval(0.9, 1.1), Interval(0.9, 1.1))
+    for s0 in (0.9, 1.0, 1.1):
+        for s1 in (0.9, 1.0, 1.1):
+            assert wide.contains(float(tight_kernel(*map(scalar, (1.0, 2.0, s0, s1)))))
+    assert np.isfinite(wide.hi)
+    assert not np.isfinite(paper_kernel(Interval(1.0, 2.0), Interval(1.5), Interval(1.0), Interval(1.0)).hi)
+
+
+def test_least_solution_is_the_least_prefixed_point():
+    assert float(least_solution(scalar(2.0), scalar(0.5))) == 4.0
+    assert np.isinf(least_solution(scalar(2.0), scalar(1.0)))
+    value = least_solution(Interval(2.0), Interval(0.4, 1.2))
+    assert value.lo <= Fraction(2) / Fraction(6, 10)
+    assert np.isinf(value.hi)

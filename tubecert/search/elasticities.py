@@ -1,0 +1,67 @@
+"""How strongly the least rates react to each constant: d log(Gamma_least)/d log(constant).
+
+At a minimum over omega the derivative is the partial one at that omega (envelope theorem), so all constants
+are perturbed in one vectorised evaluation. Numbers to explain a result, not part of any proof.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tubecert.conditions.arithmetic import Array
+from tubecert.conditions.derived import rate_terms
+from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
+from tubecert.search.distance import least_rate
+from tubecert.search.rates import RateSearch, gains_along, needed_rate
+from tubecert.search.results import Conditions26, DistanceResult
+
+_STEP = 1e-4
+
+
+def elasticities_distance(problem: TubeProblem, result: DistanceResult) -> dict[str, float]:
+    """By constant, for certificate B's pair of least Gamma; empty if there is none."""
+    if result.least_adaptation is None:
+        return {}
+    n, lanes = _perturbed(problem)
+    omega = np.full(lanes, float(result.least_adaptation.recipe.bandwidth))
+    return _slopes(least_rate(problem, n, omega)[0])
+
+
+def elasticities_26(problem: TubeProblem, result: Conditions26) -> dict[str, float]:
+    """By constant, for certificate A's pair of least Gamma; empty if there is none.
+
+    Where (26a) fixes the bandwidth of that pair, the constants in (26a) act through the bandwidth too: not
+    counted.
+    """
+    if result.least_adaptation is None:
+        return {}
+    n, lanes = _perturbed(problem)
+    s = RateSearch(problem=problem, n=n, terms=rate_terms(problem, n))
+    omega = np.full(lanes, float(result.least_adaptation.recipe.bandwidth))
+    return _slopes(needed_rate(s, omega, gains_along(s, omega)))
+
+
+def _perturbed(problem: TubeProblem) -> tuple[Numbers[Array], int]:
+    """Numbers with one lane per constant made larger and one made smaller; the radius goes with Dh."""
+    n = problem.floats(problem.projection_radius)
+    count = len(FIELDS)
+    lanes = {name: np.full(2 * count, float(getattr(n, name))) for name in (*FIELDS, "R")}
+    for i, name in enumerate(FIELDS):
+        for moved in (name, "R") if name == "Dh" else (name,):
+            lanes[moved][i] *= 1 + _STEP
+            lanes[moved][count + i] *= 1 - _STEP
+    return replace(n, **lanes), 2 * count
+
+
+def _slopes(Gamma: Array) -> dict[str, float]:
+    """Central differences in logarithms by constant; what does not act is left out."""
+    logs = np.log(Gamma)
+    count = len(FIELDS)
+    slopes = (logs[:count] - logs[count:]) / (np.log1p(_STEP) - np.log1p(-_STEP))
+    return {
+        field: float(np.round(slope, 4))
+        for field, slope in zip(FIELDS.values(), slopes, strict=True)
+        if np.isfinite(slope) and abs(slope) > 5e-5
+    }
