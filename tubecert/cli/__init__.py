@@ -1,0 +1,16 @@
+"""The command line: argv in, exit code out; no mathematics.
+
+In: arguments. Out: a report on stdout, findings and progress on stderr, a certificate file, an exit code.
+Until a command runs, nothing but typer and the error family is imported: `--help` is to feel instant.
+
+| module | what it does |
+|---|---|
+| `app` | the commands and their options |
+| `options` | the options that every command shares; numbers from the command line |
+| `guard` | every way a command can end -> one exit code and no traceback |
+| `certify`, `check`, `version` | what each command does |
+"""
+
+from tubecert.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,219 @@
+"""The commands and their options. What a command does is imported when it runs."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import flush_stdout, guarded
+from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+
+_ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
+
+From a YAML file that describes a control-affine system with matched uncertainty, tubecert proves: with this
+metric, this filter bandwidth and this adaptation rate, the state stays within rho of the plan.
+"""
+
+_AFTER = """\b
+Example:
+  tubecert certify configs/three_state.yaml --rho-a 0.01
+
+\b
+Exit codes:
+  0  certified, or nothing to complain about
+  1  not certified: refuted (the report says which claim), or a check found errors
+  2  the command line or an input file is invalid
+  3  internal error
+  4  undecided: a budget ran out (the report says what to raise)
+  130  interrupted
+"""
+
+_CERTIFY_AFTER = """\b
+Examples:
+  tubecert certify plant.yaml
+  tubecert certify plant.yaml --rho-a 0.05 --conditions all -o plant.json
+  tubecert certify plant.yaml --bandwidth 50 --adaptation-rate 2e7
+  tubecert certify plant.yaml -q -o - | jq .result.tube
+"""
+
+_CHECK_AFTER = """\b
+Examples:
+  tubecert check plant.yaml
+  tubecert check configs/ other.yaml
+"""
+
+_VERSION_AFTER = """\b
+Example:
+  tubecert version -v
+"""
+
+app = typer.Typer(
+    name="tubecert",
+    help=_ABOUT,
+    epilog=_AFTER,
+    add_completion=False,
+    rich_markup_mode=None,  # rich would double the time of --help
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+class Conditions(StrEnum):
+    """Which certificates must hold."""
+
+    PAPER = "26"
+    DISTANCE = "distance"
+    SAMPLED = "sampled"
+    ALL = "all"
+
+
+class Formulas(StrEnum):
+    """Whose formulas."""
+
+    CORRECTED = "corrected"
+    AS_PRINTED = "as-printed"
+
+
+_Spec = Annotated[str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)]
+_Specs = Annotated[
+    list[str],
+    typer.Argument(metavar="SPEC", help="Specifications, or folders with some.", show_default=False),
+]
+
+
+def _number(flag: str, help: str) -> object:
+    return typer.Option(flag, metavar="NUMBER", help=help)
+
+
+@app.callback(invoke_without_command=True)
+def _main(
+    context: typer.Context,
+    *,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    context.obj = Output.of(context, locals())
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command(epilog=_CERTIFY_AFTER, short_help="Prove the tube, find the smallest gains.")
+def certify(
+    context: typer.Context,
+    spec: _Spec,
+    *,
+    rho_a: Annotated[
+        str | None, _number("--rho-a", "Radius left to the adaptation (overrides tube.rho_a).")
+    ] = None,
+    epsilon: Annotated[
+        str | None, _number("--epsilon", "Radius beyond the initial offset (overrides).")
+    ] = None,
+    metric: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
+    ] = None,
+    conditions: Annotated[
+        Conditions, typer.Option(help="Which certificates decide the verdict; all are always computed.")
+    ] = Conditions.PAPER,
+    formulas: Annotated[
+        Formulas, typer.Option(help="Corrected formulas, or the paper's own (proves nothing).")
+    ] = Formulas.CORRECTED,
+    bandwidth: Annotated[str | None, _number("--bandwidth", "Judge this filter bandwidth, in rad/s.")] = None,
+    adaptation_rate: Annotated[
+        str | None, _number("--adaptation-rate", "... with this adaptation rate.")
+    ] = None,
+    gap: Annotated[str, _number("--gap", "Relative width at which a constant is sharp enough.")] = "1/100",
+    budget: Annotated[str | None, _number("--budget", "Boxes examined per claim before giving up.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The certificate; - is stdout.  [SPEC's stem.certificate.json]",
+        ),
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Prove the tube around the plan and find the smallest gains; always write the certificate."""
+    given = dict(locals())
+    how = Output.of(context, given)
+    if (bandwidth is None) != (adaptation_rate is None):
+        raise typer.BadParameter("--bandwidth and --adaptation-rate are given together", ctx=context)
+    with guarded(how):
+        from tubecert.cli.certify import run
+
+        code = run(given, how)
+    raise typer.Exit(code)
+
+
+@app.command(epilog=_CHECK_AFTER, short_help="Check specifications, without certifying.")
+def check(
+    context: typer.Context,
+    specs: _Specs,
+    *,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Check specifications without certifying: the format, that f, B, W are smooth, that B has full rank."""
+    how = Output.of(context, locals())
+    with guarded(how):
+        from tubecert.cli.check import run
+
+        code = run(specs, how)
+    raise typer.Exit(code)
+
+
+@app.command("version", epilog=_VERSION_AFTER, short_help="Show the version.")
+def show_version(
+    context: typer.Context,
+    *,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Show the version; with -v, also those of Python and of the libraries that results rest on."""
+    how = Output.of(context, locals())
+    with guarded(how):
+        from tubecert.cli.version import run
+
+        run(how)
+    raise typer.Exit(0)
+
+
+def main() -> None:
+    """The entry point: never a traceback, whatever stdout is connected to."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # a library's deprecations are no message to users
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        app(prog_name="tubecert")
+    except SystemExit as end:
+        code = flush_stdout()
+        sys.exit(code or end.code)

@@ -1,0 +1,123 @@
+"""`certify`: a specification in; a certificate, a report and an exit code out."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Numbers, Output
+from tubecert.cli.version import versions
+from tubecert.errors import ExitCode, TargetError
+from tubecert.findings import Finding
+from tubecert.report.terminal import Terminal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where the certificate goes."""
+
+    target: str
+
+    @property
+    def is_stdout(self) -> bool:
+        """Whether stdout takes the certificate."""
+        return self.target == certificate.STDOUT
+
+
+def run(given: Mapping[str, Any], output: Output) -> ExitCode:
+    """Certify; `given` holds the options by the names of their parameters."""
+    numbers = _numbers(given)
+    place = _place(given)
+    from tubecert import spec
+
+    system = spec.load(given["spec"])
+    from tubecert import pipeline  # numpy and the rest, once the input is known to be readable
+    from tubecert.report import progress
+
+    started, clock = datetime.now(UTC), time.perf_counter()
+    words: dict[str, Any] = {"conditions": str(given["conditions"]), "formulas": str(given["formulas"])}
+    options = pipeline.Options(**numbers, **words, metric=given["metric"])
+    terminal = Terminal.stderr(color=output.color)
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        result = pipeline.certify(system, options, report)
+    sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
+    if not place.is_stdout:
+        certificate.write(place.target, sealed)
+    _report(sealed, place, output)
+    return certificate.exit_code(result)
+
+
+def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
+    numbers = Numbers()
+    values: dict[str, Any] = {
+        name: numbers.positive(f"--{name.replace('_', '-')}", given[name])
+        for name in ("rho_a", "epsilon", "bandwidth", "adaptation_rate")
+    }
+    values["gap"] = numbers.positive("--gap", given["gap"], below=1)
+    values["budget"] = numbers.count("--budget", given["budget"])
+    numbers.check()
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _place(given: Mapping[str, Any]) -> Place:
+    """Where the certificate goes, checked before any work is done.
+
+    Raises `TargetError` if it cannot go there, or would take the place of an input.
+    """
+    target = (
+        given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.certificate.json"
+    )
+    certificate.check_target(target)
+    for what, source in (("specification", given["spec"]), ("metric file", given["metric"])):
+        if source is not None and target != certificate.STDOUT and _same_file(target, source):
+            finding = Finding(
+                code="TC120",
+                message=f"{target} is the {what} itself and would be overwritten",
+                help="choose another file with -o FILE",
+            )
+            raise TargetError([finding])
+    return Place(target=target)
+
+
+def _same_file(target: str, source: str | Path) -> bool:
+    try:
+        return Path(target).samefile(source)
+    except (OSError, ValueError):
+        return False
+
+
+def _record(started: datetime, seconds: float) -> dict[str, Any]:
+    """How the certificate was made; no part of what is hashed."""
+    return {
+        "command": shlex.join(["tubecert", *sys.argv[1:]]),
+        "started": started.isoformat(timespec="seconds"),
+        "seconds": round(seconds, 3),
+        "versions": versions(),
+    }
+
+
+def _report(sealed: Mapping[str, Any], place: Place, output: Output) -> None:
+    """The report on stdout, or the certificate, with the verdict line on stderr."""
+    from tubecert.report import console
+
+    json = output.json or place.is_stdout
+    terminal = (Terminal.stderr if json else Terminal.stdout)(color=output.color)
+    if json:
+        write_stdout(certificate.dump(sealed))
+        if not output.quiet:
+            terminal.show(console.verdict_line(sealed["result"]))
+        return
+    if output.quiet:
+        text = terminal.text(console.verdict_line(sealed["result"]))
+    else:
+        text = terminal.text(console.report(sealed, target=place.target, verbose=output.verbose))
+    write_stdout(text)

@@ -1,0 +1,134 @@
+"""Every way a command can end, as one exit code: findings for the user, a log for us, no traceback."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import typer
+
+from tubecert.errors import ExitCode, TargetError, TubecertError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tubecert.cli.options import Output
+
+
+@contextlib.contextmanager
+def guarded(output: Output) -> Iterator[None]:
+    """Turns whatever the block raises into `typer.Exit` with the right code, having told the user."""
+    try:
+        yield
+    except typer.Exit:
+        raise
+    except TubecertError as error:
+        show(error, output)
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        _tell("interrupted")
+        raise typer.Exit(ExitCode.INTERRUPTED) from None
+    except Exception as error:
+        if output.debug:
+            import traceback
+
+            traceback.print_exc()
+        _tell(_defect(error))
+        raise typer.Exit(ExitCode.INTERNAL) from None
+
+
+def show(error: TubecertError, output: Output) -> None:
+    """The findings of an error on stderr."""
+    from tubecert.report.findings import render
+    from tubecert.report.terminal import Terminal
+
+    Terminal.stderr(color=output.color).show(render(error.findings))
+
+
+def write_stdout(text: str) -> None:
+    """Writes the result; a reader that has gone (`| head`) is no error, a full disk is one.
+
+    Raises `TargetError`.
+    """
+    if sys.stdout is None:  # closed by the caller (`>&-`)
+        return
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_stdout()
+    except OSError as error:
+        _drop_stdout()
+        from tubecert.findings import Finding
+
+        reason = (error.strerror or str(error)).lower()
+        raise TargetError([Finding(code="TC120", message=f"cannot write to stdout: {reason}")]) from None
+
+
+def flush_stdout() -> int:
+    """What is left in the buffer of stdout, written quietly; the exit code that this leads to, 0 if none."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_stdout()
+    except OSError as error:
+        _drop_stdout()
+        _tell(f"error TC120: cannot write to stdout: {(error.strerror or str(error)).lower()}")
+        return ExitCode.INVALID
+    return 0
+
+
+def _drop_stdout() -> None:
+    """Sends what may still be in the buffer to nowhere: Python would complain about it at exit."""
+    with contextlib.suppress(OSError, ValueError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+
+
+def _tell(line: str) -> None:
+    with contextlib.suppress(OSError, ValueError):
+        print(f"tubecert: {line}", file=sys.stderr, flush=True)
+
+
+def _defect(error: Exception) -> str:
+    """The one line about an unexpected exception, having written its log."""
+    what = " ".join(str(error).split())[:200]
+    name = "out of memory" if isinstance(error, MemoryError) else type(error).__name__
+    line = f"internal error: {name}" + (f": {what}" if what else "")
+    log = _write_log(error)
+    where = f"details are in {log}" if log else "no log could be written; --debug shows the details"
+    return f"{line}\n  this is a defect of tubecert, not of your input; {where}"
+
+
+def _write_log(error: Exception) -> Path | None:
+    import platform
+    import tempfile
+    import time
+    import traceback
+    from pathlib import Path
+
+    from tubecert import __version__
+
+    text = "\n".join(
+        (
+            f"tubecert {__version__}, Python {platform.python_version()}, {platform.system()}",
+            f"arguments: {sys.argv[1:]}",
+            "".join(traceback.format_exception(error, limit=-60)),
+        )
+    )
+    name = f"{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
+    home = os.environ.get("HOME")
+    state = os.environ.get("XDG_STATE_HOME") or (home and os.path.join(home, ".local", "state"))
+    folders = [Path(state) / "tubecert"] if state else []
+    for folder in (*folders, Path(tempfile.gettempdir())):
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            path = folder / f"tubecert-{name}"
+            path.write_text(text, encoding="utf-8", errors="backslashreplace")
+            return path
+    return None

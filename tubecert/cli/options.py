@@ -1,0 +1,127 @@
+"""What every command shares: how to report, and how a number on the command line is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tubecert.errors import SpecError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from tubecert.findings import Finding
+
+
+class Color(StrEnum):
+    """When to colour."""
+
+    AUTO = "auto"
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from tubecert import __version__
+
+        typer.echo(f"tubecert {__version__}")
+        raise typer.Exit
+
+
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Also show the constants and all assumptions.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only the verdict.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON on stdout instead of the report.")]
+Colored = Annotated[Color | None, typer.Option("--color", help="When to colour (NO_COLOR is honoured).")]
+NoProgress = Annotated[bool, typer.Option("--no-progress", help="No progress on stderr.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
+Version = Annotated[
+    bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """How to report."""
+
+    verbose: bool = False
+    quiet: bool = False
+    json: bool = False
+    color: Color | None = None
+    no_progress: bool = False
+    debug: bool = False
+
+    @classmethod
+    def of(cls, context: typer.Context, values: Mapping[str, object]) -> Output:
+        """The options given after the command (among `values`) together with those given before it.
+
+        Raises a usage error for `-q` with `-v`.
+        """
+        own = cls(**{item.name: values[item.name] for item in fields(cls)})  # type: ignore[arg-type]
+        before = context.obj if isinstance(context.obj, cls) else cls()
+        both = cls(
+            **{item.name: getattr(own, item.name) or getattr(before, item.name) for item in fields(cls)}
+        )
+        if both.quiet and both.verbose:
+            raise typer.BadParameter("--quiet and --verbose exclude each other", ctx=context)
+        return both
+
+
+class Numbers:
+    """Reads numbers as the specification's are read, and keeps what is wrong with them."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+
+    def positive(self, option: str, text: str | None, *, below: int | None = None) -> Fraction | None:
+        """The exact number, > 0 (and < `below`); None if the option is absent or wrong."""
+        if text is None:
+            return None
+        from tubecert.expression import ExpressionError, parse_number
+
+        try:
+            value = parse_number(text)
+        except ExpressionError as error:
+            place = {"offset": error.offset, "width": error.width}
+            self._fail("TC108", option, text, message=error.message, help=error.help, **place)
+            return None
+        if value <= 0:
+            self._range(option, text, "positive", "> 0")
+        elif below is not None and value >= below:
+            self._range(option, text, f"below {below}", f"< {below}")
+        else:
+            return value
+        return None
+
+    def count(self, option: str, text: str | None) -> int | None:
+        """A positive whole number; None if the option is absent or wrong."""
+        value = self.positive(option, text)
+        if value is None or text is None:
+            return None
+        if value.denominator != 1:
+            self._range(option, text, "a whole number", "without a fraction")
+            return None
+        return int(value)
+
+    def check(self) -> None:
+        """Raises `SpecError` with every problem met so far."""
+        if self.findings:
+            raise SpecError(self.findings)
+
+    def _range(self, option: str, text: str, wanted: str, remedy: str) -> None:
+        shown = text if len(text) <= 40 else f"{text[:40]}..."
+        self._fail("TC112", option, text, message=f"{shown} is not {wanted}", help=f"write a number {remedy}")
+
+    def _fail(self, code: str, option: str, text: str, **what: Any) -> None:
+        from tubecert.cli.places import OptionPlace
+        from tubecert.findings import Finding
+
+        column, width = what.pop("offset", 0) + 1, what.pop("width", len(text))
+        place = OptionPlace(file=option, line=1, column=column, source=text, width=width)
+        self.findings.append(Finding(code=code, location=place, **what))

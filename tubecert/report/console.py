@@ -1,0 +1,106 @@
+"""The report of a certification: a verdict first, then what it means, then everything one may ask next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from rich.padding import Padding
+from rich.text import Text
+
+from tubecert.report import sections
+from tubecert.report.gains import Gains, deciding
+from tubecert.report.numbers import up
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+STYLES = {"certified": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
+
+
+def report(certificate: Mapping[str, Any], *, target: str, verbose: bool) -> list[RenderableType]:
+    """The whole report as renderables; `target` is the file that holds the certificate."""
+    result = certificate["result"]
+    parts: list[RenderableType] = [verdict_line(result), _indented(meaning(result))]
+    for title, body in sections.of(result, verbose=verbose):
+        parts += [Text(), Text(title, style="bold"), *(_indented(item) for item in body)]
+    parts += [Text(), *_closing(certificate, target)]
+    return parts
+
+
+def verdict_line(result: Mapping[str, Any]) -> Text:
+    """The verdict and the numbers (or the reason) that go with it, on one line."""
+    verdict = result["verdict"]
+    line = Text(no_wrap=True, overflow="ignore")
+    line.append(verdict, style=STYLES[verdict])
+    line.append(f" {name(result)}: ", style="bold")
+    if verdict == "certified":
+        numbers = [f"rho = {up(result['tube']['rho'])}"]
+        numbers += [gains.text() for gains in deciding(result)]
+        line.append("; ".join(numbers))
+    else:
+        line.append(_because(result))
+    return line
+
+
+def name(result: Mapping[str, Any]) -> str:
+    """The name of the specification."""
+    return str(result["spec"]["effective"]["name"])
+
+
+def _because(result: Mapping[str, Any]) -> str:
+    """The reason that decided: the first with the verdict's own word."""
+    reasons = [item for item in result["reasons"] if item.get("verdict") == result["verdict"]]
+    reason = (reasons or result["reasons"] or [{"message": "no reason was recorded"}])[0]
+    claim = f"{reason['claim']}: " if reason.get("claim") else ""
+    return " ".join(f"{claim}{reason['message']}".split())
+
+
+def meaning(result: Mapping[str, Any]) -> Text:
+    """One sentence: what the verdict says, and what it does not say."""
+    match result["verdict"]:
+        case "certified":
+            return _promise(result)
+        case "refuted" if _tube_is_known(result):
+            return Text(
+                "The condition below is proven not to hold. It is a sufficient one: that it fails does not "
+                "prove that the state leaves the tube."
+            )
+        case "refuted":
+            return Text("The claim below is proven false, so nothing that rests on it is certified.")
+        case _:
+            return Text("This is neither proven nor refuted; it must not be relied on.")
+
+
+def _promise(result: Mapping[str, Any]) -> Text:
+    chosen = deciding(result)
+    loops = " and, separately, ".join(gains.words() for gains in chosen)
+    return Text(
+        f"With this metric and {loops}, the state stays within {up(result['tube']['rho'])} of the plan "
+        f"{sections.span(result)}, under the assumptions below."
+    )
+
+
+def _tube_is_known(result: Mapping[str, Any]) -> bool:
+    return "rho_r" in result.get("tube", {})
+
+
+def _closing(certificate: Mapping[str, Any], target: str) -> list[Text]:
+    """Where the certificate is, and how to see again that it is right."""
+    where = Text("certificate  ", style="bold", no_wrap=True, overflow="ignore")
+    where.append(target, style="not bold")
+    again = Text(
+        f"{certificate['hash']}\n"
+        "To check it later: the same command gives the same hash on this machine with these versions.",
+        style="dim",
+        no_wrap=True,
+        overflow="ignore",
+    )
+    return [where, Padding(again, (0, 0, 0, 2), expand=False)]  # type: ignore[list-item]
+
+
+def _indented(item: RenderableType) -> Padding:
+    return Padding(item, (0, 0, 0, 2), expand=False)
+
+
+__all__ = ["Gains", "meaning", "name", "report", "verdict_line"]

@@ -1,0 +1,70 @@
+"""How numbers are shown: bounds from above rounded up, bounds from below rounded down, so both stay true."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
+from fractions import Fraction
+from typing import Final
+
+Number = float | int | str
+UNKNOWN: Final = "-"
+
+
+def short(value: Number | None, digits: int = 4) -> str:
+    """The nearest number of `digits` significant digits."""
+    return _shown(value, digits, ROUND_HALF_EVEN)
+
+
+def up(value: Number | None, digits: int = 4) -> str:
+    """The least number of `digits` significant digits that is not below `value`."""
+    return _shown(value, digits, ROUND_CEILING)
+
+
+def down(value: Number | None, digits: int = 4) -> str:
+    """The greatest number of `digits` significant digits that is not above `value`."""
+    return _shown(value, digits, ROUND_FLOOR)
+
+
+def exact(value: Number | None) -> str:
+    """A gain: every digit of it."""
+    return _shown(value, None, ROUND_HALF_EVEN)
+
+
+def percent(margin: Sequence[float | None] | None) -> str:
+    """The side of a margin that is proven, rounded down: `1.23 %`."""
+    if not margin or margin[0] is None:
+        return UNKNOWN
+    return f"{_shown(100 * _decimal(margin[0]), 3, ROUND_FLOOR)} %"
+
+
+def _decimal(value: Number | Decimal) -> Decimal:
+    """The decimal that is written in the certificate (a float stands for its shortest text)."""
+    if isinstance(value, Decimal):
+        return value
+    if isinstance(value, str) and "/" in value:
+        ratio = Fraction(value)
+        return Decimal(ratio.numerator) / Decimal(ratio.denominator)
+    return Decimal(value if isinstance(value, str) else repr(value))
+
+
+def _shown(value: Number | Decimal | None, digits: int | None, rounding: str) -> str:
+    if value is None:
+        return UNKNOWN
+    number = _decimal(value)
+    if not number.is_finite():
+        return UNKNOWN
+    if number == 0:
+        return "0"
+    if digits is not None:
+        number = Context(prec=digits, rounding=rounding).plus(number)
+    return _text(number.normalize())
+
+
+def _text(number: Decimal) -> str:
+    """Plain digits for moderate sizes, else `1.967e7`."""
+    if -4 <= number.adjusted() < 6:
+        return f"{number:f}"
+    sign, digits, _ = number.as_tuple()
+    mantissa = str(digits[0]) + ("." + "".join(map(str, digits[1:])) if len(digits) > 1 else "")
+    return f"{'-' if sign else ''}{mantissa}e{number.adjusted()}"

@@ -1,0 +1,219 @@
+"""The sections of the report, each a title and what stands below it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+from rich.text import Text
+
+from tubecert.report.gains import NAMES, rows
+from tubecert.report.numbers import UNKNOWN, down, exact, percent, short, up
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Section = tuple[str, list["RenderableType"]]
+VERDICTS = {"certified": "green", "refuted": "red", "undecided": "yellow"}
+
+
+def of(result: Mapping[str, Any], *, verbose: bool) -> Iterator[Section]:
+    """The sections that a result has something to say in."""
+    if result["reasons"]:
+        yield "Not proven", [_reason(result, item) for item in result["reasons"]]
+    if any(name in result for name in NAMES):
+        yield "Gains", _gains(result)
+        if limits := _limits(result):
+            yield "What limits them", limits
+    if "tube" in result:
+        yield "Tube", _tube(result)
+    if "metric" in result:
+        yield "Metric", _metric(result["metric"], result["safe_set"])
+    if verbose and "constants" in result:
+        yield "Constants over the tube", [_constants(result)]
+    yield "Assumed, not proven", _assumptions(result, verbose)
+
+
+def span(result: Mapping[str, Any]) -> str:
+    """The time that is claimed."""
+    horizon = result["spec"]["effective"]["trajectory"].get("horizon")
+    return "for all t >= 0" if horizon is None else f"for 0 <= t <= {short(horizon, 12)} s"
+
+
+# -- why not
+
+
+def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Text:
+    verdict = reason.get("verdict", "undecided")
+    text = Text()
+    text.append(verdict, style=VERDICTS[verdict])
+    text.append(f" {reason['claim']}", style="bold")
+    text.append(f"\n  {reason['message']}")
+    if at := reason.get("at"):
+        text.append(f"\n  at {point(result, at)}")
+    if relax := reason.get("relax"):
+        text.append("\n  help", style="green")
+        text.append(f": {relax}")
+    return text
+
+
+def point(result: Mapping[str, Any], at: Mapping[str, Any]) -> str:
+    """A witness: `t = 0.2 s, x1 = 0.1, ...`."""
+    states = result["spec"]["effective"]["system"]["states"]
+    parts = [] if at.get("t") is None else [f"t = {short(at['t'], 6)} s"]
+    parts += [f"{name} = {short(value, 6)}" for name, value in zip(states, at.get("x", ()), strict=False)]
+    return ", ".join(parts)
+
+
+# -- gains
+
+
+def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
+    found = list(rows(result))
+    body: list[RenderableType] = []
+    if found:
+        table = _table("certificate", "pair", "verdict", ">omega, rad/s", ">Gamma", ">Ts, s", ">margin left")
+        before = ""
+        for row in found:
+            table.add_row(
+                "" if row.section == before else NAMES[row.section],
+                f"{row.which} *" if row.decides else row.which,
+                Text(row.verdict, style=VERDICTS[row.verdict]),
+                exact(row.bandwidth),
+                "" if row.adaptation_rate is None else exact(row.adaptation_rate),
+                "" if row.sample_time is None else exact(row.sample_time),
+                row.slack,
+            )
+            before = row.section
+        body.append(table)
+        if any(row.decides for row in found):
+            body.append(
+                Text(
+                    "* decides the verdict. A pair belongs to its own certificate; rows do not mix.",
+                    style="dim",
+                )
+            )
+    missing = [NAMES[key] for key in NAMES if key in result and not any(row.section == key for row in found)]
+    body += [Text(f"{title}: no gains were found") for title in missing]
+    return body
+
+
+def _limits(result: Mapping[str, Any]) -> list[RenderableType]:
+    """What binds, per certificate."""
+    lines = []
+    rates = result.get("conditions_26", {})
+    if rates.get("binds"):
+        words = f"A  ({rates['binds']}) sets the bandwidth"
+        if rates["binds"] == "26b" and rates.get("bandwidth_infimum") is not None:
+            words += f"; Gamma grows without bound towards omega = {short(rates['bandwidth_infimum'])} rad/s"
+        lines.append(words)
+    if rates.get("below_twice_rate"):
+        lines.append("A  the bandwidth lies below 2 lambda")
+    sampled = result.get("sampled", {})
+    if sampled.get("sample_time_limit") is not None:
+        limit = down(sampled["sample_time_limit"])
+        lines.append(f"C  Ts stays below {limit} s however large the bandwidth")
+    for key, title in NAMES.items():
+        radius = result.get(key, {}).get("ultimate_radius")
+        if radius is not None:
+            lines.append(f"{title[0]}  in the long run |x - x*| <= {up(radius)}")
+        lines += [f"{title[0]}  {_shortfall(item)}" for item in result.get(key, {}).get("shortfalls") or ()]
+    return [Text(line) for line in lines]
+
+
+def _shortfall(item: Mapping[str, Any]) -> str:
+    words = f"{item['claim']} does not hold"
+    if item.get("needed") is not None and item.get("allowed") is not None:
+        return f"{words}: {short(item['needed'])} is needed, {short(item['allowed'])} is allowed"
+    margin = item.get("margin") or [None, None]
+    return words if margin[1] is None else f"{words}: its margin is at most {short(100 * margin[1], 3)} %"
+
+
+# -- tube and metric
+
+
+def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
+    tube = result["tube"]
+    line = f"rho = {up(tube['rho'])}"
+    if "rho_r" in tube:
+        line += f" = {short(tube['rho_r'])} (rho_r) + {short(tube['rho_a'])} (rho_a)"
+    body: list[RenderableType] = [Text(f"{line}; epsilon = {short(tube['epsilon'])}")]
+    if widths := tube.get("half_widths"):
+        units = result["spec"]["effective"]["system"].get("units", {})
+        table = _table("state", ">at most this far from the plan", "unit" if units else "")
+        for name, width in widths.items():
+            table.add_row(name, up(width), units.get(name, ""))
+        body.append(table)
+    return body
+
+
+def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[RenderableType]:
+    body = [f"rate {short(metric['rate'], 12)} 1/s, {metric['verdict']} on the safe set"]
+    if (margin := metric.get("margin")) and metric["verdict"] == "certified":
+        body[0] += f"; it holds up to {down(margin[0], 3)} 1/s more"
+    for words, low, high in (
+        ("over the tube", "lower", "upper"),
+        ("on the safe set", "lower_on_set", "upper_on_set"),
+    ):
+        if low in metric and high in metric:
+            a, A = metric[low], metric[high]
+            body.append(f"{down(a[0])} I <= M <= {up(A[1])} I {words}")
+    sides = ", ".join(f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in safe_set.items())
+    return [Text(line) for line in [*body, f"safe set: {sides}"]]
+
+
+def _constants(result: Mapping[str, Any]) -> Table:
+    table = _table("symbol", "what it is", ">proven", "unit", ">gap", "equation", "where")
+    for name, item in result["constants"].items():
+        table.add_row(
+            item["symbol"],
+            item.get("meaning") or name.replace("_", " "),
+            _proven(item),
+            item["unit"],
+            _gap(item),
+            item["equation"],
+            point(result, item["at"]) if item.get("at") else "",
+        )
+    return table
+
+
+def _proven(item: Mapping[str, Any]) -> str:
+    """The side that the certificate uses: from below for an infimum, from above for a supremum."""
+    if item.get("meaning", "").startswith(("inf", "smallest")):
+        return f">= {down(item['below'], 6)}"
+    return f"<= {up(item['above'], 6)}"
+
+
+def _gap(item: Mapping[str, Any]) -> str:
+    low, high = item["below"], item["above"]
+    if low is None or high is None:
+        return UNKNOWN
+    return "exact" if low == high else percent([(high - low) / abs(high or low)])
+
+
+# -- assumptions
+
+
+def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableType]:
+    stated = result["assumptions"]
+    declared = result.get("declared", {})
+    believed = [
+        f"declared, believed as given: {', '.join(f'{k} <= {exact(v)}' for k, v in declared.items())}"
+    ]
+    if verbose:
+        return [Text(f"- {item}") for item in [*stated, *(believed if declared else [])]]
+    brief = (
+        "exact continuous-time control, full state, no noise, delay or saturation; unique geodesics; filter "
+        f"and predictor start at rest; the uncertainty is as specified ({len(stated)} assumptions, -v shows them)"
+    )
+    return [Text(line) for line in [brief, *(believed if declared else [])]]
+
+
+def _table(*columns: str) -> Table:
+    """A table without lines; a column whose name begins with > is aligned to the right."""
+    table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="dim")
+    for column in columns:
+        right = column.startswith(">")
+        table.add_column(column.lstrip(">"), justify="right" if right else "left", overflow="fold")
+    return table
