@@ -14,14 +14,13 @@ from tubecert.spec import codes
 from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.plan import read_initial_state, read_trajectory
-from tubecert.spec.reader import Field, Reader, root_field
+from tubecert.spec.reader import MAX_FINDINGS, Field, Reader, root_field
 from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty
 from tubecert.spec.types import Spec, Tube
 
 VERSION: Final = 1
-MAX_FINDINGS: Final = 200
 
 _REQUIRED = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory")
 _OPTIONAL = ("initial_state", "metric", "tube", "adaptation", "conditions", "expect")

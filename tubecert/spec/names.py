@@ -11,7 +11,7 @@ from typing import Final
 
 from tubecert.expression import FUNCTIONS, Expression, constant, symbol
 from tubecert.spec import codes
-from tubecert.spec.document import Scalar
+from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.reader import Field, Scope
 
 TIME: Final = "t"
@@ -107,14 +107,17 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
 
 
 def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[str, ...] | None:
+    if (
+        field is not None
+        and isinstance(field.node, ListNode)
+        and not 1 <= len(field.node.items) <= MAX_STATES
+    ):
+        count = len(field.node.items)
+        code = codes.LIMIT if count else codes.WRONG_SHAPE
+        field.fail(code, f"{field.path} has {count} entries; there must be 1 to {MAX_STATES}")
+        return None
     items = field.items(None, f"{what} names") if field else None
-    if field is None or items is None:
-        return None
-    if not items:
-        field.fail(codes.WRONG_SHAPE, f"there is no {what}; at least one is needed")
-        return None
-    if len(items) > MAX_STATES:
-        field.fail(codes.LIMIT, f"{len(items)} {what}s; at most {MAX_STATES} are supported")
+    if items is None:
         return None
     names = [_name(item.text(f"the name of a {what}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None

@@ -21,6 +21,8 @@ from tubecert.spec.types import Matrix, Term, TermMatrix
 Parameters = Mapping[str, Fraction]
 T = TypeVar("T")
 
+MAX_FINDINGS = 200  # that are shown; what comes after them is only counted
+
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
     "symbol": codes.UNKNOWN_SYMBOL,
@@ -140,11 +142,10 @@ class Field:
         if not isinstance(self.node, ListNode):
             self._wrong_type(f"a list of {f'{count} ' if count is not None else ''}{what}", help)
             return None
-        found = [self.item(i, node) for i, node in enumerate(self.node.items)]
-        if count is not None and len(found) != count:
-            self._wrong_count(len(found), count, what, help)
+        if count is not None and len(self.node.items) != count:
+            self._wrong_count(len(self.node.items), count, what, help)
             return None
-        return found
+        return [self.item(i, node) for i, node in enumerate(self.node.items)]
 
     # scalars
 
@@ -234,12 +235,13 @@ class Field:
 
     def terms(self, count: int, scope: Scope, what: str = "expressions") -> tuple[Term, ...] | None:
         """A list of expressions; the ones that are there are read even if their number is wrong."""
-        items = self.items(None, what)
-        if items is None:
+        if not isinstance(self.node, ListNode):
+            self._wrong_type(f"a list of {what}")
             return None
-        found = [item.term(scope) for item in items[: 2 * count + 8]]
-        if len(items) != count:
-            self._wrong_count(len(items), count, what)
+        nodes = self.node.items[: 2 * count + 8]
+        found = [self.item(i, node).term(scope) for i, node in enumerate(nodes)]
+        if len(self.node.items) != count:
+            self._wrong_count(len(self.node.items), count, what)
             return None
         return _all(found, count)
 
@@ -277,6 +279,9 @@ class Field:
 
     def _unknown(self, key: Scalar, known: Sequence[str]) -> list[str]:
         """Reports an unknown key; returns the known ones that it may stand for."""
+        if len(self.reader.findings) > MAX_FINDINGS:
+            self._at(codes.UNKNOWN_KEY, key, "unknown key")
+            return []
         shown = key.text[:60]
         message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
         if not key.text.isascii():

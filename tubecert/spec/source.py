@@ -28,7 +28,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A file's name and text, with its lines."""
+    """A file's name and text; `lines` are for display (nothing in them steers a terminal)."""
 
     file: str
     text: str
@@ -39,15 +39,15 @@ class Source:
     def of(cls, file: str, text: str) -> Source:
         """The source with its lines found."""
         starts = (0, *(match.end() for match in _BREAK.finditer(text)))
-        return cls(file=file, text=text, lines=tuple(_BREAK.split(text)), starts=starts)
+        lines = tuple(_displayed(line) for line in _BREAK.split(text))
+        return cls(file=file, text=text, lines=lines, starts=starts)
 
     def location(self, mark: Mark, width: int = 1) -> Location:
         """The place as a finding names it."""
-        line = self.lines[mark.line] if mark.line < len(self.lines) else ""
-        line = "".join(c if c.isprintable() else " " for c in line)  # nothing here may steer a terminal
-        return Location(
-            file=self.file, line=mark.line + 1, column=mark.column + 1, source=line, width=max(1, width)
-        )
+        number = min(mark.line, len(self.lines) - 1)  # the end of a text may be called its next line
+        line = self.lines[number]
+        column = min(mark.column, len(line)) if number == mark.line else len(line)
+        return Location(file=self.file, line=number + 1, column=column + 1, source=line, width=max(1, width))
 
     def index(self, mark: Mark) -> int:
         """Position of the mark in the text."""
@@ -62,6 +62,10 @@ class Source:
             middle = (low + high) // 2
             low, high = (middle, high) if self.starts[middle] <= index else (low, middle)
         return Mark(line=low, column=index - self.starts[low])
+
+
+def _displayed(line: str) -> str:
+    return line if line.isprintable() else "".join(c if c.isprintable() else " " for c in line)
 
 
 def read_source(path: str) -> Source:
