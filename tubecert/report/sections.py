@@ -205,7 +205,7 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
         return [Text(f"- {item}") for item in [*stated, *(believed if declared else [])]]
     brief = (
         "exact continuous-time control, full state, no noise, delay or saturation; unique geodesics; filter "
-        f"and predictor start at rest; the uncertainty is as specified ({len(stated)} assumptions, -v shows them)"
+        f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
     )
     return [Text(line) for line in [brief, *(believed if declared else [])]]
 
