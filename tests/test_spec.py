@@ -243,6 +243,12 @@ def test_equal_systems_have_equal_canonical_forms() -> None:
     assert canonical(load_text(changed)) != canonical(load_text(MINIMAL))
 
 
+def test_long_constants_survive_the_canonical_form() -> None:
+    text = minimal("inputs: [u],", "inputs: [u], parameters: {a: 0.1234567890123456789, b: a**12/7},")
+    data = canonical(load_text(text.replace("f: [-x]", "f: [-b*x]")))
+    assert canonical(load_text(json.dumps(data))) == data
+
+
 def test_overrides_are_read_like_the_file() -> None:
     spec = load(str(ROOT / "configs/three_state.yaml"))
     changed = apply_overrides(spec, rho_a="1e-1/5")

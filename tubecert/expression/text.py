@@ -9,35 +9,67 @@ from __future__ import annotations
 from fractions import Fraction
 
 from tubecert.expression.graph import Expression, topological
+from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
 
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)  # how strongly the outermost operation of a text binds
 _LARGEST_EXPONENT = 12  # of one `**` in the grammar
 _PLAIN_DIGITS = 25
+_CHUNK = 30  # digits of the parts of a long integer
 
 
 def number_text(q: Fraction) -> str:
-    """A rational exactly: as an integer or decimal where that is short, else as `p/q`."""
-    scale, digits = q.denominator, 0
-    while scale % 10 == 0:
-        scale, digits = scale // 10, digits + 1
-    while scale % 2 == 0:
-        scale, digits = scale // 2, digits + 1
-    while scale % 5 == 0:
-        scale, digits = scale // 5, digits + 1
-    if scale != 1 or digits > 300:
-        return f"{q.numerator}/{q.denominator}"
-    mantissa = str(abs(q.numerator) * 10**digits // q.denominator)
-    sign = "-" if q < 0 else ""
-    if digits == 0:
-        short = mantissa.rstrip("0")
-        zeros = len(mantissa) - len(short)
-        plain = mantissa if len(mantissa) <= _PLAIN_DIGITS or zeros < 4 else f"{short}e{zeros}"
-    elif digits <= _PLAIN_DIGITS:
-        whole = mantissa.zfill(digits + 1)
-        plain = f"{whole[:-digits]}.{whole[-digits:]}"
-    else:
-        plain = f"{mantissa}e-{digits}"
-    return sign + plain
+    """A rational exactly: as a decimal where that is short, else `p/q`; within the limits of the grammar."""
+    sign, size = "-" if q < 0 else "", abs(q)
+    short = _decimal(size)
+    if short is not None and len(short) <= MAX_NUMBER_LENGTH:
+        return sign + short
+    quotient = "" if size.denominator == 1 else f"/{_integer(size.denominator)}"
+    return sign + _integer(size.numerator) + quotient
+
+
+def _decimal(q: Fraction) -> str | None:
+    """A positive rational as a decimal, None if it has no finite one or one of too many places."""
+    twos, rest = _multiplicity(q.denominator, 2)
+    fives, rest = _multiplicity(rest, 5)
+    places = max(twos, fives)
+    if rest != 1 or places > MAX_NUMBER_EXPONENT:
+        return None
+    digits = str(q.numerator * 10**places // q.denominator)
+    if places == 0:
+        short = digits.rstrip("0")
+        zeros = len(digits) - len(short)
+        return (
+            f"{short}e{zeros}"
+            if len(digits) > _PLAIN_DIGITS and 4 <= zeros <= MAX_NUMBER_EXPONENT
+            else digits
+        )
+    if places > _PLAIN_DIGITS:
+        return f"{digits}e-{places}"
+    digits = digits.zfill(places + 1)
+    return f"{digits[:-places]}.{digits[-places:]}"
+
+
+def _multiplicity(n: int, prime: int) -> tuple[int, int]:
+    """How often `prime` divides n, and what is left."""
+    found = 0
+    while n % prime == 0:
+        n, found = n // prime, found + 1
+    return found, n
+
+
+def _integer(n: int) -> str:
+    """A positive integer; a long one as a sum of short numbers in parentheses."""
+    digits = str(n)
+    if len(digits) <= MAX_NUMBER_LENGTH:
+        return digits
+    high, low = divmod(n, 10**MAX_NUMBER_EXPONENT)
+    parts = [f"{_integer(high)}*1e{MAX_NUMBER_EXPONENT}"] if high else []
+    words = str(low)
+    for end in range(len(words), 0, -_CHUNK):
+        chunk, place = words[max(0, end - _CHUNK) : end].lstrip("0"), len(words) - end
+        if chunk:
+            parts.append(f"{chunk}e{place}" if place else chunk)
+    return f"({' + '.join(parts)})"
 
 
 def to_text(e: Expression) -> str:
