@@ -52,7 +52,7 @@ def _because(result: Mapping[str, Any]) -> str:
     """The reason that decided: the first with the verdict's own word."""
     reasons = [item for item in result["reasons"] if item.get("verdict") == result["verdict"]]
     reason = (reasons or result["reasons"] or [{"message": "no reason was recorded"}])[0]
-    claim = f"{reason['claim']}: " if reason.get("claim") else ""
+    claim = f"{sections.claim(reason)}: " if reason.get("claim") else ""
     return " ".join(f"{claim}{reason['message']}".split())
 
 
@@ -74,9 +74,9 @@ def meaning(result: Mapping[str, Any]) -> Text:
 
 def _promise(result: Mapping[str, Any]) -> Text:
     chosen = deciding(result)
-    loops = " and, separately, ".join(gains.words() for gains in chosen)
+    loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
-        f"With this metric and {loops}, the state stays within {up(result['tube']['rho'])} of the plan "
+        f"With this metric, {loops}, the state stays within {up(result['tube']['rho'])} of the plan "
         f"{sections.span(result)}, under the assumptions below."
     )
 
@@ -85,18 +85,12 @@ def _tube_is_known(result: Mapping[str, Any]) -> bool:
     return "rho_r" in result.get("tube", {})
 
 
-def _closing(certificate: Mapping[str, Any], target: str) -> list[Text]:
+def _closing(certificate: Mapping[str, Any], target: str) -> list[RenderableType]:
     """Where the certificate is, and how to see again that it is right."""
-    where = Text("certificate  ", style="bold", no_wrap=True, overflow="ignore")
+    where = Text("certificate ", style="bold", no_wrap=True, overflow="ignore")
     where.append(target, style="not bold")
-    again = Text(
-        f"{certificate['hash']}\n"
-        "To check it later: the same command gives the same hash on this machine with these versions.",
-        style="dim",
-        no_wrap=True,
-        overflow="ignore",
-    )
-    return [where, Padding(again, (0, 0, 0, 2), expand=False)]  # type: ignore[list-item]
+    again = "To check it later: the same command gives the same hash on this machine with these versions."
+    return [where, _indented(Text(certificate["hash"], style="dim")), _indented(Text(again, style="dim"))]
 
 
 def _indented(item: RenderableType) -> Padding:

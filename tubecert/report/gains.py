@@ -9,9 +9,9 @@ from typing import Any
 from tubecert.report.numbers import Number, exact, percent
 
 NAMES = {
-    "conditions_26": "A  conditions (26) of the paper",
-    "distance": "B  distance",
-    "sampled": "C  sampled",
+    "conditions_26": "A (26)",
+    "distance": "B distance",
+    "sampled": "C sampled",
 }
 
 
@@ -49,7 +49,7 @@ class Gains:
     def slack(self) -> str:
         """The margin in per cent, with the condition that has the least where there are several."""
         share = percent([self.margin])
-        return f"{share} ({self.tightest})" if self.tightest and self.margin is not None else share
+        return f"{share} {self.tightest}" if self.tightest and self.margin is not None else share
 
 
 def rows(result: Mapping[str, Any]) -> Iterator[Gains]:
@@ -117,7 +117,7 @@ def _sampled(data: Mapping[str, Any], decides: bool, asked: bool) -> Iterator[Ga
     if data.get("sample_time") is not None:
         yield Gains(
             section="sampled",
-            which="omega asked for" if asked else "omega = 1/Ts",
+            which="asked for" if asked else "omega = 1/Ts",
             verdict=data["verdict"],
             decides=decides,
             bandwidth=data["bandwidth"],

@@ -27,7 +27,9 @@ def down(value: Number | None, digits: int = 4) -> str:
 
 
 def exact(value: Number | None) -> str:
-    """A gain: every digit of it."""
+    """A gain or another exact number: every digit of it."""
+    if isinstance(value, str) and "/" in value:
+        return value
     return _shown(value, None, ROUND_HALF_EVEN)
 
 

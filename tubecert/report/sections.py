@@ -20,12 +20,14 @@ VERDICTS = {"certified": "green", "refuted": "red", "undecided": "yellow"}
 
 def of(result: Mapping[str, Any], *, verbose: bool) -> Iterator[Section]:
     """The sections that a result has something to say in."""
-    if result["reasons"]:
-        yield "Not proven", [_reason(result, item) for item in result["reasons"]]
+    failed = [item for item in result["reasons"] if item.get("verdict") != "certified"]
+    holding = [item for item in result["reasons"] if item.get("verdict") == "certified"]
+    if failed:
+        yield "Not certified", [_reason(result, item) for item in failed]
     if any(name in result for name in NAMES):
         yield "Gains", _gains(result)
-        if limits := _limits(result):
-            yield "What limits them", limits
+    if holding:
+        yield "What limits them", [_reason(result, item) for item in holding]
     if "tube" in result:
         yield "Tube", _tube(result)
     if "metric" in result:
@@ -47,15 +49,22 @@ def span(result: Mapping[str, Any]) -> str:
 def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Text:
     verdict = reason.get("verdict", "undecided")
     text = Text()
-    text.append(verdict, style=VERDICTS[verdict])
-    text.append(f" {reason['claim']}", style="bold")
-    text.append(f"\n  {reason['message']}")
+    text.append(f"{verdict} ", style=VERDICTS[verdict])
+    text.append(claim(reason), style="bold")
+    text.append(f": {reason['message']}")
     if at := reason.get("at"):
         text.append(f"\n  at {point(result, at)}")
     if relax := reason.get("relax"):
-        text.append("\n  help", style="green")
-        text.append(f": {relax}")
+        text.append("\n  help: ", style="green")
+        text.append(relax)
     return text
+
+
+def claim(reason: Mapping[str, Any]) -> str:
+    """What a reason is about, in the words of the table of gains."""
+    section, _, rest = reason["claim"].partition(": ")
+    title = NAMES.get(section, section)
+    return f"{title}, {rest}" if rest else title
 
 
 def point(result: Mapping[str, Any], at: Mapping[str, Any]) -> str:
@@ -73,7 +82,7 @@ def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
     found = list(rows(result))
     body: list[RenderableType] = []
     if found:
-        table = _table("certificate", "pair", "verdict", ">omega, rad/s", ">Gamma", ">Ts, s", ">margin left")
+        table = _table("certificate", "gains", "verdict", ">omega", ">Gamma", ">Ts", "margin left")
         before = ""
         for row in found:
             table.add_row(
@@ -90,44 +99,19 @@ def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
         if any(row.decides for row in found):
             body.append(
                 Text(
-                    "* decides the verdict. A pair belongs to its own certificate; rows do not mix.",
+                    "* decides the verdict; rows do not mix; omega in rad/s, Ts in s",
                     style="dim",
                 )
             )
     missing = [NAMES[key] for key in NAMES if key in result and not any(row.section == key for row in found)]
     body += [Text(f"{title}: no gains were found") for title in missing]
-    return body
+    return body + _limit(result)
 
 
-def _limits(result: Mapping[str, Any]) -> list[RenderableType]:
-    """What binds, per certificate."""
-    lines = []
-    rates = result.get("conditions_26", {})
-    if rates.get("binds"):
-        words = f"A  ({rates['binds']}) sets the bandwidth"
-        if rates["binds"] == "26b" and rates.get("bandwidth_infimum") is not None:
-            words += f"; Gamma grows without bound towards omega = {short(rates['bandwidth_infimum'])} rad/s"
-        lines.append(words)
-    if rates.get("below_twice_rate"):
-        lines.append("A  the bandwidth lies below 2 lambda")
-    sampled = result.get("sampled", {})
-    if sampled.get("sample_time_limit") is not None:
-        limit = down(sampled["sample_time_limit"])
-        lines.append(f"C  Ts stays below {limit} s however large the bandwidth")
-    for key, title in NAMES.items():
-        radius = result.get(key, {}).get("ultimate_radius")
-        if radius is not None:
-            lines.append(f"{title[0]}  in the long run |x - x*| <= {up(radius)}")
-        lines += [f"{title[0]}  {_shortfall(item)}" for item in result.get(key, {}).get("shortfalls") or ()]
-    return [Text(line) for line in lines]
-
-
-def _shortfall(item: Mapping[str, Any]) -> str:
-    words = f"{item['claim']} does not hold"
-    if item.get("needed") is not None and item.get("allowed") is not None:
-        return f"{words}: {short(item['needed'])} is needed, {short(item['allowed'])} is allowed"
-    margin = item.get("margin") or [None, None]
-    return words if margin[1] is None else f"{words}: its margin is at most {short(100 * margin[1], 3)} %"
+def _limit(result: Mapping[str, Any]) -> list[Text]:
+    """What no bandwidth can go beyond."""
+    limit = result.get("sampled", {}).get("sample_time_limit")
+    return [] if limit is None else [Text(f"However large the bandwidth, C needs Ts < {down(limit)} s.")]
 
 
 # -- tube and metric
@@ -137,21 +121,35 @@ def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
     tube = result["tube"]
     line = f"rho = {up(tube['rho'])}"
     if "rho_r" in tube:
-        line += f" = {short(tube['rho_r'])} (rho_r) + {short(tube['rho_a'])} (rho_a)"
+        line += f" = {up(tube['rho_r'])} (rho_r) + {up(tube['rho_a'])} (rho_a)"
     body: list[RenderableType] = [Text(f"{line}; epsilon = {short(tube['epsilon'])}")]
+    body += _in_the_long_run(result)
     if widths := tube.get("half_widths"):
         units = result["spec"]["effective"]["system"].get("units", {})
-        table = _table("state", ">at most this far from the plan", "unit" if units else "")
+        table = _table("state", ">half-width of the tube", "unit" if units else "")
         for name, width in widths.items():
             table.add_row(name, up(width), units.get(name, ""))
         body.append(table)
     return body
 
 
+def _in_the_long_run(result: Mapping[str, Any]) -> list[Text]:
+    """The radius that remains when the initial error has died out, for each certificate that holds."""
+    found = [
+        (title, data["ultimate_radius"])
+        for key, title in NAMES.items()
+        if (data := result.get(key, {})).get("verdict") == "certified"
+        and data.get("ultimate_radius") is not None
+    ]
+    return [Text(f"in the long run |x - x*| <= {up(radius)} with {title}") for title, radius in found]
+
+
 def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[RenderableType]:
-    body = [f"rate {short(metric['rate'], 12)} 1/s, {metric['verdict']} on the safe set"]
+    body = [f"rate {short(metric['rate'], 12)} 1/s: {metric['verdict']} on the safe set"]
+    if (largest := metric.get("largest_rate")) is not None:
+        body[0] += f"; the metric supports rates up to {down(largest[0], 7)} 1/s"
     if (margin := metric.get("margin")) and metric["verdict"] == "certified":
-        body[0] += f"; it holds up to {down(margin[0], 3)} 1/s more"
+        body[0] += f" (margin {down(margin[0], 3)} 1/s)"
     for words, low, high in (
         ("over the tube", "lower", "upper"),
         ("on the safe set", "lower_on_set", "upper_on_set"),
@@ -164,18 +162,24 @@ def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[Rend
 
 
 def _constants(result: Mapping[str, Any]) -> Table:
-    table = _table("symbol", "what it is", ">proven", "unit", ">gap", "equation", "where")
+    table = _table("symbol", "what it is, and where", ">proven", "unit", ">gap", "equation")
     for name, item in result["constants"].items():
         table.add_row(
             item["symbol"],
-            item.get("meaning") or name.replace("_", " "),
+            _described(result, name, item),
             _proven(item),
             item["unit"],
             _gap(item),
             item["equation"],
-            point(result, item["at"]) if item.get("at") else "",
         )
     return table
+
+
+def _described(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) -> Text:
+    text = Text(item.get("meaning") or name.replace("_", " "))
+    if item.get("at") and (where := point(result, item["at"])):
+        text.append(f"\nat {where}", style="dim")
+    return text
 
 
 def _proven(item: Mapping[str, Any]) -> str:
@@ -212,7 +216,7 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
 
 def _table(*columns: str) -> Table:
     """A table without lines; a column whose name begins with > is aligned to the right."""
-    table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="dim")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     for column in columns:
         right = column.startswith(">")
         table.add_column(column.lstrip(">"), justify="right" if right else "left", overflow="fold")

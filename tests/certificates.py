@@ -1,0 +1,165 @@
+"""A small certificate by hand, in the form of the contract, for tests of what is made of certificates."""
+
+from __future__ import annotations
+
+import copy
+
+_EFFECTIVE = {
+    "tubecert": 1,
+    "name": "pendulum",
+    "system": {
+        "states": ["angle", "speed"],
+        "inputs": ["torque"],
+        "units": {"angle": "rad", "speed": "rad/s"},
+    },
+    "trajectory": {"kind": "equilibrium", "at": ["0", "0"], "input": ["0"]},
+}
+
+_CONSTANTS = {
+    "lower": {
+        "below": 3.8123456,
+        "above": 3.83,
+        "symbol": "a",
+        "equation": "CCM_1",
+        "unit": "1",
+        "meaning": "smallest eigenvalue of the metric M",
+        "at": {"x": [0.01, -0.02]},
+    },
+    "h": {
+        "below": 0.1,
+        "above": 0.1,
+        "symbol": "Dh",
+        "equation": "assumption 4",
+        "unit": "u",
+        "meaning": "sup |h|",
+        "at": {"t": 0.785398163, "x": [0.0, 0.0]},
+    },
+    "zeta_1": {"below": 1.5, "above": 1.6, "symbol": "zeta1", "equation": "26a", "unit": "1", "meaning": ""},
+}
+
+_RESULT = {
+    "verdict": "certified",
+    "formulas": "corrected",
+    "spec": {"effective": _EFFECTIVE, "effective_hash": "sha256:00", "file_hash": "sha256:01"},
+    "overrides": {},
+    "plan": {"kind": "equilibrium", "interpolation": "exact"},
+    "safe_set": {"angle": [-0.5, 0.5], "speed": [-1.0, "4/3"]},
+    "assumptions": ["the controller acts in continuous time and exactly", "the claim is for all t >= 0"],
+    "declared": {},
+    "decided_by": ["conditions_26"],
+    "reasons": [
+        {
+            "claim": "conditions_26",
+            "verdict": "certified",
+            "message": "(26a) sets the bandwidth; proven margins: 26a 0.0001, 26b 0.63, 26c 4e-05",
+            "relax": "the least Gamma would fall by about 19 % per 10 % less of Dh (sup |h|)",
+        }
+    ],
+    "metric": {
+        "rate": 0.9999,
+        "dual_metric": [["1", "0"], ["0", "1"]],
+        "verdict": "certified",
+        "margin": [2.41e-5, 2.42e-5],
+        "largest_rate": [0.9999241, 0.9999242],
+        "lower": [3.8123456, 3.83],
+        "upper": [5.8, 5.8412345],
+        "lower_on_set": [3.7, 3.71],
+        "upper_on_set": [5.9, 5.91],
+    },
+    "tube": {
+        "epsilon": 0.01,
+        "rho_a": 0.01,
+        "rho_r": 0.0312345678,
+        "rho": 0.0412345678,
+        "half_widths": {"angle": 0.0398765, "speed": 0.0412345},
+    },
+    "constants": _CONSTANTS,
+    "conditions_26": {
+        "verdict": "certified",
+        "bandwidth": 41.82,
+        "adaptation_rate": 13940000.0,
+        "margins": {"26a": [0.000123, 0.02], "26b": [0.63, 0.64], "26c": [4.1e-5, 0.03]},
+        "least_adaptation": {
+            "bandwidth": 48.0,
+            "adaptation_rate": 12340000.0,
+            "margins": {"26a": [0.05, 0.06], "26b": [0.7, 0.8], "26c": [2e-5, 0.03]},
+        },
+        "curve": [],
+        "binds": "26a",
+        "shortfalls": [],
+    },
+    "distance": {
+        "verdict": "certified",
+        "split": {"bandwidth": 7.5, "adaptation_rate": 30000, "predictor_gain": 7.5, "margin": [1e-4, 0.01]},
+        "least_adaptation": {"bandwidth": 10.8, "adaptation_rate": 13800, "margin": [2e-4, 0.01]},
+        "asked": None,
+        "ultimate_radius": 0.0123,
+        "curve": [],
+        "shortfalls": [],
+    },
+    "sampled": {
+        "verdict": "certified",
+        "sample_time": 0.0906,
+        "bandwidth": 11.04,
+        "margin": [1e-4, 0.01],
+        "sample_time_limit": 0.12589,
+        "curve": [],
+        "shortfalls": [],
+    },
+    "proof": {},
+}
+
+_TUBE_KEYS = ("tube", "constants", "conditions_26", "distance", "sampled", "decided_by")
+
+
+def certified(**changes):
+    """A result whose every certificate holds."""
+    return copy.deepcopy(_RESULT) | changes
+
+
+def refuted_metric():
+    """A result that stops at the metric, with a witness."""
+    result = {key: value for key, value in certified().items() if key not in _TUBE_KEYS}
+    reason = {
+        "claim": "metric, C2",
+        "verdict": "refuted",
+        "message": "C2 fails at rate 1: the largest rate that this metric supports is 0.99654",
+        "at": {"x": [0.1, -0.25]},
+        "relax": "lower metric.rate to 0.99654, or give another dual metric",
+    }
+    return result | {
+        "verdict": "refuted",
+        "reasons": [reason],
+        "metric": result["metric"] | {"verdict": "refuted"},
+    }
+
+
+def refuted_gains():
+    """A result for gains asked for that do not suffice."""
+    result = certified(verdict="refuted", overrides={"bandwidth": 5.0, "adaptation_rate": 100.0})
+    result["conditions_26"] |= {
+        "verdict": "refuted",
+        "bandwidth": 5.0,
+        "adaptation_rate": 100.0,
+        "margins": {"26a": [-0.5, -0.4], "26b": [0.2, 0.3], "26c": [None, -3.0]},
+    }
+    result["distance"] |= {
+        "asked": {"bandwidth": 5.0, "adaptation_rate": 100.0, "margin": [None, -1.0]},
+        "verdict": "refuted",
+    }
+    result["reasons"] = [
+        {
+            "claim": "conditions_26: 26a",
+            "verdict": "refuted",
+            "message": "(26a): its margin lies in [-0.5, -0.4]",
+        }
+    ]
+    return result
+
+
+def undecided():
+    """A result whose metric could not be decided."""
+    result = refuted_metric()
+    result["reasons"][0] |= {"verdict": "undecided", "message": "too close to tell"}
+    del result["reasons"][0]["at"]
+    return result | {"verdict": "undecided"}

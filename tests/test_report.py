@@ -1,0 +1,256 @@
+"""The report: what it says, and that it says so in any terminal and in none."""
+
+import re
+from decimal import Decimal
+from io import StringIO
+from types import SimpleNamespace
+
+import pytest
+from certificates import certified, refuted_gains, refuted_metric, undecided
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.text import Text
+
+from tubecert.certificate import seal
+from tubecert.findings import Finding, Location, Severity
+from tubecert.report import console, findings, progress
+from tubecert.report.numbers import down, exact, percent, short, up
+from tubecert.report.terminal import Terminal
+
+RESULTS = {
+    "certified": certified,
+    "refuted": refuted_metric,
+    "refuted gains": refuted_gains,
+    "undecided": undecided,
+}
+ANSI = re.compile(r"\x1b\[[0-9;]*m")
+
+
+class Screen(StringIO):
+    def isatty(self):
+        return True
+
+
+def terminal(*, width=100, colored=False):
+    return Terminal(stream=None, colored=colored, width=width, interactive=colored)
+
+
+def shown(result, *, verbose=False, **looks):
+    report = console.report(seal(result, {}), target="out/pendulum.certificate.json", verbose=verbose)
+    return terminal(**looks).text(report)
+
+
+def line(result):
+    return terminal().text(console.verdict_line(result)).rstrip("\n")
+
+
+@pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
+@pytest.mark.parametrize("verbose", [False, True])
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_plain_text_is_plain(make, verbose, width):
+    text = shown(make(), verbose=verbose, width=width)
+    assert "\x1b" not in text
+    assert text.isascii()
+    for row in text.splitlines():
+        assert row == row.rstrip()
+    below_the_verdict = text.splitlines()[1:]
+    assert max(map(len, below_the_verdict)) <= width
+
+
+@pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
+def test_colour_changes_nothing_but_colour(make):
+    colored = shown(make(), verbose=True, colored=True)
+    assert "\x1b[" in colored
+    assert ANSI.sub("", colored) == shown(make(), verbose=True)
+
+
+def test_the_verdict_comes_first_with_its_numbers():
+    assert line(certified()) == "certified pendulum: rho = 0.04124; omega = 41.82 rad/s, Gamma = 1.394e7"
+    for section, numbers in {
+        "distance": "omega = 10.8 rad/s, Gamma = 13800",
+        "sampled": "omega = 11.04 rad/s, Ts = 0.0906 s",
+    }.items():
+        assert line(certified(decided_by=[section])).endswith(f"rho = 0.04124; {numbers}")
+    every = line(certified(decided_by=["conditions_26", "distance", "sampled"]))
+    assert every.count("omega") == 3
+
+
+def test_a_certificate_is_put_in_one_sentence():
+    text = " ".join(shown(certified()).split())
+    assert "the state stays within 0.04124 of the plan for all t >= 0, under the assumptions below" in text
+    finite = certified()
+    finite["spec"]["effective"]["trajectory"]["horizon"] = "2.5"
+    assert "for 0 <= t <= 2.5 s" in " ".join(shown(finite).split())
+
+
+def test_a_refusal_names_claim_witness_and_remedy():
+    text = shown(refuted_metric())
+    first, *rest = text.splitlines()
+    assert first.startswith("refuted pendulum: metric, C2: ")
+    assert "the largest rate that this metric supports is 0.99654" in first
+    assert any(row.strip() == "at angle = 0.1, speed = -0.25" for row in rest)
+    assert any(row.strip().startswith("help: lower metric.rate to 0.99654") for row in rest)
+    assert "stays within" not in text
+
+
+def test_failing_gains_refute_no_tube():
+    text = " ".join(shown(refuted_gains()).split())
+    assert text.startswith("refuted pendulum: A (26), 26a")
+    assert "does not prove that the state leaves the tube" in text
+    assert "stays within" not in text
+
+
+def test_undecided_is_shown_as_neither():
+    text = shown(undecided())
+    assert text.startswith("undecided pendulum: ")
+    assert "neither proven nor refuted" in text
+    assert "stays within" not in text
+
+
+def test_gains_of_different_certificates_do_not_mix():
+    table = shown(certified()).split("Gains\n")[1].split("\n\n")[0].splitlines()
+    rows = [row for row in table if "41.82" in row]
+    assert len(rows) == 1
+    assert "1.394e7" in rows[0]
+    assert "*" in rows[0]
+    assert "0.0041 % 26c" in rows[0]
+    assert not any("0.0906" in row and "Gamma" in row for row in table)
+
+
+def test_verbose_shows_constants_and_assumptions():
+    brief, full = shown(certified()), shown(certified(), verbose=True)
+    assert "smallest eigenvalue of the metric M" not in brief
+    for words in (
+        "smallest eigenvalue of the metric M",
+        ">= 3.81234",
+        "<= 0.1",
+        "exact",
+        "at t = 0.785398 s",
+    ):
+        assert words in full
+    for assumption in certified()["assumptions"]:
+        assert assumption in " ".join(full.split())
+
+
+def test_what_is_declared_is_said_to_be_believed():
+    text = shown(certified(declared={"h": 0.1, "h_t": 0.2}))
+    assert "declared, believed as given: h <= 0.1, h_t <= 0.2" in text
+
+
+def test_the_report_says_where_the_certificate_is():
+    text = shown(certified())
+    assert "certificate out/pendulum.certificate.json" in text
+    assert seal(certified(), {})["hash"] in text
+
+
+def test_an_unbounded_constant_is_shown_as_unknown():
+    result = certified()
+    result["constants"]["zeta_1"] |= {"above": None, "below": None}
+    assert "<= -" in shown(result, verbose=True)
+
+
+@given(st.floats(min_value=1e-12, max_value=1e12), st.integers(1, 8))
+def test_rounding_keeps_bounds_true(value, digits):
+    true = Decimal(repr(value))
+    assert Decimal(down(value, digits)) <= true <= Decimal(up(value, digits))
+    assert abs(Decimal(short(value, digits)) - true) <= true * Decimal(10) ** (1 - digits)
+    assert Decimal(exact(value)) == true
+
+
+def test_numbers_are_short():
+    assert [short(v) for v in (0, 41.82, 13940000.0, 1e-9, 123456.0, -0.5, None)] == [
+        "0", "41.82", "1.394e7", "1e-9", "123500", "-0.5", "-",
+    ]  # fmt: skip
+    assert exact("4/3") == "4/3"
+    assert exact("0.1234567890123456789") == "0.1234567890123456789"
+    assert short("4/3") == "1.333"
+    assert percent([0.12345, 0.2]) == "12.3 %"
+    assert percent([-0.5, 0.2]) == "-50 %"
+    assert percent([None, 0.2]) == "-"
+    assert short(float("inf")) == "-"
+
+
+# findings
+
+
+def finding(severity=Severity.ERROR):
+    place = Location(file="plant.yaml", line=3, column=5, source="f: [x^2]", width=3)
+    return Finding(
+        code="TC109", message="^ is not allowed", severity=severity, location=place, help="write **"
+    )
+
+
+def test_findings_are_printed_as_they_are_and_counted():
+    text = terminal(width=20).text(findings.render([finding(), finding(Severity.WARNING)]))
+    assert text == f"{finding()}\n{finding(Severity.WARNING)}\n1 error, 1 warning\n"
+    colored = terminal(colored=True, width=20).text(findings.render([finding()]))
+    assert "\x1b[" in colored
+    assert ANSI.sub("", colored) == f"{finding()}\n1 error\n"
+
+
+def test_findings_as_data():
+    assert findings.as_data(finding()) == {
+        "code": "TC109",
+        "severity": "error",
+        "message": "^ is not allowed",
+        "file": "plant.yaml",
+        "line": 3,
+        "column": 5,
+        "help": "write **",
+    }
+    assert findings.as_data(Finding(code="TC100", message="no")) == {
+        "code": "TC100",
+        "severity": "error",
+        "message": "no",
+    }
+
+
+# terminal
+
+
+@pytest.mark.parametrize(
+    ("stream", "color", "environment", "colored"),
+    [
+        (StringIO(), None, {}, False),
+        (StringIO(), "always", {}, True),
+        (Screen(), None, {}, True),
+        (Screen(), "auto", {"NO_COLOR": "1"}, False),
+        (Screen(), "auto", {"NO_COLOR": ""}, True),
+        (Screen(), "auto", {"TERM": "dumb"}, False),
+        (Screen(), "always", {"NO_COLOR": "1"}, True),
+        (Screen(), "never", {}, False),
+        (None, None, {}, False),
+    ],
+)
+def test_when_to_colour(stream, color, environment, colored):
+    found = Terminal.of(stream, color, environment)
+    assert found.colored is colored
+    assert ("\x1b" in found.text(Text("x", style="red"))) is colored
+    found.show(Text("x"))
+
+
+def test_pipes_have_a_fixed_width():
+    assert Terminal.of(StringIO(), None, {"COLUMNS": "40"}).width == 100
+
+
+# progress
+
+
+def test_progress_is_silent_in_a_pipe():
+    with progress.shown(Terminal.of(StringIO(), None, {}), wanted=True) as report:
+        assert report is None
+
+
+def test_progress_goes_away_when_it_is_done():
+    screen = Screen()
+    with progress.shown(Terminal.of(screen, "never", {}), wanted=True) as report:
+        report(SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75))
+    with progress.shown(Terminal.of(screen, None, {}), wanted=False) as report:
+        assert report is None
+
+
+def test_progress_in_words():
+    step = SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75)
+    assert progress.describe(step) == "feedback gain: 12,000 boxes, between 0.5 and 0.75"
+    step = SimpleNamespace(name="metric", boxes=3, below=float("-inf"), above=0.75)
+    assert progress.describe(step) == "metric: 3 boxes"
