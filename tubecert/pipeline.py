@@ -15,22 +15,42 @@ from pathlib import Path
 from typing import Any
 
 from tubecert.bounds.compute import Radius, bound_constants, least_radius, time_range
-from tubecert.bounds.constants import TABLE, BoundConstants, Constant, Meaning, Witness
+from tubecert.bounds.constants import DERIVED, BoundConstants, Constant, Witness
 from tubecert.bounds.suprema import Suprema
-from tubecert.certificate import digest
+from tubecert.certificate.file import digest
+from tubecert.certificate.reasons import reasons_26, reasons_distance, reasons_sampled
+from tubecert.certificate.sections import (
+    assumptions,
+    ceiling_text,
+    constant_data,
+    decimal_data,
+    declared_data,
+    declared_metric,
+    declared_uncertainty,
+    floor_text,
+    metric_data,
+    pair_data,
+    witness_data,
+)
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.conditions.rates import derived_constants
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.domain import Range
+from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import ControlAffineModel, build, domain_findings, rank_decision, time_period
-from tubecert.search import Answer, answer
+from tubecert.search.distance import search_distance
+from tubecert.search.elasticities import elasticities_26, elasticities_distance
+from tubecert.search.rates import search_26
+from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
 
 Result = dict[str, Any]
+_ORDER = ("refuted", "undecided", "certified")
 CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
 
 
@@ -121,11 +141,11 @@ class _Certification:
             "overrides": _overrides(options),
             "plan": {"kind": spec.trajectory.kind, "interpolation": "exact"},
             "safe_set": {
-                name: [_decimal(low), _decimal(high)]
+                name: [decimal_data(low), decimal_data(high)]
                 for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
             },
-            "assumptions": _assumptions(spec, self.model),
-            "declared": _declared(spec),
+            "assumptions": assumptions(spec, self.model),
+            "declared": declared_data(spec),
             "reasons": [],
             "proof": {},
         }
@@ -150,7 +170,7 @@ class _Certification:
 
     def _metric(self) -> bool:
         proof = verify_metric(self.model, self.spec.safe_set, self._effort("metric"))
-        self.result["metric"] = _metric_data(self.spec, proof)
+        self.result["metric"] = metric_data(self.spec, proof)
         if proof.verdict != "certified":
             at = proof.at if proof.verdict == "refuted" else None
             return self._stop(f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof))
@@ -159,7 +179,7 @@ class _Certification:
     def _relax_metric(self, proof: MetricProof) -> str:
         if proof.largest_rate is None:
             return "give another dual metric"
-        return f"lower metric.rate to {_floor(proof.largest_rate.below)}, or give another dual metric"
+        return f"lower metric.rate to {floor_text(proof.largest_rate.below)}, or give another dual metric"
 
     def _declared_metric(self, proof: MetricProof) -> bool:
         """The bounds a, A that a specification may declare must hold on the safe set."""
@@ -175,7 +195,7 @@ class _Certification:
                 "refuted" if refuted else "undecided",
                 f"metric.bounds.lower is {float(metric.lower):g}, but lmin(M) reaches {proof.lower_on_set.above:.8g}",
                 proof.lower_on_set.at,
-                f"declare lower: {_floor(proof.lower_on_set.below)}",
+                f"declare lower: {floor_text(proof.lower_on_set.below)}",
             )
         if metric.upper is not None and Fraction(proof.upper_on_set.above) > metric.upper:
             refuted = Fraction(proof.upper_on_set.below) > metric.upper
@@ -184,7 +204,7 @@ class _Certification:
                 "refuted" if refuted else "undecided",
                 f"metric.bounds.upper is {float(metric.upper):g}, but lmax(M) reaches {proof.upper_on_set.below:.8g}",
                 proof.upper_on_set.at,
-                f"declare upper: {_ceiling(proof.upper_on_set.above)}",
+                f"declare upper: {ceiling_text(proof.upper_on_set.above)}",
             )
         return True
 
@@ -203,7 +223,7 @@ class _Certification:
         assert tube.epsilon is not None
         assert tube.rho_a is not None
         suprema = self._suprema(1.0)
-        declared = _declared_pair(self.spec)
+        declared = declared_metric(self.spec)
         width = tube.epsilon + tube.rho_a
         radius = least_radius(
             suprema, self.spec.safe_set, suprema.initial_offset(self.spec.x0), width, declared
@@ -211,7 +231,7 @@ class _Certification:
         contained = radius.contained
         if contained.verdict == "certified":
             return radius
-        self.result["tube"] = {"epsilon": _decimal(tube.epsilon), "rho_a": _decimal(tube.rho_a), "rho": radius.rho}
+        self.result["tube"] = {"epsilon": decimal_data(tube.epsilon), "rho_a": decimal_data(tube.rho_a), "rho": radius.rho}
         lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
         self._stop(
             "assumption 1: the tube lies in the safe set",
@@ -227,19 +247,14 @@ class _Certification:
         assert radius.lower is not None
         assert radius.upper is not None
         suprema = self._suprema(radius.rho)
-        declared = _declared_uncertainty(self.spec)
+        declared = declared_uncertainty(self.spec)
         constants = bound_constants(suprema, self.spec.x0, (radius.lower, radius.upper), declared)
-        self.result["metric"] |= {"lower": _pair(constants.lower), "upper": _pair(constants.upper)}
-        self.result["constants"] = {name: _constant(value, meaning) for name, value, meaning in constants.items()}
+        self.result["metric"] |= {"lower": pair_data(constants.lower), "upper": pair_data(constants.upper)}
+        self.result["constants"] = {name: constant_data(value, meaning) for name, value, meaning in constants.items()}
         if not (self._finite(constants) and self._declared_holds(suprema, declared)):
             return
-        found = answer(
-            self._problem(suprema, radius, constants),
-            bandwidth=self.options.bandwidth,
-            adaptation_rate=self.options.adaptation_rate,
-        )
-        self._tube(suprema, radius, found)
-        self._collect(found)
+        self._tube(suprema, radius)
+        self._search(self._problem(suprema, radius, constants))
 
     def _finite(self, constants: BoundConstants) -> bool:
         for name, value, meaning in constants.items():
@@ -266,7 +281,7 @@ class _Certification:
                     f"uncertainty.bounds.{name} is {declared[name].above:g}, but the expression reaches "
                     f"{derived.below:.8g} on the tube",
                     derived.at,
-                    f"declare {name}: {_ceiling(derived.above)}",
+                    f"declare {name}: {ceiling_text(derived.above)}",
                 )
         return True
 
@@ -290,49 +305,63 @@ class _Certification:
             formulas=Formulas(self.options.formulas),
             kernel=self.spec.kernel,
             drift=Drift.SUM if printed else Drift.PLAN,
-            initial_uncertainty=constants.h_initial,
         )
 
     # -- result ------------------------------------------------------------------------------------------------
 
-    def _tube(self, suprema: Suprema, radius: Radius, found: Answer) -> None:
+    def _tube(self, suprema: Suprema, radius: Radius) -> None:
+        """The radii, and half-widths per state: |x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho."""
         tube = self.spec.tube
         assert tube.rho_a is not None
+        assert radius.lower is not None
         rho = Fraction(repr(radius.rho))
-        reach = found.distance_reach  # sup D of the certified pair, or dbar
+        reach = sqrt(Interval(radius.lower.below)) * Interval(radius.rho)  # certified: d < dbar
         widths = {
-            name: printable_above(min(width.above * reach, radius.rho))
+            name: printable_above(min(float((Interval(width.above) * reach).hi), radius.rho))
             for name, width in zip(self.spec.states, suprema.half_widths(), strict=True)
         }
         self.result["tube"] = {
-            "epsilon": _decimal(tube.epsilon),
-            "rho_a": _decimal(tube.rho_a),
-            "rho_r": _decimal(rho - tube.rho_a),
+            "epsilon": decimal_data(tube.epsilon),
+            "rho_a": decimal_data(tube.rho_a),
+            "rho_r": decimal_data(rho - tube.rho_a),
             "rho": radius.rho,
             "half_widths": widths,
         }
 
-    def _collect(self, found: Answer) -> None:
-        """Put the three certificates together; those that were chosen decide the verdict."""
-        for name, (value, meaning) in found.derived.items():
-            self.result["constants"][name] = _constant(value, meaning)
-        self.result |= found.to_dict()
-        chosen = list(CONDITIONS) if self.options.conditions == "all" else [self.options.conditions]
-        self.result["decided_by"] = [CONDITIONS[key] for key in chosen]
-        self.result["reasons"] += found.reasons
-        if self.options.formulas == "as-printed":
-            self.result["reasons"].append(
-                {
-                    "claim": "as-printed",
-                    "verdict": "undecided",
-                    "message": "the paper's printed formulas are reproduced; several are wrong, so nothing is certified",
-                }
-            )
-            self.result["verdict"] = "undecided"
-            return
-        verdicts = {self.result[CONDITIONS[key]]["verdict"] for key in chosen}
-        order = ("refuted", "undecided", "certified")
-        self.result["verdict"] = next(word for word in order if word in verdicts)
+    def _search(self, problem: TubeProblem) -> None:
+        """Gains of A, B and C; those conditions that were chosen decide the verdict."""
+        asked = {"bandwidth": self.options.bandwidth, "adaptation_rate": self.options.adaptation_rate}
+        rates = search_26(problem, **asked)
+        distance = search_distance(problem, **asked)
+        sampled = search_sampled(problem, bandwidth=self.options.bandwidth)
+        if rates.pair is not None:
+            for name, value in derived_constants(problem, rates.pair.recipe).items():
+                self.result["constants"][name] = constant_data(value.printable(), DERIVED[name])
+        slopes = {
+            "conditions_26": elasticities_26(problem, rates),
+            "distance": elasticities_distance(problem, distance),
+        }
+        explained = {
+            "conditions_26": reasons_26(rates, slopes["conditions_26"]),
+            "distance": reasons_distance(distance, slopes["distance"]),
+            "sampled": reasons_sampled(sampled),
+        }
+        self.result |= {
+            "conditions_26": rates.to_dict(),
+            "distance": distance.to_dict(),
+            "sampled": sampled.to_dict(),
+            "elasticities": slopes,
+        }
+        chosen = list(CONDITIONS.values()) if self.options.conditions == "all" else [CONDITIONS[self.options.conditions]]
+        self.result["decided_by"] = chosen
+        self.result["reasons"] += [reason for name in chosen for reason in explained[name]]
+        verdicts = {self.result[name]["verdict"] for name in chosen}
+        if self.options.formulas == Formulas.AS_PRINTED:
+            verdicts.add("undecided")
+            verdicts.discard("certified")
+            if "conditions_26" not in chosen:
+                self.result["reasons"] += explained["conditions_26"]
+        self.result["verdict"] = next(word for word in _ORDER if word in verdicts)
 
     def _stop(
         self, claim: str, verdict: str, message: str, at: Witness | None = None, relax: str = ""
@@ -340,7 +369,7 @@ class _Certification:
         """Record a claim that is not proven, as the verdict."""
         reason: Result = {"claim": claim, "verdict": verdict, "message": message}
         if at is not None:
-            reason["at"] = _witness(at)
+            reason["at"] = witness_data(at)
         if relax:
             reason["relax"] = relax
         self.result["reasons"].append(reason)
@@ -380,15 +409,6 @@ def _complete(spec: Spec, options: Options) -> list[Finding]:
         Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
         for key, remedy in missing
     ]
-    if not all(e.expression.is_constant for row in spec.B for e in row):
-        findings.append(
-            Finding(
-                code="TC113",
-                message="an input matrix B that is not constant and rational cannot be certified yet",
-                location=spec.location("system.B"),
-                help="use a constant B of rational numbers",
-            )
-        )
     return findings
 
 
@@ -408,33 +428,6 @@ def _time(spec: Spec) -> tuple[list[Finding], Range | None]:
         return [finding], None
 
 
-def _declared_pair(spec: Spec) -> tuple[Constant, Constant] | None:
-    """The declared (a, A), if both are declared."""
-    metric = spec.metric
-    if metric is None or metric.lower is None or metric.upper is None:
-        return None
-    return _exactly(metric.lower), _exactly(metric.upper)
-
-
-def _declared_uncertainty(spec: Spec) -> dict[str, Constant]:
-    bounds = spec.uncertainty.bounds
-    if bounds is None:
-        return {}
-    values = {"h": bounds.h, "h_x": bounds.h_x, "h_t": bounds.h_t}
-    return {name: _exactly(value) for name, value in values.items() if value is not None}
-
-
-def _exactly(value: Fraction) -> Constant:
-    return Constant(below=printable_below(value), above=printable_above(value))
-
-
-def _declared(spec: Spec) -> Result:
-    """What is believed, not proven: bounds of an h that is not given as expressions."""
-    if spec.uncertainty.h is not None or spec.uncertainty.bounds is None:
-        return {}
-    return {name: constant.above for name, constant in _declared_uncertainty(spec).items()}
-
-
 def _overrides(options: Options) -> Result:
     given = {
         "rho_a": options.rho_a,
@@ -442,92 +435,7 @@ def _overrides(options: Options) -> Result:
         "bandwidth": options.bandwidth,
         "adaptation_rate": options.adaptation_rate,
     }
-    result: Result = {name: _decimal(value) for name, value in given.items() if value is not None}
+    result: Result = {name: decimal_data(value) for name, value in given.items() if value is not None}
     if options.metric is not None:
         result["metric"] = options.metric.name
     return result
-
-
-def _metric_data(spec: Spec, proof: MetricProof) -> Result:
-    metric = spec.metric
-    assert metric is not None
-    data: Result = {
-        "rate": _decimal(metric.rate),
-        "dual_metric": canonical(spec)["metric"]["dual_metric"],
-        "verdict": proof.verdict,
-    }
-    for name in ("margin", "largest_rate", "lower_on_set", "upper_on_set"):
-        if (value := getattr(proof, name)) is not None:
-            data[name] = _pair(value.printable())
-    return data
-
-
-def _constant(value: Constant, meaning: Meaning) -> Result:
-    data: Result = {
-        "below": _number(value.below),
-        "above": _number(value.above),
-        "symbol": meaning.symbol,
-        "equation": meaning.equation,
-        "unit": meaning.unit,
-        "meaning": meaning.words,
-    }
-    if value.at is not None:
-        data["at"] = _witness(value.at)
-    return data
-
-
-def _witness(at: Witness) -> Result:
-    return {**({} if at.t is None else {"t": at.t}), "x": list(at.x)}
-
-
-def _pair(value: Constant) -> list[float | None]:
-    return [_number(value.below), _number(value.above)]
-
-
-def _number(value: float) -> float | None:
-    """A bound for JSON: null where there is none."""
-    return value if math.isfinite(value) else None
-
-
-def _decimal(value: Fraction | None) -> float | str | None:
-    """An exact number: a JSON number where one of at most 15 digits is exact, else a text `p/q`."""
-    if value is None:
-        return None
-    near = float(value)
-    return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
-
-
-def _floor(value: float) -> str:
-    digits = 6
-    step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
-    return f"{math.floor(value / step) * step:.{digits}g}"
-
-
-def _ceiling(value: float) -> str:
-    return _floor(-value).lstrip("-")
-
-
-def _assumptions(spec: Spec, model: ControlAffineModel) -> list[str]:
-    """Everything that is not proven here (theory, section 5)."""
-    flat = all(e.is_constant for row in model.W for e in row)
-    smooth = spec.adaptation.smooth
-    horizon = spec.trajectory.horizon
-    return [
-        "the controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
-        "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
-        "minimising geodesics are straight lines, which the constant metric makes unique"
-        if flat
-        else "the controller finds the minimising geodesic exactly, and it is unique in the tube (not proven here)",
-        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
-        "the projection is hard" if smooth is None else f"the projection is smooth with layer {float(smooth):g}",
-        "the full state is measured without noise or delay, and inputs do not saturate",
-        "the filter is first order, C(s) = omega/(s + omega)",
-        f"the claim is for 0 <= t <= {float(horizon):g} s" if horizon is not None else "the claim is for all t >= 0",
-        "the uncertainty obeys its declared bounds on the tube"
-        if spec.uncertainty.h is None
-        else "the uncertainty is the expression of the specification"
-        + (", or any other within the declared bounds" if spec.uncertainty.bounds else ""),
-    ]
-
-
-__all__ = ["CONDITIONS", "TABLE", "Options", "Progress", "Step", "certify", "inspect"]

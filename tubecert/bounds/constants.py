@@ -79,3 +79,20 @@ class BoundConstants:
 
 
 TABLE: dict[str, Meaning] = {item.name: item.metadata["meaning"] for item in fields(BoundConstants)}
+
+DERIVED: dict[str, Meaning] = {
+    name: Meaning(symbol=symbol, equation=equation, unit=unit, words=words)
+    for name, symbol, equation, unit, words in (
+        ("speed", "Y", "bounds:dx", "x/s", "bound of |xdot|"),
+        ("uncertainty_rate", "s1", "theory 2", "u/s", "bound of |dh(t, x(t))/dt|"),
+        ("prediction_error", "Dxt", "bounds:tx", "x/s^0.5", "bound of |xtilde| times the root of Gamma"),
+        ("filter_error", "Deta", "bounds:teta", "u/s^0.5", "bound of the filtered error times the root of Gamma"),
+        ("theta", "Dtheta", "bounds:theta", "d^2/x", "effect of the estimation error in (26c)"),
+        ("Psi_x", "DPsix", "bounds:psi_x", "1/x", "slope of the input direction along a geodesic"),
+        ("geodesic_rate", "Dgs", "bounds:dgamma_s", "1/s", "rate of the geodesic's initial velocity"),
+        ("Psi_rate", "DPsidot", "bounds:dpsi", "1/s", "rate of the input direction"),
+        ("zeta_1", "zeta1", "conditions:zeta_1", "x^2", "effect of the filter in (26a)"),
+        ("zeta_2", "zeta2", "conditions:zeta_2", "1", "effect of the filter in (26b)"),
+        ("zeta_3", "zeta3", "conditions:zeta_3", "1", "effect of the state-dependence of h in (26b)"),
+    )
+}

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+
+DIGITS = 12
+_LEAST = 2.0**-900
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,3 +40,39 @@ class Constant:
     def gap(self) -> float:
         """Relative width (above - below)/|above|; 0 for an exact value."""
         return 0.0 if self.above == self.below else (self.above - self.below) / abs(self.above)
+
+    def printable(self) -> Constant:
+        """The same, widened to bounds of `DIGITS` digits: what is printed is what is used (see `printable_above`)."""
+        return Constant(below=printable_below(self.below), above=printable_above(self.above), at=self.at)
+
+
+def printable_above(value: Fraction | float) -> float:
+    """The least number of `DIGITS` digits >= `value` whose float is not below its decimal.
+
+    Its shortest decimal text, read exactly, is then a bound, and so is the float that is computed with.
+    """
+    return _printable(value, ROUND_CEILING)
+
+
+def printable_below(value: Fraction | float) -> float:
+    """The greatest number of `DIGITS` digits <= `value` whose float is not above its decimal."""
+    return _printable(value, ROUND_FLOOR)
+
+
+def _printable(value: Fraction | float, rounding: str) -> float:
+    if value == 0 or (isinstance(value, float) and not math.isfinite(value)):
+        return float(value)
+    if abs(value) < _LEAST:  # floats lose digits below their normal range
+        outward_of_zero = (value > 0) == (rounding == ROUND_CEILING)
+        return math.copysign(_LEAST, value) if outward_of_zero else 0.0
+    exact = Fraction(value)
+    context = Context(prec=DIGITS, rounding=rounding)
+    decimal = context.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+    step = Decimal((0, (1,), decimal.adjusted() - DIGITS + 1))
+    outward = step if rounding == ROUND_CEILING else -step
+    while True:
+        near = float(decimal)
+        binary, text = Fraction(near), Fraction(decimal)
+        if (binary >= text) if rounding == ROUND_CEILING else (binary <= text):
+            return near
+        decimal = context.add(decimal, outward)

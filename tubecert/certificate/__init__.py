@@ -1,0 +1,28 @@
+"""The certificate: what was proven as canonical JSON, sealed with a hash, written atomically.
+
+In: the values of a certification. Out: the JSON of the contract (design: `result`, `hash`, `run`). Trusted: yes.
+"""
+
+from tubecert.certificate.file import (
+    FORMAT,
+    STDOUT,
+    canonical_bytes,
+    check_target,
+    digest,
+    dump,
+    exit_code,
+    seal,
+    write,
+)
+
+__all__ = [
+    "FORMAT",
+    "STDOUT",
+    "canonical_bytes",
+    "check_target",
+    "digest",
+    "dump",
+    "exit_code",
+    "seal",
+    "write",
+]

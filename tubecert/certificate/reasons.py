@@ -1,0 +1,87 @@
+"""Why a verdict is what it is, in words: what binds, by how much, what would relax it.
+
+In: the results of the three searches and their elasticities. Out: the `reasons` of a certificate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tubecert.bounds.constants import TABLE
+from tubecert.conditions.verdict import Shortfall, Verdict
+from tubecert.search.results import Conditions26, DistanceResult, SampledResult
+
+Reason = dict[str, Any]
+
+_EXPLAINED = {
+    "26a": "(26a): the initial error and the filter's share must fit into rho_r",
+    "26b": "(26b): the metric's lower bound must exceed zeta_2 + zeta_3",
+    "26c": "(26c): the adaptation rate must make up for the estimation error",
+    "dbar <= d0": "the initial distance d0 must be below dbar = sqrt(a) rho",
+    "dbar <= delta/lambda": "the plan's defect alone must keep the distance below dbar",
+    "distance": "the distance bound sup D(t) must stay below dbar",
+    "sampled": "the distance bound with sampled adaptation must stay below dbar",
+    "as-printed": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
+}
+
+_GIVEN = {"lower", "upper", "B", "B_pinv"}  # the metric's scale and the actuators: nobody can relax these alone
+
+
+def reasons_26(result: Conditions26, elasticities: Mapping[str, float]) -> list[Reason]:
+    """Reasons of certificate A."""
+    if result.verdict is not Verdict.CERTIFIED or result.pair is None:
+        return _short("conditions_26", result.verdict, result.shortfalls)
+    margins = ", ".join(f"{claim} {float(margin.lo):.2g}" for claim, margin in result.pair.margins.items())
+    binds = {"26a": "(26a)", "26b": "(26b)"}.get(result.binds or "", result.binds)
+    message = f"{binds} sets the bandwidth; proven margins: {margins}"
+    if result.below_twice_rate:
+        message += "; the bandwidth lies below twice the rate"
+    if result.binds == "26b":
+        message += "; where (26b) binds the rate grows without bound, so 1 % of it is left"
+    return [_certified("conditions_26", message, elasticities)]
+
+
+def reasons_distance(result: DistanceResult, elasticities: Mapping[str, float]) -> list[Reason]:
+    """Reasons of certificate B."""
+    pair = result.decisive
+    if result.verdict is not Verdict.CERTIFIED or pair is None:
+        return _short("distance", result.verdict, result.shortfalls)
+    return [_certified("distance", f"proven margin {float(pair.margin.lo):.2g} of dbar", elasticities)]
+
+
+def reasons_sampled(result: SampledResult) -> list[Reason]:
+    """Reasons of certificate C."""
+    if result.verdict is not Verdict.CERTIFIED or result.pair is None:
+        return _short("sampled", result.verdict, result.shortfalls)
+    return [_certified("sampled", f"proven margin {float(result.pair.margin.lo):.2g} of dbar", {})]
+
+
+def _certified(claim: str, message: str, elasticities: Mapping[str, float]) -> Reason:
+    reason: Reason = {"claim": claim, "verdict": str(Verdict.CERTIFIED), "message": message}
+    # what can be relaxed is what the user chooses or models, largest effect first
+    named = [item for item in elasticities.items() if item[0] not in _GIVEN]
+    largest = sorted(named, key=lambda item: (-abs(item[1]), item[0]))[:2]
+    if largest:
+        parts = [
+            f"{abs(100 * (1 - 0.9**slope)):.0f} % per 10 % {'less' if slope > 0 else 'more'} of {TABLE[name].symbol} "
+            f"({TABLE[name].words})"
+            for name, slope in largest
+        ]
+        reason["relax"] = "the least Gamma would fall by about " + ", by about ".join(parts)
+    return reason
+
+
+def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...]) -> list[Reason]:
+    reasons = []
+    for item in shortfalls:
+        message = _EXPLAINED.get(item.claim, item.claim)
+        if item.allowed is not None and item.needed is not None:
+            message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
+        else:
+            low, high = float(item.margin.lo), float(item.margin.hi)
+            message += f": its margin lies in [{low:.3g}, {high:.3g}]"
+        reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})
+    return reasons or [
+        {"claim": claim, "verdict": str(verdict), "message": "no gains were found that can be proven to serve"}
+    ]

@@ -1,0 +1,127 @@
+"""Values as the JSON of a certificate: constants, metric, declared bounds, assumptions.
+
+Numbers are written so that a reader of exact decimals reads a bound: see `enclosure.constant`.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+from tubecert.bounds.constants import Constant, Meaning, Witness
+from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.metric.verify import MetricProof
+from tubecert.model import ControlAffineModel
+from tubecert.spec import Spec, canonical
+
+Result = dict[str, Any]
+
+
+def declared_metric(spec: Spec) -> tuple[Constant, Constant] | None:
+    """The declared (a, A), if both are declared."""
+    metric = spec.metric
+    if metric is None or metric.lower is None or metric.upper is None:
+        return None
+    return _exactly(metric.lower), _exactly(metric.upper)
+
+
+def declared_uncertainty(spec: Spec) -> dict[str, Constant]:
+    bounds = spec.uncertainty.bounds
+    if bounds is None:
+        return {}
+    values = {"h": bounds.h, "h_x": bounds.h_x, "h_t": bounds.h_t}
+    return {name: _exactly(value) for name, value in values.items() if value is not None}
+
+
+def _exactly(value: Fraction) -> Constant:
+    return Constant(below=printable_below(value), above=printable_above(value))
+
+
+def declared_data(spec: Spec) -> Result:
+    """What is believed, not proven: bounds of an h that is not given as expressions."""
+    if spec.uncertainty.h is not None or spec.uncertainty.bounds is None:
+        return {}
+    return {name: constant.above for name, constant in declared_uncertainty(spec).items()}
+
+
+def metric_data(spec: Spec, proof: MetricProof) -> Result:
+    metric = spec.metric
+    assert metric is not None
+    data: Result = {
+        "rate": decimal_data(metric.rate),
+        "dual_metric": canonical(spec)["metric"]["dual_metric"],
+        "verdict": proof.verdict,
+    }
+    for name in ("margin", "largest_rate", "lower_on_set", "upper_on_set"):
+        if (value := getattr(proof, name)) is not None:
+            data[name] = pair_data(value.printable())
+    return data
+
+
+def constant_data(value: Constant, meaning: Meaning) -> Result:
+    data: Result = {
+        "below": _number(value.below),
+        "above": _number(value.above),
+        "symbol": meaning.symbol,
+        "equation": meaning.equation,
+        "unit": meaning.unit,
+        "meaning": meaning.words,
+    }
+    if value.at is not None:
+        data["at"] = witness_data(value.at)
+    return data
+
+
+def witness_data(at: Witness) -> Result:
+    return {**({} if at.t is None else {"t": at.t}), "x": list(at.x)}
+
+
+def pair_data(value: Constant) -> list[float | None]:
+    return [_number(value.below), _number(value.above)]
+
+
+def _number(value: float) -> float | None:
+    """A bound for JSON: null where there is none."""
+    return value if math.isfinite(value) else None
+
+
+def decimal_data(value: Fraction | None) -> float | str | None:
+    """An exact number: a JSON number where one of at most 15 digits is exact, else a text `p/q`."""
+    if value is None:
+        return None
+    near = float(value)
+    return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
+
+
+def floor_text(value: float) -> str:
+    digits = 6
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
+    return f"{math.floor(value / step) * step:.{digits}g}"
+
+
+def ceiling_text(value: float) -> str:
+    return floor_text(-value).lstrip("-")
+
+
+def assumptions(spec: Spec, model: ControlAffineModel) -> list[str]:
+    """Everything that is not proven here (theory, section 5)."""
+    flat = all(e.is_constant for row in model.W for e in row)
+    smooth = spec.adaptation.smooth
+    horizon = spec.trajectory.horizon
+    return [
+        "the controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
+        "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
+        "minimising geodesics are straight lines, which the constant metric makes unique"
+        if flat
+        else "the controller finds the minimising geodesic exactly, and it is unique in the tube (not proven here)",
+        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
+        "the projection is hard" if smooth is None else f"the projection is smooth with layer {float(smooth):g}",
+        "the full state is measured without noise or delay, and inputs do not saturate",
+        "the filter is first order, C(s) = omega/(s + omega)",
+        f"the claim is for 0 <= t <= {float(horizon):g} s" if horizon is not None else "the claim is for all t >= 0",
+        "the uncertainty obeys its declared bounds on the tube"
+        if spec.uncertainty.h is None
+        else "the uncertainty is the expression of the specification"
+        + (", or any other within the declared bounds" if spec.uncertainty.bounds else ""),
+    ]
