@@ -461,3 +461,57 @@ def test_elasticities_are_the_slopes_of_the_search():
         assert slopes[name] == pytest.approx(float(np.log(ratio[0]) / np.log(1.001)), rel=0.02)
     assert set(slopes) <= set(ALIVE)
     assert elasticities_26(problem, search_26(problem))["B_pinv"] == pytest.approx(2.0, abs=0.2)
+
+
+# --- anything in, a verdict out
+
+
+def random_problem(rng: np.random.Generator) -> TubeProblem:
+    """Constants over orders of magnitude, some of them 0 or without a bound, any option."""
+    spread = rng.choice([0.3, 2.0, 6.0])
+    keep = {"lower", "upper", "B", "B_pinv", "metric_input_gain", "input_gain_least"}
+    values = {
+        name: float(x * np.exp(rng.normal() * spread)) * float(name in keep or rng.random() > 0.08)
+        for name, x in ALIVE.items()
+    }
+    values["upper"] = max(values["upper"], values["lower"])
+    values["h_initial"] = min(values["h_initial"], values["h"])
+    if rng.random() < 0.1:
+        values[rng.choice(["feedback_gain", "M_x", "h_x", "h", "f"])] = float("inf")
+    rate, epsilon, rho_a, horizon = (Fraction(float(x)) for x in np.exp(rng.normal(size=4) * spread))
+    general = ((Fraction(-3), Fraction(1)), (Fraction(0), Fraction(-2)))
+    return alive(
+        values=values,
+        rate=rate,
+        epsilon=epsilon,
+        rho_a=rho_a,
+        rho_r=epsilon,
+        rho=epsilon + rho_a,
+        A_m=[None, scalar_predictor("3.5", 2), general][rng.integers(3)],
+        horizon=[None, horizon][rng.integers(2)],
+        smooth=[None, Fraction(1, 10)][rng.integers(2)],
+        kernel=[None, Kernel.PAPER][rng.integers(2)],
+        formulas=[Formulas.CORRECTED, Formulas.AS_PRINTED][int(rng.random() < 0.2)],
+        drift=[Drift.PLAN, Drift.SUM][rng.integers(2)],
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_problems_end_in_a_verdict_that_says_why(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(12):
+        problem = random_problem(rng)
+        wish = Fraction(float(np.exp(rng.normal() * 3)))
+        for asked in ({}, {"bandwidth": wish}):
+            for search in (search_26, search_distance, search_sampled):
+                result = search(problem, **asked)
+                json.dumps(result.to_dict(), allow_nan=False)
+                assert bool(result.shortfalls) == (result.verdict is not Verdict.CERTIFIED)
+
+
+def test_a_constant_without_a_bound_is_named():
+    problem = alive(values={"M_x": float("inf")})
+    result = search_26(problem)
+    assert result.verdict is Verdict.UNDECIDED
+    assert [item.claim for item in result.shortfalls] == ["unbounded: M_x"]
+    assert search_distance(problem).verdict is Verdict.CERTIFIED  # no M_x in B

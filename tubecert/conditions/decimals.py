@@ -6,7 +6,7 @@ representation is that decimal, so that a checker that reads JSON numbers as dec
 
 from __future__ import annotations
 
-from decimal import Decimal
+from decimal import Context, Decimal
 from fractions import Fraction
 from math import ceil, floor
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-MOST_DIGITS = 15  # every decimal of 15 significant digits survives the way through binary64
+_MOST_PLACES = 1200  # after the decimal point; enough for every binary64 number
 
 
 def exact(value: Fraction | Decimal | str | float) -> Fraction:
@@ -66,5 +66,9 @@ def printed(value: Fraction) -> float | str:
     near = float(value)
     if Fraction(repr(near)) == value:
         return near
-    digits = Decimal(value.numerator) / Decimal(value.denominator)
-    return str(digits)
+    places = 0
+    while (value * 10**places).denominator != 1:
+        places += 1
+        if places > _MOST_PLACES:
+            raise ValueError(f"{near} has no short decimal expansion")
+    return str(Decimal(int(value * 10**places)).scaleb(-places, Context(prec=_MOST_PLACES)))

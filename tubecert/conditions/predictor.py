@@ -67,12 +67,16 @@ def predictor_of_matrix(A_m: Matrix, omega: Interval) -> Predictor[Interval]:
 
 
 def predictor(A_m: Matrix | None, omega: T, g: T | None) -> Predictor[T]:
-    """The predictor of the loop: -g I, or the matrix A_m if g is None; floats are on the safe side."""
+    """The predictor of the loop: -g I, or the matrix A_m if g is None."""
     if g is not None:
         return Predictor.of_gain(g, omega)
     if A_m is None:
         raise ValueError("`auto` needs a gain")
     if isinstance(omega, Interval):
         return predictor_of_matrix(A_m, omega)
-    safe = predictor_of_matrix(A_m, Interval(omega))
-    return Predictor(norm=safe.norm.hi, shifted=safe.shifted.hi, q=safe.q.lo)
+    # the search is in floats: it proposes, the verified norms above decide
+    A = np.array([[float(x) for x in row] for row in A_m])
+    moved = A + np.asarray(omega)[..., None, None] * np.eye(len(A))
+    shifted = np.asarray(np.linalg.norm(moved, 2, axis=(-2, -1)))
+    q = np.asarray(np.linalg.eigvalsh(-(A + A.T))[0])
+    return Predictor(norm=np.asarray(np.linalg.norm(A, 2)), shifted=shifted, q=q)

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from tubecert.enclosure.interval import Interval
 
 
@@ -21,8 +23,9 @@ class Verdict(StrEnum):
 class Shortfall:
     """A claim that is not proven: its margin (relative to what is allowed), both sides where known.
 
-    `claim` is "26a", "26b", "26c", "distance", "sampled" at gains asked for; "26a", "dbar <= d0",
-    "dbar <= delta/lambda" where no gains can help; "as-printed" where the formulas themselves prove nothing.
+    `claim` is "26a", "26b", "26c", "distance", "sampled" at gains asked for; "26a", "dbar <= d0", "dbar <=
+    delta/lambda" where no gains can help; "unbounded: NAME" where a constant has no finite bound;
+    "as-printed" where the formulas themselves prove nothing; "nothing found" where the search failed.
     """
 
     claim: str
@@ -42,3 +45,13 @@ def verdict(margins: Iterable[Interval]) -> Verdict:
     if all(margin.lo > 0 for margin in values):
         return Verdict.CERTIFIED
     return Verdict.REFUTED if any(margin.hi <= 0 for margin in values) else Verdict.UNDECIDED
+
+
+UNKNOWN = Interval(-np.inf, np.inf)
+
+NOTHING_FOUND = (Shortfall(claim="nothing found", margin=UNKNOWN),)
+
+
+def unbounded(names: Iterable[str]) -> tuple[Shortfall, ...]:
+    """One reason per constant without a finite bound: nothing follows from it, either way."""
+    return tuple(Shortfall(claim=f"unbounded: {name}", margin=UNKNOWN) for name in names)

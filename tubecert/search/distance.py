@@ -18,8 +18,8 @@ from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.predictor import Predictor, predictor
-from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.verdict import Shortfall, Verdict, verdict
+from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
+from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
 from tubecert.search.results import DistancePair, DistanceResult
 from tubecert.search.scan import boundary, minimum_lanes, minimum_log, smallest
@@ -101,12 +101,13 @@ def recipes_at(
     root = np.sqrt(root)
     given = [float(g) for g in gains if g is not None]
     p = predictor(problem.A_m, omega, np.array(given) if given else None)
-    Y = np.broadcast_to(theorem_b.drift_bound(n), omega.shape)
+    e = np.zeros_like(omega)
     for _ in range(400):
-        S, e = theorem_b.uncertainty(n, Y, omega), theorem_b.filter_error(n, Y, omega, p) / root
-        raised = theorem_b.speed_needed(n, S, e)
-        settled = np.all(raised <= Y * (1 + 1e-15))
-        Y = raised
+        # Y is closed for a given e, so that only the error itself is iterated
+        Y = theorem_b.least_speed(n, omega, e)
+        raised = theorem_b.filter_error(n, Y, omega, p) / root
+        settled = np.all(raised <= e * (1 + 1e-15))
+        e = raised
         if settled:
             break
     Y = Y * (1 + inflation)
@@ -178,10 +179,14 @@ def printed_rates(
 def proven_at(problem: TubeProblem, omega: Fraction) -> DistancePair | None:
     """The pair of least Gamma at a printed bandwidth, or None if no Gamma serves there."""
     for w, Gamma, g in printed_rates(problem, [omega]):
-        for rate in (Gamma, next_up(Gamma, DIGITS), round_up(1.01 * float(Gamma), DIGITS)):
-            pair = judged(problem, w, rate, g)
-            if pair.margin.lo > 0:
-                return pair
+        # more than the least rate is needed only where rounding decides
+        for rate in (
+            Gamma,
+            next_up(Gamma, DIGITS),
+            *(round_up(x * float(Gamma), DIGITS) for x in (1.01, 2.0)),
+        ):
+            if prove(problem, [w], [rate], [g])[0].margin.lo > 0:
+                return judged(problem, w, rate, g)
     return None
 
 
@@ -189,7 +194,7 @@ def pair_from(problem: TubeProblem, omega: float, high: float = np.inf) -> Dista
     """The pair at the first printed bandwidth that is proven; more digits only if 4 overshoot `high`."""
     if not np.isfinite(omega):
         return None
-    for digits in range(DIGITS, 13):
+    for digits in (DIGITS, 5, 6, 8, 12):
         w = round_up(omega * (1 + _SLACK), digits)
         if float(w) <= high and (pair := proven_at(problem, w)) is not None:
             return pair
@@ -275,7 +280,7 @@ def search_distance(
     problem: TubeProblem, *, bandwidth: Fraction | None = None, adaptation_rate: Fraction | None = None
 ) -> DistanceResult:
     """Certificate B: proven pairs, the curve, and the verdict on the gains asked for, if any."""
-    blocked = obstacles(problem)
+    blocked = unbounded(problem.unbounded(Certificate.DISTANCE)) or obstacles(problem)
     if blocked:
         return DistanceResult(verdict=verdict(item.margin for item in blocked), shortfalls=blocked)
     n = problem.floats(problem.projection_radius)
@@ -289,7 +294,10 @@ def search_distance(
         curve=_curve(problem, low) if np.isfinite(low) else (),
     )
     if bandwidth is None and adaptation_rate is None:
-        return replace(result, verdict=Verdict.CERTIFIED) if result.decisive else result
+        found = result.decisive is not None
+        return (
+            replace(result, verdict=Verdict.CERTIFIED) if found else replace(result, shortfalls=NOTHING_FOUND)
+        )
     asked = _asked(problem, bandwidth, adaptation_rate)
     return _decided(problem, replace(result, asked=asked), bandwidth)
 
@@ -300,10 +308,9 @@ def _decided(problem: TubeProblem, result: DistanceResult, bandwidth: Fraction |
     if asked is None and bandwidth is not None:
         g = bandwidth if problem.A_m is None else problem.predictor_gain
         margin = judged(problem, bandwidth, _ENDLESS, g).margin
-        return replace(
-            result, verdict=verdict([margin]), shortfalls=(Shortfall(claim="distance", margin=margin),)
-        )
+        refuted = Verdict.REFUTED if margin.hi <= 0 else Verdict.UNDECIDED
+        return replace(result, verdict=refuted, shortfalls=(Shortfall(claim="distance", margin=margin),))
     if asked is None:
-        return result
+        return replace(result, shortfalls=NOTHING_FOUND)
     short = () if asked.margin.lo > 0 else (Shortfall(claim="distance", margin=asked.margin),)
     return replace(result, verdict=verdict([asked.margin]), shortfalls=short)

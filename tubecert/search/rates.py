@@ -19,9 +19,9 @@ from tubecert.conditions.derived import RateTerms, rate_terms, zetas
 from tubecert.conditions.distance import ultimate_radius
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.predictor import Matrix
-from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
 from tubecert.conditions.rates import Margins, RateRecipe, margins_26, margins_26_along, theta
-from tubecert.conditions.verdict import Shortfall, Verdict, verdict
+from tubecert.conditions.verdict import NOTHING_FOUND, UNKNOWN, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
 from tubecert.search.distance import prove as prove_distance
 from tubecert.search.results import Conditions26, RatePair
@@ -189,6 +189,8 @@ def _proven(problem: TubeProblem, recipe: RateRecipe | None) -> RatePair | None:
 
 def judged(problem: TubeProblem, recipe: RateRecipe) -> RatePair:
     """A pair of gains with its margins, and the ultimate radius that certificate B proves for it."""
+    if problem.unbounded(Certificate.DISTANCE):
+        return RatePair(recipe=recipe, margins=margins_26(problem, recipe))
     distance = prove_distance(problem, [recipe.bandwidth], [recipe.adaptation_rate], [recipe.predictor_gain])[
         0
     ]
@@ -198,7 +200,7 @@ def judged(problem: TubeProblem, recipe: RateRecipe) -> RatePair:
 
 def pair_from(s: RateSearch, found: Bandwidth) -> RatePair | None:
     """The pair at the first printed bandwidth that is proven; more digits only if 4 overshoot the window."""
-    for digits in range(DIGITS, 13):
+    for digits in (DIGITS, 5, 6, 8, 12):
         w = round_up(found.low * (1 + _SLACK), digits)
         if float(w) <= found.high and (pair := _proven(s.problem, recipe_at(s, w))) is not None:
             return pair
@@ -295,9 +297,15 @@ def _asked(
         # (26b) leaves nothing for any rate: judge the bandwidth alone
         recipe = recipe_at(s, bandwidth, Fraction(10) ** 100)
         margins = margins_26(s.problem, recipe) if recipe else {}
-        return replace(result, pair=None, verdict=verdict(margins.values()), shortfalls=_failing(margins))
+        refuted = any(margin.hi <= 0 for margin in margins.values())
+        return replace(
+            result,
+            pair=None,
+            verdict=Verdict.REFUTED if refuted else Verdict.UNDECIDED,
+            shortfalls=_failing(margins),
+        )
     if recipe is None:
-        return result
+        return replace(result, verdict=Verdict.UNDECIDED, shortfalls=NOTHING_FOUND)
     pair = judged(s.problem, recipe)
     return replace(
         result, pair=pair, verdict=verdict(pair.margins.values()), shortfalls=_failing(pair.margins)
@@ -315,6 +323,9 @@ def search_26(
     `states` is n, the size of A_m in the result. With the paper's own formulas the verdict is undecided,
     whatever the numbers: they prove nothing.
     """
+    endless = unbounded(problem.unbounded(Certificate.RATES))
+    if endless:
+        return Conditions26(verdict=Verdict.UNDECIDED, pair=None, A_m=problem.A_m, shortfalls=endless)
     s = RateSearch.of(problem)
     found = bandwidths(s, SHARE_LEFT)
     whole = bandwidths(s, 0.0)
@@ -333,6 +344,8 @@ def search_26(
     elif not found:
         short = _no_bandwidth(s)
         result = replace(result, shortfalls=short, verdict=verdict(item.margin for item in short))
+    elif pair is None:
+        result = replace(result, shortfalls=NOTHING_FOUND)
     return _finished(problem, result)
 
 
@@ -346,6 +359,6 @@ def _finished(problem: TubeProblem, result: Conditions26) -> Conditions26:
             below_twice_rate=recipe.bandwidth < 2 * problem.rate,
         )
     if problem.as_printed:
-        proviso = Shortfall(claim="as-printed", margin=Interval(-np.inf, np.inf))
+        proviso = Shortfall(claim="as-printed", margin=UNKNOWN)
         result = replace(result, verdict=Verdict.UNDECIDED, shortfalls=(proviso, *result.shortfalls))
     return result

@@ -16,9 +16,9 @@ from tubecert.conditions import sampled as theorem_c
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import round_down, round_up
 from tubecert.conditions.distance import reach
-from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
 from tubecert.conditions.sampled import SampledRecipe
-from tubecert.conditions.verdict import Shortfall, Verdict, verdict
+from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
 from tubecert.search.distance import obstacles
 from tubecert.search.results import SampledPair, SampledResult
@@ -131,7 +131,7 @@ def search_sampled(
     problem: TubeProblem, *, bandwidth: Fraction | None = None, sample_time: Fraction | None = None
 ) -> SampledResult:
     """Certificate C: the largest proven sample time (at a bandwidth asked for), or the verdict on one."""
-    blocked = obstacles(problem)
+    blocked = unbounded(problem.unbounded(Certificate.SAMPLED)) or obstacles(problem)
     if blocked:
         return SampledResult(verdict=verdict(item.margin for item in blocked), shortfalls=blocked)
     n = problem.floats(problem.clipping_radius)
@@ -145,9 +145,10 @@ def search_sampled(
         short = round_down(_SHORTEST / float(problem.rate), DIGITS)
         asked = judged(problem, short, bandwidth, problem.predictor_gain or bandwidth)
         missing = (Shortfall(claim="sampled", margin=asked.margin),)
-        return SampledResult(verdict=verdict([asked.margin]), shortfalls=missing)
+        refuted = Verdict.REFUTED if asked.margin.hi <= 0 else Verdict.UNDECIDED
+        return SampledResult(verdict=refuted, shortfalls=missing)
     if pair is None:
-        return SampledResult(verdict=Verdict.UNDECIDED)
+        return SampledResult(verdict=Verdict.UNDECIDED, shortfalls=NOTHING_FOUND)
     return _decided(pair, n, problem)
 
 
