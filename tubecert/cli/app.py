@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from tubecert.cli.guard import flush_stdout, guarded
+from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
 from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
 
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
@@ -215,5 +215,6 @@ def main() -> None:
     try:
         app(prog_name="tubecert")
     except SystemExit as end:
-        code = flush_stdout()
-        sys.exit(code or end.code)
+        sys.exit(flush_stdout() or end.code)
+    except OSError as error:  # from --help, which writes by itself
+        sys.exit(stdout_failed(error))

@@ -64,22 +64,32 @@ def write_stdout(text: str) -> None:
         _drop_stdout()
         from tubecert.findings import Finding
 
-        reason = (error.strerror or str(error)).lower()
-        raise TargetError([Finding(code="TC120", message=f"cannot write to stdout: {reason}")]) from None
+        raise TargetError(
+            [Finding(code="TC120", message=f"cannot write to stdout: {_reason(error)}")]
+        ) from None
 
 
 def flush_stdout() -> int:
-    """What is left in the buffer of stdout, written quietly; the exit code that this leads to, 0 if none."""
+    """Writes what is left in the buffer of stdout; the exit code that a failure leads to, else 0."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
-    except BrokenPipeError:
-        _drop_stdout()
     except OSError as error:
-        _drop_stdout()
-        _tell(f"error TC120: cannot write to stdout: {(error.strerror or str(error)).lower()}")
-        return ExitCode.INVALID
+        return stdout_failed(error)
     return 0
+
+
+def stdout_failed(error: OSError) -> int:
+    """Tells why stdout takes nothing more (not if its reader has gone); the exit code."""
+    _drop_stdout()
+    if isinstance(error, BrokenPipeError):
+        return 0
+    _tell(f"error TC120: cannot write to stdout: {_reason(error)}")
+    return ExitCode.INVALID
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 def _drop_stdout() -> None:
