@@ -37,7 +37,7 @@ from tubecert.conditions.rates import derived_constants
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.domain import Range
-from tubecert.enclosure.interval import Interval, sqrt
+from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
 from tubecert.metric.verify import MetricProof, verify_metric
@@ -208,7 +208,7 @@ class _Certification:
             )
         return True
 
-    def _suprema(self, rho: float) -> Suprema:
+    def _suprema(self) -> Suprema:
         report = None
         if self.progress is not None:
             show = self.progress
@@ -216,13 +216,13 @@ class _Certification:
             def report(name: str, boxes: int, below: float, above: float) -> None:
                 show(Step(name=name, boxes=boxes, below=below, above=above))
 
-        return Suprema(self.model, self.plan, rho, self.time, self.effort, report)
+        return Suprema(self.model, self.plan, 0.0, self.time, self.effort, report)
 
     def _radius(self) -> Radius | None:
         tube = self.spec.tube
         assert tube.epsilon is not None
         assert tube.rho_a is not None
-        suprema = self._suprema(1.0)
+        suprema = self._suprema()
         declared = declared_metric(self.spec)
         width = tube.epsilon + tube.rho_a
         radius = least_radius(
@@ -231,12 +231,12 @@ class _Certification:
         contained = radius.contained
         if contained.verdict == "certified":
             return radius
-        self.result["tube"] = {"epsilon": decimal_data(tube.epsilon), "rho_a": decimal_data(tube.rho_a), "rho": radius.rho}
+        self.result["tube"] = {"epsilon": decimal_data(tube.epsilon), "rho_a": decimal_data(tube.rho_a), "rho": decimal_data(radius.rho)}
         lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
         self._stop(
             "assumption 1: the tube lies in the safe set",
             contained.verdict,
-            f"the tube of radius {radius.rho:.6g} {lies} the safe set through the {contained.side} bound of "
+            f"the tube of radius {float(radius.rho):.6g} {lies} the safe set through the {contained.side} bound of "
             f"{contained.state}, at t = {contained.t:.6g}, by {contained.excess:.3g}",
             Witness(t=contained.t, x=contained.x),
             "reduce epsilon, rho_a or the initial error, or enlarge the safe set",
@@ -246,7 +246,7 @@ class _Certification:
     def _conditions(self, radius: Radius) -> None:
         assert radius.lower is not None
         assert radius.upper is not None
-        suprema = self._suprema(radius.rho)
+        suprema = self._suprema().with_radius(radius.rho)
         declared = declared_uncertainty(self.spec)
         constants = bound_constants(suprema, self.spec.x0, (radius.lower, radius.upper), declared)
         self.result["metric"] |= {"lower": pair_data(constants.lower), "upper": pair_data(constants.upper)}
@@ -289,7 +289,7 @@ class _Certification:
         tube, adaptation = self.spec.tube, self.spec.adaptation
         assert tube.epsilon is not None
         assert tube.rho_a is not None
-        rho = Fraction(repr(radius.rho))
+        rho = radius.rho
         printed = self.options.formulas == "as-printed"
         return TubeProblem(
             constants=constants,
@@ -314,17 +314,17 @@ class _Certification:
         tube = self.spec.tube
         assert tube.rho_a is not None
         assert radius.lower is not None
-        rho = Fraction(repr(radius.rho))
-        reach = sqrt(Interval(radius.lower.below)) * Interval(radius.rho)  # certified: d < dbar
+        rho = radius.rho
+        reach = sqrt(Interval(radius.lower.below)) * Interval.of(radius.rho)  # certified: d < dbar
         widths = {
-            name: printable_above(min(float((Interval(width.above) * reach).hi), radius.rho))
+            name: printable_above(min(float((Interval(width.above) * reach).hi), fraction_bounds(rho)[1]))
             for name, width in zip(self.spec.states, suprema.half_widths(), strict=True)
         }
         self.result["tube"] = {
             "epsilon": decimal_data(tube.epsilon),
             "rho_a": decimal_data(tube.rho_a),
             "rho_r": decimal_data(rho - tube.rho_a),
-            "rho": radius.rho,
+            "rho": decimal_data(radius.rho),
             "half_widths": widths,
         }
 

@@ -151,10 +151,13 @@ class Containment:
 
 
 def containment(
-    plan: Plan, rho: float, states: tuple[str, ...], safe_set: tuple[tuple[Fraction, Fraction], ...], effort: Effort
+    plan: Plan,
+    radius: Fraction,
+    states: tuple[str, ...],
+    safe_set: tuple[tuple[Fraction, Fraction], ...],
+    effort: Effort,
 ) -> Containment:
     """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
-    radius = Fraction(rho)
     undecided: Containment | None = None
     worst: Containment | None = None
     for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
@@ -171,7 +174,7 @@ def containment(
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))
             place = here.mid[0].copy()
-            place[i] += sign * rho
+            place[i] += sign * float(radius)
             case = Containment(
                 verdict="refuted" if low + radius > limit else "undecided",
                 state=name,

@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.suprema import Suprema
-from tubecert.enclosure.constant import printable_above
+from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.model import TIME
 from tubecert.tube import Containment, containment
 
 Box = tuple[tuple[Fraction, Fraction], ...]
 _ROUNDS = 60
+_CLOSE = 1 + Fraction(1, 10**4)
+_INFLATION = 1 + Fraction(1, 10**6)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Radius:
-    """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a; as a decimal it is not above the float over which constants are taken.
+    """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, an exact decimal.
 
     `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused.
     """
 
-    rho: float
+    rho: Fraction
     lower: Constant | None
     upper: Constant | None
     contained: Containment
@@ -39,26 +41,28 @@ def least_radius(
     With declared a and A (proven on the safe set) there is nothing to iterate.
     """
 
-    def needed(a: Constant, A: Constant) -> float:
+    def needed(a: Constant, A: Constant) -> Fraction:
+        if not offset.hi > 0:
+            return width
         overshoot = sqrt(Interval(A.above) / Interval(a.below))
-        return printable_above(float((overshoot * offset + Interval.of(width)).hi))
+        return decimal_above(Fraction(float((overshoot * offset).hi)) + width)
 
-    def check(rho: float) -> Containment:
+    def check(rho: Fraction) -> Containment:
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
     if declared is not None:
         rho = needed(*declared)
         return Radius(rho=rho, lower=declared[0], upper=declared[1], contained=check(rho))
-    rho = printable_above(float((offset + Interval.of(width)).hi))
+    rho = decimal_above(Fraction(float(offset.hi)) + width)
     for _ in range(_ROUNDS):
         contained = check(rho)
         if contained.verdict != "certified":
             return Radius(rho=rho, lower=None, upper=None, contained=contained)
-        a, A = replace(suprema, rho=rho).metric_bounds()
+        a, A = suprema.with_radius(rho).metric_bounds()
         right = needed(a, A)
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
-        rho = printable_above(right * (1 + 1e-6)) if right < rho * (1 + 1e-4) else right
+        rho = decimal_above(right * _INFLATION) if right < rho * _CLOSE else right
     raise ValueError("the radius did not settle")
 
 

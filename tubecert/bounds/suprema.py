@@ -15,7 +15,7 @@ from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import ClosedFormGain
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.domain import BoxDomain, Range
-from tubecert.enclosure.interval import Array, Interval, sqrt
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, Pencil, SumOfNorms, SumOfPencils
 from tubecert.enclosure.taylor import MatrixFunction
@@ -26,6 +26,7 @@ from tubecert.expression import (
     constant,
     derivatives,
     free_symbols,
+    is_zero,
     rebuild,
     substitute,
     symbol,
@@ -54,6 +55,10 @@ class Suprema:
     time: Range | None
     effort: Effort
     report: Report | None = None
+
+    def with_radius(self, rho: Fraction) -> Suprema:
+        """The same over another tube."""
+        return replace(self, rho=fraction_bounds(rho)[1])
 
     # -- metric ------------------------------------------------------------------------------------------------
 
@@ -158,15 +163,20 @@ class Suprema:
         )
 
     def plan_defect(self) -> tuple[Constant, Constant]:
-        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
-        p = self.plan.defect(self.model)
+        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*.
+
+        They matter against rate times rho: what is a millionth of that is not refined further.
+        """
+        p = column([ZERO if is_zero(row[0]) is True else row[0] for row in self.plan.defect(self.model)])
         if all(row[0] is ZERO for row in p):
             return Constant.exactly(0.0), Constant.exactly(0.0)
-        scaled = Pencil(multiply(p, transpose(p)), [self.plan.on(self.model, self.model.W)])
-        return (
-            self._on_plan("plan_defect", SumOfNorms([p])),
-            self._root(self._search_plan("plan_defect_metric", scaled)),
-        )
+        small = 1e-6 * float(self.model.rate) * self.rho
+        W = self.plan.on(self.model, self.model.W)
+        stretch = self._search_plan("plan_defect_metric", Pencil(identity(len(p)), [W]))
+        delta_p = self._search_plan("plan_defect", SumOfNorms([p]), replace(self.effort, absolute=small))
+        rough = replace(self.effort, absolute=small**2 * stretch.above)
+        delta = self._search_plan("plan_defect_metric", Pencil(multiply(p, transpose(p)), [W]), rough)
+        return self._constant(delta_p), self._root(delta)
 
     def initial_distance(self, x0: tuple[Fraction, ...]) -> Constant:
         """d0: the length of the straight segment from x*(0) to x0, an upper bound of their Riemannian distance.
@@ -226,8 +236,8 @@ class Suprema:
         )
         return self._run(name, objective, tube, effort or self.effort)
 
-    def _search_plan(self, name: str, objective: Objective) -> Supremum:
-        return self._run(name, objective, BoxDomain(self.plan.time), self.effort)
+    def _search_plan(self, name: str, objective: Objective, effort: Effort | None = None) -> Supremum:
+        return self._run(name, objective, BoxDomain(self.plan.time), effort or self.effort)
 
     def _on_plan(self, name: str, objective: SumOfNorms) -> Constant:
         return Constant.exactly(0.0) if objective.is_zero else self._constant(self._search_plan(name, objective))

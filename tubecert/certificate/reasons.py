@@ -78,7 +78,7 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...]) -> l
         message = _EXPLAINED.get(item.claim, item.claim)
         if item.allowed is not None and item.needed is not None:
             message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
-        else:
+        elif item.claim != "as-printed":
             low, high = float(item.margin.lo), float(item.margin.hi)
             message += f": its margin lies in [{low:.3g}, {high:.3g}]"
         reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})

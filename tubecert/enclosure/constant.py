@@ -59,6 +59,14 @@ def printable_below(value: Fraction | float) -> float:
     return _printable(value, ROUND_FLOOR)
 
 
+def decimal_above(value: Fraction) -> Fraction:
+    """The least decimal of `DIGITS` digits >= value."""
+    quotient = Context(prec=DIGITS, rounding=ROUND_CEILING).divide(
+        Decimal(value.numerator), Decimal(value.denominator)
+    )
+    return Fraction(quotient)
+
+
 def _printable(value: Fraction | float, rounding: str) -> float:
     if value == 0 or (isinstance(value, float) and not math.isfinite(value)):
         return float(value)
