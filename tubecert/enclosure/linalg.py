@@ -16,6 +16,7 @@ from tubecert.enclosure.interval import Array, Interval
 
 _UNIT: Final = 2.0**-53
 _TINY: Final = 1e-300  # covers underflow in products
+_LOST: Final = 1e-320  # covers underflow of a rounding error that is scaled afterwards
 _ROOT_TINY: Final = 1e-150  # covers underflow below a square root
 
 
@@ -48,7 +49,9 @@ def congruence(t: Array, mid: Array, rad: Array) -> tuple[Array, Array]:
     abs_t = np.abs(t)
     tt, abs_tt = np.swapaxes(t, -1, -2), np.swapaxes(abs_t, -1, -2)
     error = _gamma(2 * t.shape[-1]) * np.abs(mid) + rad * (1 + _gamma(2 * t.shape[-1]))
-    return t @ mid @ tt, abs_t @ error @ abs_tt * (1 + _gamma(2 * t.shape[-1])) + _TINY
+    # a product that underflows in the first factor is multiplied by entries of the second: rows of T count
+    lost = _TINY * (1 + abs_t.sum(axis=-1)[..., None, :])
+    return t @ mid @ tt, abs_t @ (error + _LOST) @ abs_tt * (1 + _gamma(2 * t.shape[-1])) + lost
 
 
 def product(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -88,7 +91,10 @@ def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
     delta = _departure(v)
     radius = (delta[..., None] * np.abs(d) + error[..., None]) * (1 + _gamma(4))
     radius = np.where((bad | ~(delta < 1))[..., None], np.inf, radius)
-    return Interval(np.nextafter(d - radius, -np.inf), np.nextafter(d + radius, np.inf))
+    # the k-th eigenvalue belongs to the k-th smallest d, in whatever order they were given
+    order = np.argsort(d, axis=-1)
+    d, radius = np.take_along_axis(d, order, axis=-1), np.take_along_axis(radius, order, axis=-1)
+    return Interval(np.nextafter(d - radius, -np.inf), np.nextafter(d + radius, np.inf)).sanitised()
 
 
 def eigenvalues(s: Interval) -> Interval:
@@ -111,10 +117,11 @@ def spectral_norm_midrad(mid: Array, rad: Array) -> Interval:
         residual = safe - (u * s[..., None, :]) @ vt
         error = _frobenius(residual) + _product_error(u, s, v, safe) + norm_bound(np.where(bad[..., None, None], 0.0, rad))
         delta = np.maximum(_departure(u), _departure(v))
-        top = s[..., 0]
+        top = np.max(np.abs(s), axis=-1)  # whatever the order and the signs given
         radius = (top * delta + error) * (1 + _gamma(4))
         bad = bad | ~(delta < 1)
         lo, hi = top - radius, top + radius
+    bad = bad | np.isnan(lo) | np.isnan(hi)
     lo = np.where(bad, 0.0, np.maximum(np.nextafter(lo, -np.inf), 0.0))
     return Interval(lo, np.where(bad, np.inf, np.nextafter(hi, np.inf)))
 
@@ -129,8 +136,9 @@ def quadratic_form(v: Array, mid: Array, rad: Array) -> Interval:
     n = v.shape[-1]
     value = np.einsum("...i,...ij,...j->...", v, mid, v)
     w = np.abs(v)
-    spread = np.einsum("...i,...ij,...j->...", w, rad * (1 + _gamma(2 * n)) + _gamma(2 * n * n) * np.abs(mid), w)
-    radius = spread * (1 + _gamma(2 * n * n)) + _TINY
+    error = rad * (1 + _gamma(2 * n)) + _gamma(2 * n * n) * np.abs(mid) + _LOST
+    spread = np.einsum("...i,...ij,...j->...", w, error, w)
+    radius = spread * (1 + _gamma(2 * n * n)) + _TINY * (1 + w.sum(axis=-1))  # underflow, as in `congruence`
     return Interval(np.nextafter(value - radius, -np.inf), np.nextafter(value + radius, np.inf))
 
 
