@@ -11,6 +11,7 @@ import pytest
 from problems import constants, scalar_predictor, three_state, two_state
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
+from tubecert.conditions.arithmetic import choose
 from tubecert.conditions.decimals import exact, next_up, printed, round_down, round_up
 from tubecert.conditions.distance import margin_distance
 from tubecert.conditions.kernels import Kernel
@@ -253,6 +254,44 @@ def test_mean_age_and_filter_share_at_high_precision():
             assert age.m.hi - age.m.lo < 1e-9 * float(m) + 1e-9 * float(T)
             assert age.w.lo <= share <= age.w.hi
             assert age.w.hi - age.w.lo < 1e-12 * float(share)
+
+
+def test_sampled_margin_against_an_independent_evaluation():
+    problem = alive()
+    r = sampled.judged(problem, Fraction("0.02"), Fraction(40), Fraction("3.5")).recipe
+    with mpmath.workdps(50):
+        v = {k: mpmath.mpf(x) for k, x in ALIVE.items()}
+        w, lam, rho, g, T = (mpmath.mpf(x) for x in ("40", "1.3", "0.9", "3.5", "0.02"))
+        dbar = mpmath.sqrt(v["lower"]) * rho
+        b = min(v["B_pinv"] * v["B_x"], v["B_pinv_x"] * v["B"]) * v["h"]
+        m = 1 / g - T / (mpmath.exp(g * T) - 1)
+        Y = mpmath.mpf(0)
+        for _ in range(200):
+            s1 = v["h_t"] + v["h_x"] * Y
+            H1 = min(v["h"], v["h_initial"] + s1 * T)
+            S_T = s1 * T / (1 - mpmath.exp(-w * T)) + m * (s1 + b * Y)
+            bound = min(2 * v["h"], max(H1, S_T))
+            Y = v["drift_on_plan"] + v["B"] * (v["feedback_gain"] * dbar + bound)
+        beta, delta = v["metric_input_gain"], v["plan_defect_metric"]
+        decay = mpmath.exp(-lam * T)
+        d1 = decay * v["initial_distance"] + (beta * H1 + delta) * (1 - decay) / lam
+        A1, C1 = (beta * S_T + delta) / lam, beta * (H1 - S_T)
+
+        def D(t):
+            K = (mpmath.exp(-lam * t) - mpmath.exp(-w * t)) / (w - lam)
+            return A1 + (d1 - A1) * mpmath.exp(-lam * t) + C1 * K
+
+        needed = max(v["initial_distance"], *(D(mpmath.mpf(i) / 2000) for i in range(20000)))
+        margin = margin_sampled(problem, r)
+        assert margin.lo <= 1 - needed / dbar
+        assert float(margin.lo) == pytest.approx(float(1 - needed / dbar), abs=1e-5)
+
+
+def test_a_comparison_that_cannot_be_decided_yields_both_branches():
+    test = Interval(np.array([-1.0, 0.5, -2.0, np.nan]), np.array([1.0, 1.0, 0.0, np.nan]))
+    value = choose(test, Interval(np.full(4, 5.0)), Interval(np.full(4, 2.0)))
+    assert list(value.lo) == [2.0, 5.0, 2.0, 2.0]
+    assert list(value.hi) == [5.0, 5.0, 2.0, 5.0]
 
 
 # --- invariance and mutation
