@@ -542,3 +542,42 @@ def test_check_mathematics(folder, monkeypatch):
         result = run("check", SPEC)
         assert result.exit_code == code
         assert result.stdout.endswith(f"1 specification checked: {words}\n")
+
+
+# the real thing
+
+
+def test_a_real_certificate(folder):
+    first, second = run("certify", SPEC, "-o", "1.json"), run("certify", SPEC, "-o", "2.json", "-q")
+    assert (first.exit_code, second.exit_code) == (0, 0)
+    assert first.stdout.splitlines()[0] == second.stdout.splitlines()[0]
+    one, two = (json.loads((folder / name).read_text(encoding="utf-8")) for name in ("1.json", "2.json"))
+    assert one["hash"] == two["hash"] == digest(one["result"])
+    assert one["result"]["verdict"] == "certified"
+    assert f"rho = {one['result']['tube']['rho']:.4g}"[:9] in first.stdout
+
+
+def test_a_real_refusal(folder):
+    file = folder / "fast.yaml"
+    file.write_text(replaced("rate: 0.9999", "rate: 1"), encoding="utf-8")
+    result = run("certify", file)
+    assert result.exit_code == 1
+    assert result.stdout.startswith("refuted three_state: metric, C2: ")
+    assert "the largest rate that this metric supports is 0.9999" in result.stdout
+    reason = json.loads((folder / "fast.certificate.json").read_text(encoding="utf-8"))["result"]["reasons"][
+        0
+    ]
+    assert reason["verdict"] == "refuted"
+    assert len(reason["at"]["x"]) == 3
+
+
+def test_printed_formulas_prove_nothing(folder):
+    result = run("certify", SPEC, "--formulas", "as-printed", "-q")
+    assert result.exit_code == 4
+    assert result.stdout.startswith("undecided three_state: ")
+
+
+def test_a_budget_that_runs_out_is_undecided(folder):
+    result = run("certify", SPEC, "--budget", "10")
+    assert result.exit_code == 4
+    assert result.stdout.startswith("undecided three_state: ")

@@ -95,7 +95,7 @@ def test_a_refusal_names_claim_witness_and_remedy():
 
 def test_failing_gains_refute_no_tube():
     text = " ".join(shown(refuted_gains()).split())
-    assert text.startswith("refuted pendulum: A (26), 26a")
+    assert text.startswith("refuted pendulum: A (26a): its margin lies in")
     assert "does not prove that the state leaves the tube" in text
     assert "stays within" not in text
 

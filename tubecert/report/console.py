@@ -35,8 +35,9 @@ def verdict_line(result: Mapping[str, Any]) -> Text:
     line.append(verdict, style=STYLES[verdict])
     line.append(f" {name(result)}: ", style="bold")
     if verdict == "certified":
+        chosen = deciding(result)
         numbers = [f"rho = {up(result['tube']['rho'])}"]
-        numbers += [gains.text() for gains in deciding(result)]
+        numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))
     else:
         line.append(_because(result))
@@ -51,9 +52,8 @@ def name(result: Mapping[str, Any]) -> str:
 def _because(result: Mapping[str, Any]) -> str:
     """The reason that decided: the first with the verdict's own word."""
     reasons = [item for item in result["reasons"] if item.get("verdict") == result["verdict"]]
-    reason = (reasons or result["reasons"] or [{"message": "no reason was recorded"}])[0]
-    claim = f"{sections.claim(reason)}: " if reason.get("claim") else ""
-    return " ".join(f"{claim}{reason['message']}".split())
+    reason = (reasons or result["reasons"])[0]
+    return f"{sections.claim(reason)}: {sections.message(reason)}"
 
 
 def meaning(result: Mapping[str, Any]) -> Text:

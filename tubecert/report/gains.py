@@ -29,14 +29,14 @@ class Gains:
     margin: float | None = None
     tightest: str = ""
 
-    def text(self) -> str:
-        """The gains for the verdict line."""
+    def text(self, *, titled: bool = False) -> str:
+        """The gains for the verdict line, with their certificate's name if there are several."""
         parts = [f"omega = {exact(self.bandwidth)} rad/s"]
         if self.adaptation_rate is not None:
             parts.append(f"Gamma = {exact(self.adaptation_rate)}")
         if self.sample_time is not None:
             parts.append(f"Ts = {exact(self.sample_time)} s")
-        return ", ".join(parts)
+        return (f"{NAMES[self.section]} " if titled else "") + ", ".join(parts)
 
     def words(self) -> str:
         """The gains in a sentence."""

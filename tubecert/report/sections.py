@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
+from rich.console import Group
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from tubecert.report.gains import NAMES, rows
-from tubecert.report.numbers import UNKNOWN, down, exact, percent, short, up
+from tubecert.report.numbers import UNKNOWN, down, exact, short, up
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -46,25 +48,31 @@ def span(result: Mapping[str, Any]) -> str:
 # -- why not
 
 
-def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Text:
+def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Group:
     verdict = reason.get("verdict", "undecided")
-    text = Text()
-    text.append(f"{verdict} ", style=VERDICTS[verdict])
-    text.append(claim(reason), style="bold")
-    text.append(f": {reason['message']}")
+    text = Text.assemble((f"{verdict} ", VERDICTS[verdict]), (claim(reason), "bold"), f": {message(reason)}")
+    more = []
     if at := reason.get("at"):
-        text.append(f"\n  at {point(result, at)}")
+        more.append(Text(f"at {point(result, at)}"))
     if relax := reason.get("relax"):
-        text.append("\n  help: ", style="green")
-        text.append(relax)
-    return text
+        more.append(Text.assemble(("help: ", "green"), relax))
+    return Group(text, *(Padding(line, (0, 0, 0, 2)) for line in more))
 
 
 def claim(reason: Mapping[str, Any]) -> str:
     """What a reason is about, in the words of the table of gains."""
     section, _, rest = reason["claim"].partition(": ")
-    title = NAMES.get(section, section)
-    return f"{title}, {rest}" if rest else title
+    if section not in NAMES:
+        return str(reason["claim"])
+    if section == "conditions_26" and rest.startswith("26"):
+        return f"A ({rest})"
+    return f"{NAMES[section]}, {rest}" if rest not in ("", section) else NAMES[section]
+
+
+def message(reason: Mapping[str, Any]) -> str:
+    """The message on one line, without the condition's tag where the claim names it already."""
+    tag = reason["claim"].partition(": ")[2]
+    return " ".join(str(reason["message"]).removeprefix(f"({tag}): ").split())
 
 
 def point(result: Mapping[str, Any], at: Mapping[str, Any]) -> str:
@@ -122,15 +130,12 @@ def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
     line = f"rho = {up(tube['rho'])}"
     if "rho_r" in tube:
         line += f" = {up(tube['rho_r'])} (rho_r) + {up(tube['rho_a'])} (rho_a)"
-    body: list[RenderableType] = [Text(f"{line}; epsilon = {short(tube['epsilon'])}")]
-    body += _in_the_long_run(result)
+    lines = [f"{line}; epsilon = {short(tube['epsilon'])}"]
     if widths := tube.get("half_widths"):
         units = result["spec"]["effective"]["system"].get("units", {})
-        table = _table("state", ">half-width of the tube", "unit" if units else "")
-        for name, width in widths.items():
-            table.add_row(name, up(width), units.get(name, ""))
-        body.append(table)
-    return body
+        sides = (f"{name} {up(width)} {units.get(name, '')}".rstrip() for name, width in widths.items())
+        lines.append(f"half-widths: {', '.join(sides)}")
+    return [*map(Text, lines), *_in_the_long_run(result)]
 
 
 def _in_the_long_run(result: Mapping[str, Any]) -> list[Text]:
@@ -162,16 +167,9 @@ def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[Rend
 
 
 def _constants(result: Mapping[str, Any]) -> Table:
-    table = _table("symbol", "what it is, and where", ">proven", "unit", ">gap", "equation")
+    table = _table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
     for name, item in result["constants"].items():
-        table.add_row(
-            item["symbol"],
-            _described(result, name, item),
-            _proven(item),
-            item["unit"],
-            _gap(item),
-            item["equation"],
-        )
+        table.add_row(item["symbol"], _described(result, name, item), _proven(item), item["unit"], _gap(item))
     return table
 
 
@@ -190,10 +188,11 @@ def _proven(item: Mapping[str, Any]) -> str:
 
 
 def _gap(item: Mapping[str, Any]) -> str:
+    """How far the two proven sides are apart, relative to the larger one."""
     low, high = item["below"], item["above"]
-    if low is None or high is None:
+    if low is None or high is None or low < 0 < high:
         return UNKNOWN
-    return "exact" if low == high else percent([(high - low) / abs(high or low)])
+    return "exact" if low == high else f"{up(100 * (high - low) / max(abs(low), abs(high)), 2)} %"
 
 
 # -- assumptions
@@ -206,7 +205,10 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
         f"declared, believed as given: {', '.join(f'{k} <= {exact(v)}' for k, v in declared.items())}"
     ]
     if verbose:
-        return [Text(f"- {item}") for item in [*stated, *(believed if declared else [])]]
+        table = Table.grid(padding=(0, 1, 0, 0))
+        for item in [*stated, *(believed if declared else [])]:
+            table.add_row("-", Text(item))
+        return [table]
     brief = (
         "exact continuous-time control, full state, no noise, delay or saturation; unique geodesics; filter "
         f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
@@ -214,10 +216,10 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
     return [Text(line) for line in [brief, *(believed if declared else [])]]
 
 
-def _table(*columns: str) -> Table:
-    """A table without lines; a column whose name begins with > is aligned to the right."""
+def _table(*columns: str, wrapped: int | None = None) -> Table:
+    """A table without lines; columns named >... are aligned to the right, only the one at `wrapped` wraps."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in columns:
-        right = column.startswith(">")
-        table.add_column(column.lstrip(">"), justify="right" if right else "left", overflow="fold")
+    for index, column in enumerate(columns):
+        justify: Literal["left", "right"] = "right" if column.startswith(">") else "left"
+        table.add_column(column.lstrip(">"), justify=justify, overflow="fold", no_wrap=index != wrapped)
     return table
