@@ -38,7 +38,7 @@ def intervals(draw, within=numbers):
     a, b = draw(within), draw(within)
     kind = draw(st.sampled_from(["wide", "thin", "narrow"]))
     if kind != "wide":
-        b = a if kind == "thin" else float(np.nextafter(a, np.inf))
+        b = a if kind == "thin" else float(np.nextafter(a, 0.0))
     return min(a, b), max(a, b)
 
 
