@@ -19,9 +19,10 @@ from tubecert.conditions.rates import RateRecipe, margins_26, rate_margins
 from tubecert.conditions.verdict import Verdict, verdict
 from tubecert.search.distance import least_rate, search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
-from tubecert.search.rates import search_26, windows
+from tubecert.search.rates import search_26
 from tubecert.search.results import recipe_json
 from tubecert.search.sampled import search_sampled, serves
+from tubecert.search.windows import windows
 
 THREE = scalar_predictor("1", 3)
 

@@ -16,11 +16,11 @@ from tubecert.conditions import distance as theorem_b
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
-from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.predictor import Predictor, predictor
 from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
 from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
+from tubecert.search.obstacles import obstacles
 from tubecert.search.results import DistancePair, DistanceResult
 from tubecert.search.scan import boundary, minimum_lanes, minimum_log, smallest
 
@@ -208,51 +208,6 @@ def _curve(problem: TubeProblem, low: float) -> tuple[DistancePair, ...]:
         return ()
     pairs = prove(problem, [w for w, _, _ in points], [G for _, G, _ in points], [g for _, _, g in points])
     return tuple(pair for pair in pairs if pair.margin.lo > 0)
-
-
-def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
-    return tuple(
-        item
-        for n in [(problem.proven(), problem.enclosed())]
-        for item in (
-            _obstacle("dbar <= d0", theorem_b.reach(n[0]), n[0].d0, theorem_b.reach(n[1]), n[1].d0),
-            _obstacle(
-                "dbar <= delta/lambda",
-                theorem_b.reach(n[0]),
-                _residual(n[0]),
-                theorem_b.reach(n[1]),
-                _residual(n[1]),
-            ),
-        )
-        if item is not None
-    )
-
-
-def _residual(n: Numbers[Interval]) -> Interval:
-    """What a plan defect alone leads to: delta/lambda, or what of it the horizon allows."""
-    still = DistanceBound(
-        d0=0.0 * n.d0,
-        beta=n.beta,
-        H0=0.0 * n.H0,
-        S=0.0 * n.H0,
-        e=0.0 * n.H0,
-        delta=n.delta,
-        lam=n.lam,
-        omega=2.0 * n.lam,
-        horizon=n.horizon,
-    )
-    return still.supremum()
-
-
-def _obstacle(
-    claim: str, allowed: Interval, needed: Interval, allowed_all: Interval, needed_all: Interval
-) -> Shortfall | None:
-    low = 1.0 - needed / allowed
-    if low.lo > 0:
-        return None
-    margin = Interval(low.lo, np.maximum(low.lo, (1.0 - needed_all / allowed_all).hi))
-    return Shortfall(claim=claim, margin=margin, allowed=float(allowed.lo), needed=float(needed.hi))
 
 
 def _asked(problem: TubeProblem, bandwidth: Fraction | None, rate: Fraction | None) -> DistancePair | None:

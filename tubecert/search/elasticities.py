@@ -13,8 +13,9 @@ import numpy as np
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.derived import rate_terms
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
+from tubecert.search.bandwidths import RateSearch
 from tubecert.search.distance import least_rate
-from tubecert.search.rates import RateSearch, gains_along, needed_rate
+from tubecert.search.rates import gains_along, needed_rate
 from tubecert.search.results import Conditions26, DistanceResult
 
 _STEP = 1e-4

@@ -8,21 +8,21 @@ one half-line. Implements: theory section 3, "Closed form".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
-from tubecert.conditions.derived import RateTerms, rate_terms, zetas
+from tubecert.conditions.derived import rate_terms, zetas
 from tubecert.conditions.distance import ultimate_radius
-from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.predictor import Matrix
-from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
+from tubecert.conditions.problem import Certificate, TubeProblem
 from tubecert.conditions.rates import Margins, RateRecipe, margins_26, margins_26_along, theta
 from tubecert.conditions.verdict import NOTHING_FOUND, UNKNOWN, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
+from tubecert.search.bandwidths import Bandwidth, RateSearch, bandwidths
 from tubecert.search.distance import prove as prove_distance
 from tubecert.search.results import Conditions26, RatePair
 from tubecert.search.scan import minimum_log, smallest
@@ -31,100 +31,6 @@ DIGITS = 4
 CURVE_POINTS = 25
 SHARE_LEFT = 0.01  # of (26b) that the pair leaves where (26b) binds
 _SLACK = 1e-12
-_LOWEST = 1e-3  # the least bandwidth considered, in units of the rate
-
-Window = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bandwidth:
-    """The smallest feasible bandwidth, the set it belongs to, and the condition that sets it."""
-
-    low: float
-    high: float
-    binds: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RateSearch:
-    """What every step of this search needs: the problem, its numbers in floats, the derived constants."""
-
-    problem: TubeProblem
-    n: Numbers[Array]
-    terms: RateTerms[Array]
-
-    @staticmethod
-    @quiet
-    def of(problem: TubeProblem) -> RateSearch:
-        """Floats on the safe side."""
-        n = problem.floats(problem.projection_radius)
-        return RateSearch(problem=problem, n=n, terms=rate_terms(problem, n))
-
-
-def windows(c1: float, c2: float, R: float, c: float) -> list[Window]:
-    """Where c1/|c - omega| + c2/omega <= R, ascending, for c1, c2 >= 0: closed form."""
-    if R <= 0:
-        return []
-    if c1 == 0:
-        return [(c2 / R, float("inf"))]
-    b = c * R + c1 + c2
-    ray = ((b + np.sqrt(b * b - 4 * c * R * c2)) / (2 * R), float("inf"))
-    if np.sqrt(c1) + np.sqrt(c2) > np.sqrt(c * R):
-        return [ray]
-    b = c * R + c2 - c1
-    larger = (b + np.sqrt(max(b * b - 4 * c * R * c2, 0.0))) / (2 * R)
-    return [(c * c2 / (R * larger) if larger > 0 else 0.0, larger), ray]
-
-
-def intersection(first: Sequence[Window], second: Sequence[Window]) -> list[Window]:
-    """The common part of two unions of intervals, ascending."""
-    parts = [(max(a, c), min(b, d)) for a, b in first for c, d in second]
-    return sorted((low, high) for low, high in parts if low <= high)
-
-
-def _budgets(s: RateSearch, share_left: float) -> dict[str, tuple[float, float, float]]:
-    """(c1, c2, R) of the two bandwidth conditions."""
-    n, terms = s.n, s.terms
-    slow = float(terms.s1 / (2.0 * n.lam))
-    first, second = float(terms.weight1), float(terms.weight2)
-    allowed = float(n.rho_r**2 - terms.E0 / n.a - terms.zeta_p)
-    return {
-        "26a": (first * float(n.Dh), max(first * slow, 0.0), allowed),
-        "26b": (
-            second * float(n.Dh),
-            max(second * slow + float(terms.third), 0.0),
-            float(n.a) * (1 - share_left),
-        ),
-    }
-
-
-@quiet
-def _feasible(s: RateSearch, claim: str, share_left: float) -> list[Window]:
-    """Bandwidths that satisfy one of the conditions."""
-    c1, c2, R = _budgets(s, share_left)[claim]
-    c = 2.0 * float(s.n.lam)
-    if R <= 0:
-        return []
-    if s.problem.active_kernel is Kernel.PAPER:
-        return windows(c1, c2, R, c)
-
-    def holds(omega: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        z = zetas(s.problem, s.n, s.terms, omega)
-        return (z.zeta1 if claim == "26a" else z.zeta2 + z.zeta3) <= R
-
-    floor = _LOWEST * float(s.n.lam)
-    # the kernel is at most Dh/omega + s1/(2 lambda omega), so the half-line begins below (c1 + c2)/R
-    return [(smallest(holds, floor, max((c1 + c2) / R, floor) * 1.01), float("inf"))]
-
-
-def bandwidths(s: RateSearch, share_left: float) -> list[Bandwidth]:
-    """The feasible set of (26a) and (26b), ascending; `share_left` of (26b) is kept free for Gamma."""
-    first, second = _feasible(s, "26a", share_left), _feasible(s, "26b", share_left)
-    floor = _LOWEST * float(s.n.lam)
-    common = [(max(low, floor), high) for low, high in intersection(first, second) if high >= floor]
-    # the condition whose own interval begins at the common lower end is the one that binds
-    starts = {low for low, _ in second}
-    return [Bandwidth(low=low, high=high, binds="26b" if low in starts else "26a") for low, high in common]
 
 
 @quiet

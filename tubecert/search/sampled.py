@@ -20,7 +20,7 @@ from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
 from tubecert.conditions.sampled import SampledRecipe
 from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
 from tubecert.enclosure.interval import Interval
-from tubecert.search.distance import obstacles
+from tubecert.search.obstacles import obstacles
 from tubecert.search.results import SampledPair, SampledResult
 from tubecert.search.scan import largest
 

@@ -1,0 +1,49 @@
+"""What no gains can overcome in B and C: a tube too narrow for where the plan starts or drifts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tubecert.conditions import distance as theorem_b
+from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.verdict import Shortfall
+from tubecert.enclosure.interval import Interval
+
+
+def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
+    safe, whole = problem.proven(), problem.enclosed()
+    allowed = theorem_b.reach(safe), theorem_b.reach(whole)
+    items = (
+        _obstacle("dbar <= d0", allowed, (safe.d0, whole.d0)),
+        _obstacle("dbar <= delta/lambda", allowed, (_residual(safe), _residual(whole))),
+    )
+    return tuple(item for item in items if item is not None)
+
+
+def _residual(n: Numbers[Interval]) -> Interval:
+    """What a plan defect alone leads to: delta/lambda, or what of it the horizon allows."""
+    still = DistanceBound(
+        d0=0.0 * n.d0,
+        beta=n.beta,
+        H0=0.0 * n.H0,
+        S=0.0 * n.H0,
+        e=0.0 * n.H0,
+        delta=n.delta,
+        lam=n.lam,
+        omega=2.0 * n.lam,
+        horizon=n.horizon,
+    )
+    return still.supremum()
+
+
+def _obstacle(
+    claim: str, allowed: tuple[Interval, Interval], needed: tuple[Interval, Interval]
+) -> Shortfall | None:
+    """The reason, unless allowed > needed is proven; both on the safe side first, then enclosed."""
+    low, high = (1.0 - x / y for x, y in zip(needed, allowed, strict=True))
+    if low.lo > 0:
+        return None
+    margin = Interval(low.lo, np.maximum(low.lo, high.hi))
+    return Shortfall(claim=claim, margin=margin, allowed=float(allowed[0].lo), needed=float(needed[0].hi))
