@@ -440,3 +440,13 @@ def test_table_and_helper_agree():
     assert Constant.exactly(1.0).gap == 0
     assert three_state().constants.h_x.above == 0
     assert two_state().states == 2
+
+
+def test_options_may_be_given_as_their_text():
+    named = alive(kernel="paper", drift="sum", formulas="as-printed")
+    assert named.active_kernel is Kernel.PAPER
+    assert named.as_printed
+    proper = alive(kernel=Kernel.PAPER, drift=Drift.SUM, formulas=Formulas.AS_PRINTED)
+    assert (
+        margins_26(named, recipe("60", "1e6"))["26c"].lo == margins_26(proper, recipe("60", "1e6"))["26c"].lo
+    )

@@ -39,7 +39,7 @@ def rate_terms(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
 
 def known_drift(problem: TubeProblem, n: Numbers[T]) -> T:
     """The bound of |f + B u*| over the tube that the problem asks for."""
-    return n.phi if problem.drift is Drift.PLAN else n.Df + n.DB * n.Dus
+    return n.phi if problem.drift == Drift.PLAN else n.Df + n.DB * n.Dus
 
 
 @quiet

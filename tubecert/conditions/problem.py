@@ -162,13 +162,13 @@ class TubeProblem:
     @property
     def as_printed(self) -> bool:
         """Whether the paper's own formulas are to be reproduced."""
-        return self.formulas is Formulas.AS_PRINTED
+        return self.formulas == Formulas.AS_PRINTED
 
     @property
     def active_kernel(self) -> Kernel:
         """The kernel in use: tight for corrected formulas and the paper's for printed ones, unless chosen."""
         if self.kernel is not None:
-            return self.kernel
+            return Kernel(self.kernel)
         return Kernel.PAPER if self.as_printed else Kernel.TIGHT
 
     @property
@@ -196,7 +196,7 @@ class TubeProblem:
     def unbounded(self, certificate: Certificate) -> tuple[str, ...]:
         """The constants that a certificate needs and that have no finite bound, by field name."""
         if certificate is Certificate.RATES:
-            drift = {"drift_on_plan"} if self.drift is Drift.PLAN else {"f"}
+            drift = {"drift_on_plan"} if self.drift == Drift.PLAN else {"f"}
             gain = {"input_gain_least", "contraction_excess"} if self.as_printed else {"feedback_gain"}
             names = _IN_26 | drift | gain
         else:

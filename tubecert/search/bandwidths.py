@@ -1,4 +1,4 @@
-"""Which bandwidths (26a) and (26b) admit: windows with the paper's kernel, one half-line with the tight one."""
+"""Which bandwidths (26a) and (26b) admit: windows with the paper's kernel, a half-line with the tight one."""
 
 from __future__ import annotations
 
