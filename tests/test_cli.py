@@ -18,6 +18,7 @@ from tubecert.certificate import digest
 from tubecert.cli.app import app
 from tubecert.errors import RefutedError, SpecError
 from tubecert.findings import Finding, Severity
+from tubecert.spec import canonical
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "configs" / "three_state.yaml"
@@ -206,10 +207,8 @@ def test_options_are_exact(proven):
         "1/3", "1/100", "50", "20000000",
     ]  # fmt: skip
     assert (str(options.gap), options.budget) == ("1/2", 10000)
-    run("certify", SPEC, "--conditions", "all", "--formulas", "as-printed", "--metric", "w.json")
-    options = proven["options"]
-    assert (options.conditions, options.formulas, options.metric) == ("all", "as-printed", Path("w.json"))
-    assert options == pipeline.Options(conditions="all", formulas="as-printed", metric=Path("w.json"))
+    run("certify", SPEC, "--conditions", "all", "--formulas", "as-printed")
+    assert proven["options"] == pipeline.Options(conditions="all", formulas="as-printed")
 
 
 @pytest.mark.parametrize("option", ["--rho-a", "--epsilon", "--gap", "--budget"])
@@ -331,6 +330,83 @@ def test_a_folder_is_no_specification(tmp_path):
     result = run("certify", tmp_path)
     quiet_failure(result, 2)
     assert "directory" in result.stderr or "folder" in result.stderr
+
+
+# metric files
+
+
+METRIC = {
+    "format": "tubecert-metric/1",
+    "rate": 0.25,
+    "dual_metric": [["1", "0", "0.1*x1"], ["0", "1/3", "0"], ["0.1*x1", "0", 2]],
+    "margin": 1e9,
+    "lower": "believed by nobody",
+    "solver": {"name": "any"},
+}
+
+
+def test_a_metric_file_takes_the_place_of_the_metric(folder, proven):
+    (folder / "w.json").write_text(json.dumps(METRIC, indent=1))
+    assert run("certify", SPEC, "--metric", "w.json").exit_code == 0
+    assert proven["options"].metric == Path("w.json")
+    data = canonical(proven["spec"])["metric"]
+    assert data == {
+        "rate": "0.25",
+        "dual_metric": [["1", "0", "0.1*x1"], ["0", "1/3", "0"], ["0.1*x1", "0", "2"]],
+    }
+    assert proven["spec"].metric.lower is None
+
+
+@pytest.mark.parametrize(
+    ("change", "fragment"),
+    [
+        ({"rate": -1}, "must be > 0"),
+        ({"rate": "fast"}, "unknown symbol"),
+        ({"format": "tubecert-metric/9"}, "tubecert-metric/1"),
+        ({"dual_metric": [["1"]]}, "dual_metric"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["x4", "0", "1"]]}, "unknown symbol x4"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["x1", "0", "1"]]}, "not symmetric"),
+        ({"rates": 1}, "unknown key rates"),
+    ],
+)
+def test_bad_metric_files(folder, proven, change, fragment):
+    (folder / "w.json").write_text(json.dumps(METRIC | change, indent=1))
+    result = run("certify", SPEC, "--metric", "w.json")
+    quiet_failure(result, 2)
+    assert len(LOCATED.findall(result.stderr)) == 1, result.stderr
+    assert result.stderr.startswith("w.json:")
+    assert fragment in result.stderr
+
+
+def test_metric_files_that_are_none(folder, proven):
+    (folder / "bad.json").write_text("{")
+    (folder / "empty.json").write_text("")
+    for name in ("missing.json", ".", "bad.json", "empty.json"):
+        result = run("certify", SPEC, "--metric", name)
+        quiet_failure(result, 2)
+        assert result.stderr.endswith("1 error\n")
+
+
+def test_a_metric_file_is_never_overwritten(folder, unused):
+    (folder / "w.json").write_text(json.dumps(METRIC))
+    result = run("certify", SPEC, "--metric", "w.json", "-o", "w.json")
+    quiet_failure(result, 2)
+    assert "is the metric file itself" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("change", "claim"),
+    [
+        ({"rate": 5}, "metric, C2"),
+        ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, C3"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, C1"),
+    ],
+)
+def test_a_metric_file_is_verified(folder, change, claim):
+    (folder / "w.json").write_text(json.dumps(METRIC | change))
+    result = run("certify", SPEC, "--metric", "w.json")
+    assert result.exit_code == 1
+    assert result.stdout.startswith(f"refuted three_state: {claim}: ")
 
 
 # targets
@@ -581,3 +657,36 @@ def test_a_budget_that_runs_out_is_undecided(folder):
     result = run("certify", SPEC, "--budget", "10")
     assert result.exit_code == 4
     assert result.stdout.startswith("undecided three_state: ")
+
+
+# the README
+
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_specification_of_the_readme_certifies(folder):
+    [text] = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)
+    (folder / "example.yaml").write_text(text, encoding="utf-8")
+    assert run("check", "example.yaml").exit_code == 0
+    assert run("certify", "example.yaml").exit_code == 0
+
+
+def test_the_output_of_the_readme_is_real(folder):
+    [command] = re.findall(r"tubecert (certify configs/\S+.*)", README)
+    _, spec, *options = command.split()
+    shown = README.split("```text\n")[1].split("```")[0]
+    real = run("certify", ROOT / spec, *options).stdout
+    # numbers are those of the pinned versions, so only what does not depend on them is compared
+    assert titles(shown) == titles(real)
+
+
+def titles(report):
+    return [line.split()[0] for line in report.splitlines() if line and not line.startswith(" ")]
+
+
+def test_ci_runs_what_the_readme_says():
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    for part in ('install --quiet -c constraints.txt -e ".[dev]"', "-m pytest\n"):
+        assert part in script
+        assert part.replace(" --quiet", "").strip() in README

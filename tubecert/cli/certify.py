@@ -37,8 +37,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     numbers = _numbers(given)
     place = _place(given)
     from tubecert import spec
+    from tubecert.spec.metric_file import with_metric
 
     system = spec.load(given["spec"])
+    if given["metric"] is not None:
+        system = with_metric(system, str(given["metric"]))
     from tubecert import pipeline  # numpy and the rest, once the input is known to be readable
     from tubecert.report import progress
 
