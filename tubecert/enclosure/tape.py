@@ -60,7 +60,7 @@ class Tape:
         """Float values of the outputs, shape (outputs, *shape); rounded, hence for proposals only."""
         memory: list[Array] = [np.empty(0)] * self._size
         for target, node in self._constants:
-            memory[target] = np.asarray(np.pi if node.op == "pi" else float(node.fraction))
+            memory[target] = _constant(node).lo
         for target, index in self._symbols:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
