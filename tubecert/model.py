@@ -7,23 +7,30 @@ Trusted: yes. Implements: F(x) = -d_f W + f_x W + W f_x' + 2 rate W, B^+ = (B'B)
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, reduce
+from itertools import combinations
 from math import gcd, lcm
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import PI, Interval
 from tubecert.enclosure.objective import scalar
+from tubecert.enclosure.tape import Tape
 from tubecert.expression import (
+    ZERO,
     Expression,
     constant,
     derivative,
     free_symbols,
     rebuild,
+    substitute,
     symbol,
+    to_text,
     topological,
 )
 from tubecert.expression.matrix import (
@@ -45,6 +52,7 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec, Term
 
 TIME = "t"
+_RANK_BUDGET = 20_000
 
 
 @dataclass(frozen=True)
@@ -222,49 +230,79 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
 def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort) -> list[Finding]:
     findings = []
     for duty, location in term.owed():
-        decision, needed = _prove(duty.kind, duty.argument, ranges, effort)
+        used = {v: ranges[v] for v in sorted(free_symbols([duty.argument])) if v in ranges}
+        decision = _nonzero(duty.argument, used, effort)
+        if duty.kind == "positive":
+            decision = decide(scalar(-duty.argument), BoxDomain(used), 0.0, effort)
         if decision.verdict == "proven":
             continue
+        wrong = "is zero" if duty.kind == "nonzero" else "is not positive"
+        code, message = "TC202", f"'{duty.text}' could not be proven to be defined and smooth on {where}"
+        remedy = "keep the safe set further away from the singularity"
         if decision.verdict == "refuted":
-            point = ", ".join(f"{name} = {value:.6g}" for name, value in decision.at.items()) or "every point"
-            message = f"'{duty.text}' must be {needed} on {where}, but is not at {point}"
-            findings.append(
-                Finding(
-                    code="TC201",
-                    message=message,
-                    location=location,
-                    help="shrink the safe set or rewrite the expression so that it is smooth there",
-                )
+            code = "TC201"
+            message = (
+                f"'{duty.text}' is undefined or not smooth on {where}: "
+                f"{to_text(duty.argument)} {wrong} at {place(decision.at)}"
             )
-        else:
-            findings.append(
-                Finding(
-                    code="TC202",
-                    message=f"'{duty.text}' could not be proven {needed} on {where}",
-                    location=location,
-                    help="rewrite the expression with a larger distance from the singularity",
-                )
-            )
+            remedy = "shrink the safe set, or rewrite the expression so that it is smooth there"
+        findings.append(Finding(code=code, message=message, location=location, help=remedy))
     return findings
 
 
-def _prove(kind: str, argument: Expression, ranges: dict[str, Range], effort: Effort) -> tuple[Decision, str]:
-    used = {v: ranges[v] for v in sorted(free_symbols([argument])) if v in ranges}
-    domain = BoxDomain(used)
-    if kind == "positive":
-        return decide(scalar(-argument), domain, 0.0, effort), "positive"
-    # nonzero on a connected set: of one sign everywhere
-    below = decide(scalar(-argument), domain, 0.0, effort)
-    if below.verdict == "proven":
-        return below, "nonzero"
-    above = decide(scalar(argument), domain, 0.0, effort)
-    if above.verdict == "proven" or (below.verdict == "refuted" and above.verdict == "refuted"):
-        return above, "nonzero"
-    return Decision(verdict="undecided", at={}, value=above.value, boxes=above.boxes), "nonzero"
+def place(at: dict[str, float]) -> str:
+    """A point in words."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in at.items()) or "every point"
+
+
+def _nonzero(e: Expression, ranges: dict[str, Range], effort: Effort) -> Decision:
+    """Whether e has no zero on a box: proven if it is of one sign, refuted by a point of either sign."""
+    domain = BoxDomain(ranges)
+    positive = decide(scalar(-e), domain, 0.0, effort)
+    if positive.verdict == "proven":
+        return positive
+    negative = decide(scalar(e), domain, 0.0, effort)
+    if negative.verdict == "proven":
+        return negative
+    if positive.verdict == negative.verdict == "refuted":
+        # e <= 0 at one point and e >= 0 at the other, and a box is connected
+        return replace(negative, at=_between(e, positive.at, negative.at))
+    return replace(negative, verdict="undecided")
+
+
+def _between(e: Expression, low: dict[str, float], high: dict[str, float]) -> dict[str, float]:
+    """A point near a zero of `e` on the segment between points where it is <= 0 and >= 0 (floats: only shown)."""
+    names = tuple(high)
+    tape = Tape([e], names)
+    a, b = (np.array([at[name] for name in names]) for at in (low, high))
+    for _ in range(60):
+        middle = 0.5 * a + 0.5 * b
+        value = tape.run_floats([np.array(x) for x in middle], ())[0]
+        a, b = (middle, b) if value <= 0 else (a, middle)
+    return dict(zip(names, (float(x) for x in b), strict=True))
 
 
 def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: Effort) -> Decision:
-    """Whether det(B'B) > 0 on the safe set; refuted with a point where B loses rank."""
-    gram = determinant(model.gram)
+    """Whether B has full column rank on the safe set; refuted with a point where it has not.
+
+    Proven by one m x m minor that never vanishes, or by det(B'B) > 0. Refuted by a sign change of the only minor, or by
+    an exact evaluation of det(B'B) at a rational point.
+    """
     box = dict(zip(model.states, safe_set, strict=True))
-    return decide(scalar(-gram), BoxDomain(box), 0.0, effort)
+    rows = combinations(range(len(model.states)), len(model.inputs))
+    minors = [d for d in (determinant([model.B[i] for i in chosen]) for chosen in rows) if d is not ZERO]
+    short = replace(effort, budget=min(effort.budget, _RANK_BUDGET))
+    decisions = [_nonzero(d, {v: box[v] for v in sorted(free_symbols([d]))}, short) for d in minors]
+    for decision in decisions:
+        if decision.verdict == "proven" or (decision.verdict == "refuted" and len(minors) == 1):
+            return decision
+    gram = determinant(model.gram)
+    decision = decide(scalar(-gram), BoxDomain(box), 0.0, short)
+    if decision.verdict != "undecided":
+        return decision
+    for digits in (1, 3, 6):
+        at = {name: round(value, digits) for name, value in decision.at.items()}
+        exact = {name: constant(Fraction(repr(value))) for name, value in at.items()}
+        if all(box[v][0] <= exact[v].fraction <= box[v][1] for v in exact) and substitute([gram], exact)[0] is ZERO:
+            return replace(decision, verdict="refuted", at=at)
+    return decision

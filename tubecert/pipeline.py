@@ -41,7 +41,7 @@ from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
 from tubecert.metric.verify import MetricProof, verify_metric
-from tubecert.model import ControlAffineModel, build, domain_findings, rank_decision, time_period
+from tubecert.model import ControlAffineModel, build, domain_findings, place, rank_decision, time_period
 from tubecert.search.distance import search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
 from tubecert.search.rates import search_26
@@ -93,11 +93,10 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
         return findings
     decision = rank_decision(build(spec), spec.safe_set, effort)
     if decision.verdict == "refuted":
-        point = ", ".join(f"{name} = {value:.6g}" for name, value in decision.at.items()) or "every point"
         findings.append(
             Finding(
                 code="TC203",
-                message=f"B loses rank in the safe set, at {point}",
+                message=f"B loses rank in the safe set, at {place(decision.at)}",
                 location=spec.location("system.B"),
                 help="shrink the safe set, or remove an input that does nothing there",
             )
@@ -300,6 +299,7 @@ class _Certification:
             rho=rho,
             initial_offset=suprema.initial_offset(self.spec.x0),
             horizon=self.spec.trajectory.horizon,
+            states=len(self.spec.states),
             A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
             smooth=adaptation.smooth,
             formulas=Formulas(self.options.formulas),

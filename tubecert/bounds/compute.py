@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from tubecert.bounds.constants import BoundConstants, Constant
@@ -77,14 +77,12 @@ def bound_constants(
     `metric` is (a, A) over the tube; `declared` may hold h, h_x, h_t, which then take the place of derived bounds.
     """
     model = suprema.model
+    if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
+        declared = {**declared, "h_initial": declared["h"]}
+    derived: dict[str, Constant] = {}
     if model.h is not None:
-        h, h_x, h_t = suprema.uncertainty()
-        derived = {"h": h, "h_x": h_x, "h_t": h_t, "h_initial": suprema.initial_uncertainty(x0)}
-    else:
-        derived = {"h_initial": declared["h"]}
-    uncertainty = {**derived, **declared}
-    if "h" in declared and model.h is not None:
-        uncertainty["h_initial"] = declared["h"]
+        derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
+        derived["h_initial"] = suprema.initial_uncertainty(x0)
     delta_p, delta = suprema.plan_defect()
     constants = BoundConstants(
         lower=metric[0],
@@ -98,7 +96,7 @@ def bound_constants(
         B_pinv_x=suprema.norms("B_pinv_x", model.B_pinv_x),
         M_x=suprema.metric_slope(),
         u_star=suprema.input_on_plan(),
-        **uncertainty,
+        **{**derived, **declared},
         feedback_gain=suprema.feedback_gain(),
         metric_input_gain=suprema.metric_input_gain(),
         drift_on_plan=suprema.drift_on_plan(),
@@ -108,7 +106,8 @@ def bound_constants(
         input_gain_least=suprema.input_gain_least(),
         contraction_excess=suprema.contraction_excess(),
     )
-    return constants.printable()
+    # what is declared is an exact decimal already
+    return replace(constants.printable(), **declared)
 
 
 def time_range(horizon: Fraction | None, period: Interval | None) -> tuple[Fraction | float, Fraction | float] | None:
