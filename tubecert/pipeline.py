@@ -1,6 +1,6 @@
 """Certification from a specification to a result: the rooms in their order.
 
-In: a `Spec` and `Options`. Out: the `result` object of a certificate (docs and design name its keys), for every verdict.
+In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every verdict.
 A claim that fails ends the work: what rests on it is not computed.
 """
 
@@ -32,6 +32,7 @@ from tubecert.certificate.sections import (
     pair_data,
     witness_data,
 )
+from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
 from tubecert.conditions.rates import derived_constants
 from tubecert.enclosure.branch_and_bound import Effort
@@ -40,14 +41,16 @@ from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
+from tubecert.metric.geodesic import unique_geodesics
 from tubecert.metric.verify import MetricProof, verify_metric
-from tubecert.model import ControlAffineModel, build, domain_findings, place, rank_decision, time_period
+from tubecert.model import TIME, ControlAffineModel, build, domain_findings, place, rank_decision, time_period
 from tubecert.search.distance import search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
 from tubecert.search.rates import search_26
 from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
+from tubecert.tube import Tube
 
 Result = dict[str, Any]
 _ORDER = ("refuted", "undecided", "certified")
@@ -108,7 +111,7 @@ def certify(spec: Spec, options: Options, progress: Progress | None = None) -> R
     """The result for a specification; raises `SpecError` for what makes the question meaningless."""
     spec = _overridden(spec, options)
     findings, time = _time(spec)
-    findings += _complete(spec, options)
+    findings += _complete(spec)
     if not findings:
         findings = domain_findings(spec, time, Effort(budget=options.budget))
     if any(item.severity is Severity.ERROR for item in findings):
@@ -230,7 +233,8 @@ class _Certification:
         contained = radius.contained
         if contained.verdict == "certified":
             return radius
-        self.result["tube"] = {"epsilon": decimal_data(tube.epsilon), "rho_a": decimal_data(tube.rho_a), "rho": decimal_data(radius.rho)}
+        radii = {"epsilon": tube.epsilon, "rho_a": tube.rho_a, "rho": radius.rho}
+        self.result["tube"] = {name: decimal_data(value) for name, value in radii.items()}
         lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
         self._stop(
             "assumption 1: the tube lies in the safe set",
@@ -253,6 +257,7 @@ class _Certification:
         if not (self._finite(constants) and self._declared_holds(suprema, declared)):
             return
         self._tube(suprema, radius)
+        self._geodesics(suprema)
         self._search(self._problem(suprema, radius, constants))
 
     def _finite(self, constants: BoundConstants) -> bool:
@@ -303,7 +308,7 @@ class _Certification:
             A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
             smooth=adaptation.smooth,
             formulas=Formulas(self.options.formulas),
-            kernel=self.spec.kernel,
+            kernel=None if self.spec.kernel is None else Kernel(self.spec.kernel),
             drift=Drift.SUM if printed else Drift.PLAN,
         )
 
@@ -327,6 +332,22 @@ class _Certification:
             "rho": decimal_data(radius.rho),
             "half_widths": widths,
         }
+
+    def _geodesics(self, suprema: Suprema) -> None:
+        """Whether minimising geodesics are proven unique; if not, that stays an assumption."""
+        tube = Tube(
+            self.plan,
+            suprema.rho,
+            states=self.model.states,
+            inputs=self.model.inputs,
+            time=self.plan.time.get(TIME),
+        )
+        test = unique_geodesics(self.model, tube, suprema.rho, self._effort("geodesics"))
+        self.result["metric"]["unique_geodesics"] = {
+            "value": pair_data(test.value.printable()),
+            "holds": test.holds,
+        }
+        self.result["assumptions"] = assumptions(self.spec, self.model, test)
 
     def _search(self, problem: TubeProblem) -> None:
         """Gains of A, B and C; those conditions that were chosen decide the verdict."""
@@ -352,7 +373,8 @@ class _Certification:
             "sampled": sampled.to_dict(),
             "elasticities": slopes,
         }
-        chosen = list(CONDITIONS.values()) if self.options.conditions == "all" else [CONDITIONS[self.options.conditions]]
+        every = self.options.conditions == "all"
+        chosen = list(CONDITIONS.values()) if every else [CONDITIONS[self.options.conditions]]
         self.result["decided_by"] = chosen
         self.result["reasons"] += [reason for name in chosen for reason in explained[name]]
         verdicts = {self.result[name]["verdict"] for name in chosen}
@@ -395,9 +417,8 @@ def _overridden(spec: Spec, options: Options) -> Spec:
     return replace(spec, tube=tube)
 
 
-def _complete(spec: Spec, options: Options) -> list[Finding]:
+def _complete(spec: Spec) -> list[Finding]:
     """What a certification needs and a specification may lack."""
-    del options
     missing = []
     if spec.metric is None:
         missing.append(("metric", "give metric.dual_metric and metric.rate, or --metric FILE"))
@@ -405,11 +426,10 @@ def _complete(spec: Spec, options: Options) -> list[Finding]:
         missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
     if spec.tube.rho_a is None:
         missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
-    findings = [
+    return [
         Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
         for key, remedy in missing
     ]
-    return findings
 
 
 def _time(spec: Spec) -> tuple[list[Finding], Range | None]:

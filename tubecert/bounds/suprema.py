@@ -17,7 +17,14 @@ from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, suprem
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
-from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, Pencil, SumOfNorms, SumOfPencils
+from tubecert.enclosure.objective import (
+    LeastInputGain,
+    Lipschitz,
+    Objective,
+    Pencil,
+    SumOfNorms,
+    SumOfPencils,
+)
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import (
     ONE,
@@ -158,9 +165,8 @@ class Suprema:
     def metric_input_gain(self) -> Constant:
         """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan."""
         on = self.plan.on
-        return self._root(
-            self._search_plan("metric_input_gain", Pencil(on(self.model, self.model.BBt), [on(self.model, self.model.W)]))
-        )
+        objective = Pencil(on(self.model, self.model.BBt), [on(self.model, self.model.W)])
+        return self._root(self._search_plan("metric_input_gain", objective))
 
     def plan_defect(self) -> tuple[Constant, Constant]:
         """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*.

@@ -11,6 +11,7 @@ from typing import Any
 
 from tubecert.bounds.constants import Constant, Meaning, Witness
 from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
@@ -27,6 +28,7 @@ def declared_metric(spec: Spec) -> tuple[Constant, Constant] | None:
 
 
 def declared_uncertainty(spec: Spec) -> dict[str, Constant]:
+    """The declared bounds of h, h_x and h_t, by name."""
     bounds = spec.uncertainty.bounds
     if bounds is None:
         return {}
@@ -46,6 +48,7 @@ def declared_data(spec: Spec) -> Result:
 
 
 def metric_data(spec: Spec, proof: MetricProof) -> Result:
+    """`result.metric` as far as C1-C3 on the safe set tell."""
     metric = spec.metric
     assert metric is not None
     data: Result = {
@@ -60,6 +63,7 @@ def metric_data(spec: Spec, proof: MetricProof) -> Result:
 
 
 def constant_data(value: Constant, meaning: Meaning) -> Result:
+    """One entry of `result.constants`."""
     data: Result = {
         "below": _number(value.below),
         "above": _number(value.above),
@@ -74,10 +78,12 @@ def constant_data(value: Constant, meaning: Meaning) -> Result:
 
 
 def witness_data(at: Witness) -> Result:
+    """A time (if it matters) and a state."""
     return {**({} if at.t is None else {"t": at.t}), "x": list(at.x)}
 
 
 def pair_data(value: Constant) -> list[float | None]:
+    """[below, above]."""
     return [_number(value.below), _number(value.above)]
 
 
@@ -95,17 +101,22 @@ def decimal_data(value: Fraction | None) -> float | str | None:
 
 
 def floor_text(value: float) -> str:
+    """Six digits, rounded down."""
     digits = 6
     step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
     return f"{math.floor(value / step) * step:.{digits}g}"
 
 
 def ceiling_text(value: float) -> str:
+    """Six digits, rounded up."""
     return floor_text(-value).lstrip("-")
 
 
-def assumptions(spec: Spec, model: ControlAffineModel) -> list[str]:
-    """Everything that is not proven here (theory, section 5)."""
+def assumptions(spec: Spec, model: ControlAffineModel, geodesics: GeodesicTest | None = None) -> list[str]:
+    """Everything that is not proven here (docs/guarantee, "What is assumed").
+
+    `geodesics` is the test for their uniqueness, once the tube is known.
+    """
     flat = all(e.is_constant for row in model.W for e in row)
     smooth = spec.adaptation.smooth
     horizon = spec.trajectory.horizon
@@ -114,14 +125,31 @@ def assumptions(spec: Spec, model: ControlAffineModel) -> list[str]:
         "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
         "minimising geodesics are straight lines, which the constant metric makes unique"
         if flat
-        else "the controller finds the minimising geodesic exactly, and it is unique in the tube (not proven here)",
+        else _geodesic_assumption(geodesics),
         "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
-        "the projection is hard" if smooth is None else f"the projection is smooth with layer {float(smooth):g}",
+        "the projection is hard"
+        if smooth is None
+        else f"the projection is smooth with layer {float(smooth):g}",
         "the full state is measured without noise or delay, and inputs do not saturate",
         "the filter is first order, C(s) = omega/(s + omega)",
-        f"the claim is for 0 <= t <= {float(horizon):g} s" if horizon is not None else "the claim is for all t >= 0",
+        f"the claim is for 0 <= t <= {float(horizon):g} s"
+        if horizon is not None
+        else "the claim is for all t >= 0",
         "the uncertainty obeys its declared bounds on the tube"
         if spec.uncertainty.h is None
         else "the uncertainty is the expression of the specification"
         + (", or any other within the declared bounds" if spec.uncertainty.bounds else ""),
     ]
+
+
+def _geodesic_assumption(test: GeodesicTest | None) -> str:
+    """What is assumed of geodesics of a metric that is not constant."""
+    exact = "the controller finds the minimising geodesic exactly"
+    if test is None:
+        return f"{exact}, and it is unique in the tube (not proven here)"
+    if test.holds:
+        return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {ceiling_text(test.value.above)}"
+    size = f"reaches {floor_text(test.value.below)}"
+    if test.value.below < 1:
+        size = "could not be bounded by less than 1"
+    return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"

@@ -59,8 +59,8 @@ class Supremum:
 class Effort:
     """How hard to try.
 
-    A relative `gap`, or an `absolute` one, suffices; a tenth of the gap is aimed at while the search is `cheap` (boxes);
-    after `budget` boxes it gives up and reports the gap that it has.
+    A relative `gap`, or an `absolute` one, suffices; a tenth of the gap is aimed at while the search is `cheap`
+    (boxes); after `budget` boxes it gives up and reports the gap that it has.
     """
 
     gap: float = 0.01
@@ -127,15 +127,20 @@ class _Search:
         lo, hi = self.domain.boxes(self.variables)
         bound = np.full(len(lo), np.inf)
         self._probe(0.5 * (lo + hi))
-        while len(lo) and self.count < self.effort.budget and not self._refuted:
-            take = np.argsort(-bound, kind="stable")[:_BATCH]
-            rest = np.setdiff1d(np.arange(len(lo)), take)
-            children = self._round(lo[take], hi[take], bound[take])
+        while len(lo) and self._goes_on:
+            order = np.argsort(-bound, kind="stable")
+            children, done = [], 0
+            # the longer the queue, the more is taken at once: otherwise sorting would cost its square
+            while done < min(len(lo), max(_BATCH, len(lo) // 4)) and self._goes_on:
+                take = order[done : done + _BATCH]
+                children.append(self._round(lo[take], hi[take], bound[take]))
+                done += _BATCH
+            rest = np.sort(order[done:])
             kept = bound[rest] > self.target
             self._settle(bound[rest][~kept])
             lo, hi, bound = (
-                np.concatenate([old[rest][kept], new])
-                for old, new in zip((lo, hi, bound), children, strict=True)
+                np.concatenate([old[rest][kept], *new])
+                for old, new in zip((lo, hi, bound), zip(*children, strict=True), strict=True)
             )
             if self.effort.progress:
                 self.effort.progress(self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf))))
@@ -152,8 +157,9 @@ class _Search:
         )
 
     @property
-    def _refuted(self) -> bool:
-        return self.threshold is not None and self.below >= self.threshold
+    def _goes_on(self) -> bool:
+        refuted = self.threshold is not None and self.below >= self.threshold
+        return self.count < self.effort.budget and not refuted
 
     def _round(self, lo: Array, hi: Array, bound: Array) -> tuple[Array, Array, Array]:
         """Bound a batch of boxes, settle those at or below the target, split the others."""
@@ -175,7 +181,8 @@ class _Search:
             splittable = (lo[rows, choice] < cut) & (cut < hi[rows, choice]) & (priority[rows, choice] > 0)
         done = (bound <= self.target) | ~splittable
         self._settle(bound[done])
-        lo, hi, bound, choice, cut = (x[~done] for x in (lo, hi, bound, choice, cut))
+        lo, hi, bound, cut = (x[~done] for x in (lo, hi, bound, cut))
+        choice = choice[~done]
         rows = np.arange(len(lo))
         left_hi, right_lo = hi.copy(), lo.copy()
         left_hi[rows, choice], right_lo[rows, choice] = cut, cut

@@ -9,7 +9,7 @@ rounded and are widened by several ulps. An undefined operation (0/0, sqrt of a 
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,14 +86,15 @@ class Interval:
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Elementwise lo <= x <= hi."""
-        return (self.lo <= x) & (x <= self.hi)
+        value = np.asarray(x, dtype=np.float64)
+        return (self.lo <= value) & (value <= self.hi)
 
     def hull(self, other: Interval) -> Interval:
         """The smallest interval containing both."""
         return Interval(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi))
 
-    def __getitem__(self, index: object) -> Interval:
-        return Interval(self.lo[index], self.hi[index])  # type: ignore[index]  # any numpy index
+    def __getitem__(self, index: Any) -> Interval:  # any index that numpy takes
+        return Interval(self.lo[index], self.hi[index])
 
     def __repr__(self) -> str:
         return f"Interval({self.lo!r}, {self.hi!r})"

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array, Interval
 
@@ -18,6 +19,11 @@ _UNIT: Final = 2.0**-53
 _TINY: Final = 1e-300  # covers underflow in products
 _LOST: Final = 1e-320  # covers underflow of a rounding error that is scaled afterwards
 _ROOT_TINY: Final = 1e-150  # covers underflow below a square root
+
+
+def finite(m: Array) -> NDArray[np.bool_]:
+    """Which matrices of a batch have finite entries only."""
+    return np.asarray(np.isfinite(m).all(axis=(-2, -1)))
 
 
 def _gamma(k: int) -> float:
@@ -28,14 +34,14 @@ def _gamma(k: int) -> float:
 def _frobenius(m: Array) -> Array:
     """An upper bound of the Frobenius norm, shape (...,)."""
     k = m.shape[-1] * m.shape[-2]
-    return np.sqrt(np.sum(m * m, axis=(-2, -1))) * (1 + _gamma(k)) + _ROOT_TINY
+    return np.asarray(np.sqrt(np.sum(m * m, axis=(-2, -1))) * (1 + _gamma(k)) + _ROOT_TINY)
 
 
 def norm_bound(m: Array) -> Array:
     """An upper bound of the spectral norm of any matrix between -m and m elementwise (m >= 0), shape (...,)."""
     k = max(m.shape[-2:])
     mixed = np.sqrt(m.sum(axis=-1).max(axis=-1) * m.sum(axis=-2).max(axis=-1)) * (1 + _gamma(k)) + _ROOT_TINY
-    return np.minimum(_frobenius(m), mixed)
+    return np.asarray(np.minimum(_frobenius(m), mixed))
 
 
 def midrad(s: Interval) -> tuple[Array, Array]:
@@ -73,7 +79,7 @@ def _product_error(left: Array, d: Array, right: Array, mid: Array) -> Array:
     """A bound of all roundings in mid - left diag(d) right', by norms."""
     k = left.shape[-1] + 2
     scale = np.max(np.abs(d), axis=-1) * _frobenius(left) * _frobenius(right) + _frobenius(mid)
-    return _gamma(2 * k) * scale + _TINY
+    return np.asarray(_gamma(2 * k) * scale + _TINY)
 
 
 def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
@@ -83,7 +89,7 @@ def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
             np.nextafter((mid - rad)[..., 0], -np.inf), np.nextafter((mid + rad)[..., 0], np.inf)
         ).sanitised()
     mid = 0.5 * (mid + np.swapaxes(mid, -1, -2))  # may move a midpoint by a rounding: covered by _product_error
-    bad = ~(np.isfinite(mid).all(axis=(-2, -1)) & np.isfinite(rad).all(axis=(-2, -1)))
+    bad = ~(finite(mid) & finite(rad))
     safe = np.where(bad[..., None, None], np.eye(mid.shape[-1]), mid)
     d, v = np.linalg.eigh(safe)
     residual = safe - (v * d[..., None, :]) @ np.swapaxes(v, -1, -2)
@@ -105,7 +111,7 @@ def eigenvalues(s: Interval) -> Interval:
 def spectral_norm_midrad(mid: Array, rad: Array) -> Interval:
     """The largest singular value of every matrix within mid +- rad (..., p, q); shape (...,)."""
     p, q = mid.shape[-2:]
-    bad = ~(np.isfinite(mid).all(axis=(-2, -1)) & np.isfinite(rad).all(axis=(-2, -1)))
+    bad = ~(finite(mid) & finite(rad))
     safe = np.where(bad[..., None, None], 0.0, mid)
     if min(p, q) == 1:
         exact = np.sqrt(np.sum(safe * safe, axis=(-2, -1)))
@@ -115,7 +121,8 @@ def spectral_norm_midrad(mid: Array, rad: Array) -> Interval:
         u, s, vt = np.linalg.svd(safe, full_matrices=False)
         v = np.swapaxes(vt, -1, -2)
         residual = safe - (u * s[..., None, :]) @ vt
-        error = _frobenius(residual) + _product_error(u, s, v, safe) + norm_bound(np.where(bad[..., None, None], 0.0, rad))
+        spread = norm_bound(np.where(bad[..., None, None], 0.0, rad))
+        error = _frobenius(residual) + _product_error(u, s, v, safe) + spread
         delta = np.maximum(_departure(u), _departure(v))
         top = np.max(np.abs(s), axis=-1)  # whatever the order and the signs given
         radius = (top * delta + error) * (1 + _gamma(4))
@@ -143,9 +150,9 @@ def quadratic_form(v: Array, mid: Array, rad: Array) -> Interval:
 
 
 def whitening(mid: Array) -> Array:
-    """Floats T with T S T' close to the identity (a proposal, nothing is proven); the identity where S is not positive."""
+    """Floats T with T S T' close to the identity: a proposal, nothing is proven; I where S is not positive."""
     n = mid.shape[-1]
-    bad = ~np.isfinite(mid).all(axis=(-2, -1))
+    bad = ~finite(mid)
     d, v = np.linalg.eigh(np.where(bad[..., None, None], np.eye(n), mid))
     ok = d[..., 0] > 1e-14 * np.abs(d[..., -1])
     scale = np.where(ok[..., None], 1 / np.sqrt(np.where(d > 0, d, 1.0)), 1.0)

@@ -16,6 +16,7 @@ from tubecert.enclosure.linalg import (
     congruence,
     eigenvalues,
     eigenvalues_midrad,
+    finite,
     midrad,
     norm_bound,
     quadratic_form,
@@ -58,8 +59,8 @@ class Objective(Protocol):
 class SumOfNorms:
     """sum_k |G_k(x)| in the spectral norm (of a column: the Euclidean norm)."""
 
-    def __init__(self, matrices: Sequence[Matrix]) -> None:
-        self._function = MatrixFunction(matrices)
+    def __init__(self, matrices: Sequence[Matrix], fixed: frozenset[str] = frozenset()) -> None:
+        self._function = MatrixFunction(matrices, fixed=fixed)
         self.variables = self._function.variables
         self.is_zero = self._function.is_zero
 
@@ -124,7 +125,8 @@ class LeastInputGain:
         mid, rad = midrad(w)
         t = whitening(mid)
         scaled = eigenvalues_midrad(*congruence(t, mid, rad))
-        image = [sum((b[:, j] * t[:, i, j, None] for j in range(t.shape[-1])), start=Interval(0.0)) for i in range(t.shape[-1])]
+        n = t.shape[-1]
+        image = [sum((b[:, j] * t[:, i, j, None] for j in range(n)), start=Interval(0.0)) for i in range(n)]
         gram_lo = np.empty((len(lo), b.shape[-1], b.shape[-1]))
         gram_hi = gram_lo.copy()
         for p in range(b.shape[-1]):
@@ -164,8 +166,9 @@ class Pencil:
         *,
         extra: tuple[str, ...] = (),
         weights: Weights | None = None,
+        fixed: frozenset[str] = frozenset(),
     ) -> None:
-        self._function = MatrixFunction([numerator, *denominators])
+        self._function = MatrixFunction([numerator, *denominators], fixed=fixed)
         self._own = self._function.variables
         self.variables = (*self._own, *extra)
         self._weights = weights
@@ -217,7 +220,7 @@ class Pencil:
         denominator = _weighted(weights, [m for m, _ in values[1:]], [r for _, r in values[1:]])
         t = whitening(denominator[0])
         scaled = t @ numerator[0] @ np.swapaxes(t, -1, -2)
-        bad = ~np.isfinite(scaled).all(axis=(-2, -1))
+        bad = ~finite(scaled)
         scaled = np.where(bad[:, None, None], 0.0, 0.5 * (scaled + np.swapaxes(scaled, -1, -2)))
         _, vectors = np.linalg.eigh(scaled)
         v = np.einsum("nji,nj->ni", t, vectors[..., -1])
@@ -240,7 +243,7 @@ class SumOfPencils:
         self.variables = self._function.variables
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
-        """For each i a value is guessed at the vertices, then +-N_i <= tau D is proven, inflating the guess if needed."""
+        """For each i a value is guessed at the vertices, then +-N_i <= tau D is proven, inflated if needed."""
         e = self._function.expand(lo, hi)
         filled = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
         denominator = e.mid[0], filled[0]
@@ -263,7 +266,7 @@ class SumOfPencils:
         total = np.zeros(len(lo))
         for mid, rad in values[1:]:
             scaled = t @ mid @ np.swapaxes(t, -1, -2)
-            bad = ~np.isfinite(scaled).all(axis=(-2, -1))
+            bad = ~finite(scaled)
             scaled = np.where(bad[:, None, None], 0.0, 0.5 * (scaled + np.swapaxes(scaled, -1, -2)))
             _, vectors = np.linalg.eigh(scaled)
             best = np.zeros(len(lo))
@@ -275,11 +278,11 @@ class SumOfPencils:
         return total * (1 - 1e-14)
 
 
-def scalar(e: Expression) -> Pencil:
+def scalar(e: Expression, fixed: frozenset[str] = frozenset()) -> Pencil:
     """The value of one expression, as the pencil (e, 1)."""
     from tubecert.expression import ONE
 
-    return Pencil([[e]], [[[ONE]]])
+    return Pencil([[e]], [[[ONE]]], fixed=fixed)
 
 
 def _weighted(weights: Sequence[Array], mids: Sequence[Array], rads: Sequence[Array]) -> tuple[Array, Array]:

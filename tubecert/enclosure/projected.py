@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval
-from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, product, whitening
+from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, finite, midrad, product, whitening
 from tubecert.enclosure.objective import Estimate
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
@@ -58,14 +58,13 @@ class ProjectedPencil:
         P = midrad(self._projector.at(lo[:, needed], hi[:, needed])[0])
         best = np.full(len(lo), -np.inf)
         Pt = np.swapaxes(P[0], -1, -2)
-        reduced = Pt @ N[0] @ P[0] - 0.0
+        reduced = Pt @ N[0] @ P[0]
         weight = Pt @ D[0] @ P[0]
         rank = P[0].shape[-1]
         frame = whitening(weight + 1e-9 * np.trace(weight, axis1=-2, axis2=-1)[:, None, None] * np.eye(rank))
         scaled = frame @ reduced @ np.swapaxes(frame, -1, -2)
-        ok = np.isfinite(scaled).all(axis=(-2, -1))
-        values, vectors = np.linalg.eigh(np.where(ok[:, None, None], scaled, 0.0))
-        del values
+        ok = finite(scaled)
+        _, vectors = np.linalg.eigh(np.where(ok[:, None, None], scaled, 0.0))
         for k in range(rank):  # some of these belong to the range of B' and project to nothing
             y = np.einsum("nji,nj->ni", frame, vectors[..., k])[..., None]
             v = product(P, (y, np.zeros_like(y)))
@@ -86,7 +85,7 @@ def _multiplier(centre: list[Array], target: float) -> Array:
     t = whitening(centre[1])
     tt = np.swapaxes(t, -1, -2)
     form, gram = t @ centre[0] @ tt - target * np.eye(t.shape[-1]), t @ centre[2] @ tt
-    ok = np.isfinite(form).all(axis=(-2, -1)) & np.isfinite(gram).all(axis=(-2, -1))
+    ok = finite(form) & finite(gram)
     form, gram = np.where(ok[:, None, None], form, 0.0), np.where(ok[:, None, None], gram, 0.0)
     d, v = np.linalg.eigh(gram)
     form = np.swapaxes(v, -1, -2) @ form @ v

@@ -43,17 +43,22 @@ class Expansion:
 class MatrixFunction:
     """Matrices of expressions in `variables`, with tapes for values, slopes and curvature.
 
-    `order` limits the order of the expansion (2: vertex form, 1: mean value form, 0: natural extension).
+    `order` limits the order of the expansion (2: vertex form, 1: mean value form, 0: natural extension). In `fixed`
+    variables nothing is expanded: they are data, known up to a rounding, and enter with their whole range.
     """
 
-    def __init__(self, matrices: Sequence[Matrix], order: int = 2) -> None:
+    def __init__(
+        self, matrices: Sequence[Matrix], order: int = 2, fixed: frozenset[str] = frozenset()
+    ) -> None:
         entries = [e for matrix in matrices for row in matrix for e in row]
         self.shapes = [(len(matrix), len(matrix[0])) for matrix in matrices]
         self.variables = tuple(sorted(free_symbols(entries)))
         ops = {node.op for node in topological(entries)}
         self._order = min(order, 0 if "direction" in ops else 1 if "norm" in ops else 2)
-        first = {v: derivatives(entries, v) for v in self.variables} if self._order else {}
-        self._affine, self._curved = self._classify(first)
+        free = tuple(v for v in self.variables if v not in fixed)
+        self._fixed = [i for i, v in enumerate(self.variables) if v in fixed]
+        first = {v: derivatives(entries, v) for v in free} if self._order else {}
+        self._affine, self._curved = self._classify(free, first)
         self._values = _Table(entries, self.variables)
         self._slopes = _Table([e for v in self._curved for e in first.get(v, [])], self.variables)
         curvature = []
@@ -63,14 +68,25 @@ class MatrixFunction:
                     curvature += derivatives(first[v], w)
         self._curvature = _Table(curvature, self.variables)
 
-    def _classify(self, first: dict[str, list[Expression]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    @staticmethod
+    def _of(points: Array, lo: Array, hi: Array, fixed: list[int]) -> Interval:
+        """The points, with the whole range of the fixed variables."""
+        if not fixed:
+            return Interval(points)
+        low, high = points.copy(), points.copy()
+        low[:, fixed], high[:, fixed] = lo[:, fixed], hi[:, fixed]
+        return Interval(low, high)
+
+    def _classify(
+        self, free: tuple[str, ...], first: dict[str, list[Expression]]
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Variables in which every entry is affine, and the others."""
         if self._order < 2:
-            return (), self.variables
+            return (), free
         affine = tuple(
-            v for v in self.variables if all(e is ZERO for e in derivatives(first[v], v))
+            v for v in free if all(e is ZERO for e in derivatives(first[v], v))
         )[:_MOST_VERTICES]
-        return affine, tuple(v for v in self.variables if v not in affine)
+        return affine, tuple(v for v in free if v not in affine)
 
     @property
     def is_zero(self) -> bool:
@@ -106,8 +122,9 @@ class MatrixFunction:
         point, box_lo, box_hi = (x.reshape(len(choices) * count, dim) for x in (point, box_lo, box_hi))
         expanded = curved[: max(0, _MOST_VERTICES - len(corners))] if self._order == 2 else []
         flips = np.array(list(product((-1.0, 1.0), repeat=len(expanded))))
-        base = self._unpack(self._values.run(Interval(point)), self.shapes)
-        here, second = self._derivatives(point, box_lo, box_hi, len(curved))
+        thin = self._of(point, box_lo, box_hi, self._fixed)
+        base = self._unpack(self._values.run(thin), self.shapes)
+        here, second = self._derivatives(thin, box_lo, box_hi, len(curved))
         stacked_radius = np.tile(radius, (len(choices), 1))
         mids, rads, rests = [], [], []
         for k, value in enumerate(base):
@@ -141,12 +158,12 @@ class MatrixFunction:
         return Expansion(mids, rads, rests, signs)
 
     def _derivatives(
-        self, point: Array, box_lo: Array, box_hi: Array, curved: int
+        self, thin: Interval, box_lo: Array, box_hi: Array, curved: int
     ) -> tuple[list[list[Interval]], list[list[list[Interval]]]]:
         """Slopes by variable (over the box where there is no curvature), and curvature by pair."""
         if not curved:
             return [], []
-        where = Interval(point) if self._order == 2 else Interval(box_lo, box_hi)
+        where = thin if self._order == 2 else Interval(box_lo, box_hi)
         slopes = self._unpack(self._slopes.run(where), self.shapes * curved)
         k = len(self.shapes)
         here = [slopes[j * k : (j + 1) * k] for j in range(curved)]

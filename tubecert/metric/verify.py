@@ -1,7 +1,8 @@
 """Conditions C1, C2, C3 on the safe set: certified with a margin, refuted at a point, or undecided.
 
-C1: 0 < W, with a and A on the set. C3 exactly, on the expressions. C2 as a largest rate: B_perp'(F_0 + 2 r W)B_perp <= 0
-holds for all rates r up to -1/2 sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), F_0 = -d_f W + f_x W + W f_x'.
+C1: 0 < W, with a and A on the set. C3 exactly, on the expressions. C2 as a largest rate:
+B_perp'(F_0 + 2 r W)B_perp <= 0 holds for all rates r up to -1/2 sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp),
+F_0 = -d_f W + f_x W + W f_x'.
 Implements: (CCM_1), (CCM_2) and (CCM_3) in dual form. Trusted: yes.
 """
 
@@ -69,29 +70,35 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     largest = supremum(Pencil(model.W, [eye]), domain, fine)
     upper = supremum(Pencil(eye, [model.W]), domain, fine)
     inverse = Interval(1.0) / Interval(largest.below, largest.above)
-    on_set = {
-        "lower_on_set": Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
-        "upper_on_set": Constant(below=upper.below, above=upper.above, at=place(upper.at)),
-    }
+    proof = MetricProof(
+        verdict="certified",
+        lower_on_set=Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
+        upper_on_set=Constant(below=upper.below, above=upper.above, at=place(upper.at)),
+    )
     if (failed := _killing(model, domain)) is not None:
         verdict, reason, at = failed
-        return MetricProof(verdict=verdict, condition="C3", reason=reason, at=place(at), **on_set)
+        return replace(proof, verdict=verdict, condition="C3", reason=reason, at=place(at))
     if len(model.inputs) == len(model.states):
-        return MetricProof(verdict="certified", **on_set)  # as many inputs as states: C2 is void
+        return proof  # as many inputs as states: C2 is void
     found = _largest_rate(model, domain, effort)
     below, above = -found.above / 2, -found.below / 2
     margin = Interval(below, above) - Interval.of(model.rate)
-    rates = {
-        "largest_rate": Constant(below=below, above=above, at=place(found.at)),
-        "margin": Constant(below=float(margin.lo), above=float(margin.hi), at=place(found.at)),
-    }
+    proof = replace(
+        proof,
+        largest_rate=Constant(below=below, above=above, at=place(found.at)),
+        margin=Constant(below=float(margin.lo), above=float(margin.hi), at=place(found.at)),
+    )
     if Fraction(below) > model.rate:
-        return MetricProof(verdict="certified", **on_set, **rates)
+        return proof
     if Fraction(above) < model.rate:
-        reason = f"C2 fails at rate {float(model.rate):g}: the largest rate that this metric supports is {_floor(below)}"
-        return MetricProof(verdict="refuted", condition="C2", reason=reason, at=place(found.at), **on_set, **rates)
-    reason = f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {float(model.rate):g} to tell"
-    return MetricProof(verdict="undecided", condition="C2", reason=reason, **on_set, **rates)
+        reason = (
+            f"C2 fails at rate {float(model.rate):g}: the largest rate that this metric supports is {_floor(below)}"
+        )
+        return replace(proof, verdict="refuted", condition="C2", reason=reason, at=place(found.at))
+    reason = (
+        f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {float(model.rate):g} to tell"
+    )
+    return replace(proof, verdict="undecided", condition="C2", reason=reason)
 
 
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
