@@ -81,6 +81,8 @@ def test_a_certificate_is_put_in_one_sentence():
     finite = certified()
     finite["spec"]["effective"]["trajectory"]["horizon"] = "2.5"
     assert "for 0 <= t <= 2.5 s" in " ".join(shown(finite).split())
+    assert "in the long run |x - x*| <= 0.0123 with B distance" in text
+    assert "in the long run" not in shown(finite)
 
 
 def test_a_refusal_names_claim_witness_and_remedy():

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.report.gains import NAMES, rows
-from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.report.numbers import UNKNOWN, Number, down, exact, short, up
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -41,8 +41,13 @@ def of(result: Mapping[str, Any], *, verbose: bool) -> Iterator[Section]:
 
 def span(result: Mapping[str, Any]) -> str:
     """The time that is claimed."""
-    horizon = result["spec"]["effective"]["trajectory"].get("horizon")
+    horizon = _horizon(result)
     return "for all t >= 0" if horizon is None else f"for 0 <= t <= {short(horizon, 12)} s"
+
+
+def _horizon(result: Mapping[str, Any]) -> Number | None:
+    horizon: Number | None = result["spec"]["effective"]["trajectory"].get("horizon")
+    return horizon
 
 
 # -- why not
@@ -140,6 +145,8 @@ def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
 
 def _in_the_long_run(result: Mapping[str, Any]) -> list[Text]:
     """The radius that remains when the initial error has died out, for each certificate that holds."""
+    if _horizon(result) is not None:
+        return []
     found = [
         (title, data["ultimate_radius"])
         for key, title in NAMES.items()
