@@ -70,10 +70,10 @@ def decimal_above(value: Fraction) -> Fraction:
 def _printable(value: Fraction | float, rounding: str) -> float:
     if value == 0 or (isinstance(value, float) and not math.isfinite(value)):
         return float(value)
-    if abs(value) < _LEAST:  # floats lose digits below their normal range
-        outward_of_zero = (value > 0) == (rounding == ROUND_CEILING)
-        return math.copysign(_LEAST, value) if outward_of_zero else 0.0
     exact = Fraction(value)
+    if abs(exact) < Fraction(_LEAST):  # floats lose digits below their normal range
+        away_from_zero = (exact > 0) == (rounding == ROUND_CEILING)
+        return math.copysign(_LEAST, exact) if away_from_zero else 0.0
     context = Context(prec=DIGITS, rounding=rounding)
     decimal = context.divide(Decimal(exact.numerator), Decimal(exact.denominator))
     step = Decimal((0, (1,), decimal.adjusted() - DIGITS + 1))

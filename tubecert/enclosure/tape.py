@@ -127,6 +127,6 @@ _INTERVALS: Mapping[str, Callable[[list[Interval], int], Interval]] = {
     "cos": lambda a, _: iv.cos(a[0]),
     "tan": lambda a, _: iv.tan(a[0]),
     "exp": lambda a, _: iv.exp(a[0]),
-    "norm": lambda a, _: iv.norm(a),  # noqa: PLW0108 - two arguments, not one
-    "direction": lambda a, i: iv.direction(a, i),
+    "norm": lambda a, _: iv.norm(a),
+    "direction": iv.direction,
 }
