@@ -179,6 +179,8 @@ class _Certification:
         return self._declared_metric(proof)
 
     def _relax_metric(self, proof: MetricProof) -> str:
+        if proof.verdict == "undecided" and proof.condition != "C3":
+            return "raise --budget, or lower metric.rate"
         if proof.largest_rate is None:
             return "give another dual metric"
         return f"lower metric.rate to {floor_text(proof.largest_rate.below)}, or give another dual metric"
