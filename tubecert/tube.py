@@ -116,7 +116,8 @@ class Tube:
         priority[:, state] += boundary * estimate.spread[:, state]
         if TIME in variables and not self._plan.is_constant:
             width = np.maximum(hi[:, state] - lo[:, state], 1e-300)
-            share = np.minimum(1.0, (centre.hi - centre.lo) / width)
+            # a state box narrower than the plan's motion gains nothing from being split further
+            share = np.minimum(1e9, (centre.hi - centre.lo) / width)
             moved = (boundary * estimate.spread[:, state] * share).sum(axis=1)
             priority[:, variables.index(TIME)] += moved + (estimate.spread + estimate.caused)[:, tied].sum(axis=1)
         priority[:, tied] = 0.0

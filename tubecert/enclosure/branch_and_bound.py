@@ -17,6 +17,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
 
 _BATCH: Final = 1024
+_UNKNOWN: Final = 1e300  # an overestimate of this size tells nothing about its cause
 _PROBES: Final = 64  # boxes whose corners are tried as points, per round
 
 
@@ -126,6 +127,7 @@ class _Search:
     def run(self) -> Supremum:
         lo, hi = self.domain.boxes(self.variables)
         bound = np.full(len(lo), np.inf)
+        self.extent = hi.max(axis=0) - lo.min(axis=0)
         self._probe(0.5 * (lo + hi))
         while len(lo) and self._goes_on:
             order = np.argsort(-bound, kind="stable")
@@ -192,11 +194,17 @@ class _Search:
         """The estimate with columns for the variables that only the domain needs."""
         extra = np.zeros((len(lo), len(self.variables) - self.own))
         middle = 0.5 * (lo + hi)[:, self.own :]
+        caused = np.concatenate([estimate.caused, extra], axis=1)
+        spread = np.concatenate([estimate.spread, extra], axis=1)
+        # where nothing is known yet, every variable is split in turn: NaN and inf would choose one for ever
+        known = (caused < _UNKNOWN).all(axis=1) & (spread < _UNKNOWN).all(axis=1)
+        share = np.where(self.extent > 0, (hi - lo) / np.where(self.extent > 0, self.extent, 1.0), 0.0)
+        share[:, self.own :] = 0.0
         return Estimate(
             estimate.upper,
             np.concatenate([estimate.corner, middle], axis=1),
-            np.concatenate([estimate.caused, extra], axis=1),
-            np.concatenate([estimate.spread, extra], axis=1),
+            np.where(known[:, None], caused, share),
+            np.where(known[:, None], spread, share),
         )
 
     def _settle(self, bound: Array) -> None:

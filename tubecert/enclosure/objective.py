@@ -155,7 +155,8 @@ class Pencil:
     """The largest eigenvalue of the pencil (N(x), D(x)), D > 0: the least tau with N <= tau D.
 
     D may be a combination sum_k w_k D_k with weights w_k >= 0 that depend on further variables of the box (`extra`);
-    `weights(lo, hi)` must return weights that give, for the whole box, a *lower* bound of D in the Loewner order.
+    `weights(lo, hi)` must return weights that give, for the whole box, a *lower* bound of D in the Loewner order. That
+    bounds N <= tau D for tau >= 0 only, so with weights the value is the largest eigenvalue or 0, whichever is larger.
     A target tau is tested directly: N - tau D <= 0 after a congruence that makes D nearly the identity.
     """
 
@@ -193,6 +194,7 @@ class Pencil:
         excess = _excess(t, numerator, denominator, target) if np.isfinite(target) else np.full(above.shape, np.inf)
         corner = np.argmax(np.where(np.isnan(excess), -np.inf, excess) if np.isfinite(target) else above, axis=1)
         value = np.where(np.max(excess, axis=1) <= 0, np.fmin(target, above.max(axis=1)), above.max(axis=1))
+        value = value if self._weights is None else np.maximum(value, 0.0)
         caused = np.zeros((lo.shape[1], *above.shape))
         scale = abs(target) if np.isfinite(target) else 1.0
         for k, rest in enumerate(e.rest):
@@ -227,7 +229,7 @@ class Pencil:
         quotient = quadratic_form(v, *numerator) / quadratic_form(v, *denominator)
         # the weights may be rounded below the exact ones
         lower = quotient.lo - 1e-15 * np.abs(quotient.lo)
-        return np.where(np.isnan(lower), -np.inf, lower)
+        return np.where(np.isnan(lower), -np.inf, lower) if self._weights is None else np.fmax(lower, 0.0)
 
     def _frame(self, hi: Array, denominators: list[Array]) -> Array:
         """A congruence that makes the denominator, weighted as at the upper ends, nearly the identity."""
