@@ -45,7 +45,7 @@ from tubecert.metric.geodesic import unique_geodesics
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import TIME, ControlAffineModel, build, domain_findings, place, rank_decision, time_period
 from tubecert.search.distance import search_distance
-from tubecert.search.elasticities import elasticities_26, elasticities_distance
+from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.rates import search_26
 from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
@@ -365,8 +365,8 @@ class _Certification:
             "distance": elasticities_distance(problem, distance),
         }
         explained = {
-            "conditions_26": reasons_26(rates, slopes["conditions_26"]),
-            "distance": reasons_distance(distance, slopes["distance"]),
+            "conditions_26": reasons_26(rates, halving(problem, slopes["conditions_26"], _least_26)),
+            "distance": reasons_distance(distance, halving(problem, slopes["distance"], _least_distance)),
             "sampled": reasons_sampled(sampled),
         }
         self.result |= {
@@ -408,6 +408,16 @@ class _Certification:
             self.effort,
             progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
         )
+
+
+def _least_26(problem: TubeProblem) -> Fraction | None:
+    pair = search_26(problem).least_adaptation
+    return None if pair is None else pair.recipe.adaptation_rate
+
+
+def _least_distance(problem: TubeProblem) -> Fraction | None:
+    pair = search_distance(problem).least_adaptation
+    return None if pair is None else pair.recipe.adaptation_rate
 
 
 def _overridden(spec: Spec, options: Options) -> Spec:

@@ -1,6 +1,7 @@
 """Why a verdict is what it is, in words: what binds, by how much, what would relax it.
 
-In: the results of the three searches and their elasticities. Out: the `reasons` of a certificate.
+In: the results of the three searches, and what halving a constant does to the least Gamma.
+Out: the `reasons` of a certificate.
 """
 
 from __future__ import annotations
@@ -25,10 +26,8 @@ _EXPLAINED = {
     "as-printed": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
 }
 
-_GIVEN = {"lower", "upper", "B", "B_pinv"}  # the metric's scale and the actuators: nobody can relax these alone
 
-
-def reasons_26(result: Conditions26, elasticities: Mapping[str, float]) -> list[Reason]:
+def reasons_26(result: Conditions26, halved: Mapping[str, float]) -> list[Reason]:
     """Reasons of certificate A."""
     if result.verdict is not Verdict.CERTIFIED or result.pair is None:
         return _short("conditions_26", result.verdict, result.shortfalls)
@@ -39,15 +38,15 @@ def reasons_26(result: Conditions26, elasticities: Mapping[str, float]) -> list[
         message += "; the bandwidth lies below twice the rate"
     if result.binds == "26b":
         message += "; where (26b) binds the rate grows without bound, so 1 % of it is left"
-    return [_certified("conditions_26", message, elasticities)]
+    return [_certified("conditions_26", message, halved)]
 
 
-def reasons_distance(result: DistanceResult, elasticities: Mapping[str, float]) -> list[Reason]:
+def reasons_distance(result: DistanceResult, halved: Mapping[str, float]) -> list[Reason]:
     """Reasons of certificate B."""
     pair = result.decisive
     if result.verdict is not Verdict.CERTIFIED or pair is None:
         return _short("distance", result.verdict, result.shortfalls)
-    return [_certified("distance", f"proven margin {float(pair.margin.lo):.2g} of dbar", elasticities)]
+    return [_certified("distance", f"proven margin {float(pair.margin.lo):.2g} of dbar", halved)]
 
 
 def reasons_sampled(result: SampledResult) -> list[Reason]:
@@ -57,18 +56,15 @@ def reasons_sampled(result: SampledResult) -> list[Reason]:
     return [_certified("sampled", f"proven margin {float(result.pair.margin.lo):.2g} of dbar", {})]
 
 
-def _certified(claim: str, message: str, elasticities: Mapping[str, float]) -> Reason:
+def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
     reason: Reason = {"claim": claim, "verdict": str(Verdict.CERTIFIED), "message": message}
-    # what can be relaxed is what the user chooses or models, largest effect first
-    named = [item for item in elasticities.items() if item[0] not in _GIVEN]
-    largest = sorted(named, key=lambda item: (-abs(item[1]), item[0]))[:2]
-    if largest:
-        parts = [
-            f"{abs(100 * (1 - 0.9**slope)):.0f} % per 10 % {'less' if slope > 0 else 'more'} of {TABLE[name].symbol} "
-            f"({TABLE[name].words})"
-            for name, slope in largest
-        ]
-        reason["relax"] = "the least Gamma would fall by about " + ", by about ".join(parts)
+    parts = [
+        f"halving {TABLE[name].symbol} ({TABLE[name].words}) would lower the least Gamma by {100 * (1 - factor):.0f} %"
+        for name, factor in halved.items()
+        if factor < 1
+    ]
+    if parts:
+        reason["relax"] = ", ".join(parts)
     return reason
 
 

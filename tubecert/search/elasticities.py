@@ -6,10 +6,13 @@ are perturbed in one vectorised evaluation. Numbers to explain a result, not par
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
+from tubecert.bounds.constants import Constant
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.derived import rate_terms
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
@@ -19,6 +22,7 @@ from tubecert.search.rates import gains_along, needed_rate
 from tubecert.search.results import Conditions26, DistanceResult
 
 _STEP = 1e-4
+_GIVEN = frozenset({"lower", "upper", "B", "B_x", "b_x", "B_pinv", "B_pinv_x", "metric_input_gain"})
 
 
 def elasticities_distance(problem: TubeProblem, result: DistanceResult) -> dict[str, float]:
@@ -66,3 +70,25 @@ def _slopes(Gamma: Array) -> dict[str, float]:
         for field, slope in zip(FIELDS.values(), slopes, strict=True)
         if np.isfinite(slope) and abs(slope) > 5e-5
     }
+
+
+def halving(
+    problem: TubeProblem, slopes: Mapping[str, float], least: Callable[[TubeProblem], Fraction | None]
+) -> dict[str, float]:
+    """Gamma_least with a constant halved over Gamma_least, for the two constants to which it reacts most.
+
+    Searched anew, not extrapolated. The metric and the actuators are left out: nobody can relax their size alone.
+    """
+    now = least(problem)
+    named = sorted((-slope, name) for name, slope in slopes.items() if slope > 0 and name not in _GIVEN)
+    factors = {}
+    for _, name in named[:2]:
+        value: Constant = getattr(problem.constants, name)
+        changes = {name: Constant(below=value.below / 2, above=value.above / 2)}
+        if name == "h":  # the start is one of the values that are halved
+            start = problem.constants.h_initial
+            changes["h_initial"] = Constant(below=start.below / 2, above=start.above / 2)
+        then = least(replace(problem, constants=replace(problem.constants, **changes)))
+        if now is not None and then is not None:
+            factors[name] = float(then / now)
+    return factors
