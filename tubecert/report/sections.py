@@ -216,8 +216,10 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
         for item in [*stated, *(believed if declared else [])]:
             table.add_row("-", Text(item))
         return [table]
+    proven = result.get("metric", {}).get("unique_geodesics", {}).get("holds", False)
+    geodesics = "exact geodesics (their uniqueness is proven)" if proven else "exact and unique geodesics"
     brief = (
-        "exact continuous-time control, full state, no noise, delay or saturation; unique geodesics; filter "
+        f"exact continuous-time control, full state, no noise, delay or saturation; {geodesics}; filter "
         f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
     )
     return [Text(line) for line in [brief, *(believed if declared else [])]]
