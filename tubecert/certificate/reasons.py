@@ -61,7 +61,7 @@ def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
     parts = [
         f"halving {TABLE[name].symbol} ({TABLE[name].words}) would lower the least Gamma by {100 * (1 - factor):.0f} %"
         for name, factor in halved.items()
-        if factor < 1
+        if factor < 0.995
     ]
     if parts:
         reason["relax"] = ", ".join(parts)
