@@ -96,7 +96,9 @@ class Tube:
         centre = x[:, state_column]
         offset = points[:, state] - centre.mid
         length = np.sqrt(np.sum(offset * offset, axis=1, keepdims=True))
-        scale = np.minimum(1.0, self._rho * (1 - 1e-9) / np.maximum(length, 1e-300))
+        blur = np.sum(centre.hi - centre.lo + 1e-15 * centre.magnitude, axis=1, keepdims=True)
+        reach = np.maximum(self._rho * (1 - 1e-9) - 2 * blur, 0.0)
+        scale = np.minimum(1.0, reach / np.maximum(length, 1e-300))
         points[:, state] = centre.mid + scale * offset
         distance = (Interval(points[:, state]) - centre) ** 2
         total = distance.hi.sum(axis=1) * (1 + 1e-14)
