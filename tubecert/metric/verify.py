@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
+from math import isfinite
 
 import numpy as np
 
@@ -63,13 +64,15 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         return MetricProof(
             verdict=positive.verdict,
             condition="C1",
-            reason="W is not positive definite" if positive.verdict == "refuted" else "W could not be proven positive",
+            reason="W is not positive definite"
+            if positive.verdict == "refuted"
+            else "W could not be proven positive",
             at=place(positive.at),
         )
     fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
     largest = supremum(Pencil(model.W, [eye]), domain, fine)
     upper = supremum(Pencil(eye, [model.W]), domain, fine)
-    inverse = Interval(1.0) / Interval(largest.below, largest.above)
+    inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
     proof = MetricProof(
         verdict="certified",
         lower_on_set=Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
@@ -88,16 +91,13 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         largest_rate=Constant(below=below, above=above, at=place(found.at)),
         margin=Constant(below=float(margin.lo), above=float(margin.hi), at=place(found.at)),
     )
-    if Fraction(below) > model.rate:
+    if isfinite(below) and Fraction(below) > model.rate:
         return proof
-    if Fraction(above) < model.rate:
-        reason = (
-            f"C2 fails at rate {float(model.rate):g}: the largest rate that this metric supports is {_floor(below)}"
-        )
+    if isfinite(above) and Fraction(above) < model.rate:
+        reason = f"C2 fails at rate {float(model.rate):g}: {_supported(below, above)}"
         return replace(proof, verdict="refuted", condition="C2", reason=reason, at=place(found.at))
-    reason = (
-        f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {float(model.rate):g} to tell"
-    )
+    asked = float(model.rate)
+    reason = f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {asked:g} to tell"
     return replace(proof, verdict="undecided", condition="C2", reason=reason)
 
 
@@ -176,6 +176,16 @@ def _killing(model: ControlAffineModel, domain: BoxDomain) -> tuple[str, str, di
                 return "refuted", reason, at
         return "undecided", f"C3 (the Killing condition) could not be proven exactly for input {name}", {}
     return None
+
+
+def _supported(below: float, above: float) -> str:
+    if above <= 0:
+        return "this metric supports no positive rate"
+    return (
+        f"the largest rate that this metric supports is {_floor(below)}"
+        if below > 0
+        else "no rate could be proven"
+    )
 
 
 def _floor(rate: float) -> str:

@@ -1,0 +1,121 @@
+"""The two systems of the tests, as models and as independent formulas that run on floats, Fractions and balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from tubecert.expression import constant, cos, norm, parse, sin, symbol
+from tubecert.model import ControlAffineModel
+from tubecert.trajectory import Plan, constant_plan
+
+Rows = list[list[Any]]
+THREE = ("x1", "x2", "x3")
+TWO = ("x1", "x2")
+
+# -- three states: W = Wc + Wl x1 + Wq x1^2, B = (0, 0, 1) ------------------------------------------------------
+
+WC = [
+    ["0.20365", "0.00015", "-0.00566"],
+    ["0.00015", "0.21671", "-0.00566"],
+    ["-0.00566", "-0.00566", "0.21607"],
+]
+WL = [["0", "-0.4073", "-0.00133"], ["-0.4073", "-0.00061", "0.00998"], ["-0.00133", "0.00998", "0.06785"]]
+WQ = [["0", "0", "0.00053"], ["0", "0.81459", "0.00308"], ["0.00053", "0.00308", "0.00343"]]
+PRINTED_THREE = [
+    ["0.2", "-0.41*x1", "-0.01"],
+    ["-0.41*x1", "0.81*x1**2 + 0.22", "0.01*x1 - 0.01"],
+    ["-0.01", "0.01*x1 - 0.01", "0.07*x1 + 0.22"],
+]
+F_THREE = ("-x1 + x3", "x1**2 - 2*x1*x3 - x2 + x3", "-x2")
+BOX_THREE = ((Fraction(-1, 10), Fraction(1, 10)),) * 3
+
+W_TWO = [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]
+PRINTED_TWO = [["4.26", "-0.93"], ["-0.93", "3.77"]]
+F_TWO = ("-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2")
+BOX_TWO = ((Fraction(-6), Fraction(6)),) * 2
+
+
+def polynomial_three() -> list[list[str]]:
+    """W of the three-state system as texts."""
+    return [[f"{WC[i][j]} + ({WL[i][j]})*x1 + ({WQ[i][j]})*x1**2" for j in range(3)] for i in range(3)]
+
+
+def matrix_of(rows: Sequence[Sequence[str]], names: Sequence[str]) -> tuple[tuple[Any, ...], ...]:
+    symbols = {name: symbol(name) for name in names}
+    return tuple(tuple(parse(e, symbols=symbols).expression for e in row) for row in rows)
+
+
+def three_state(
+    W: Any = None, rate: str = "0.9999", f: Sequence[str] = F_THREE, B: Any = None
+) -> ControlAffineModel:
+    t = symbol("t")
+    return ControlAffineModel(
+        states=THREE,
+        inputs=("u",),
+        f=matrix_of([f], THREE)[0],
+        B=matrix_of(B or [["0"], ["0"], ["1"]], THREE),
+        W=matrix_of(polynomial_three() if W is None else W, THREE),
+        rate=Fraction(rate),
+        h=(constant(Fraction(1, 10)) * sin(2 * t),),
+    )
+
+
+def two_state(W: Any = None, rate: str = "1.74") -> ControlAffineModel:
+    t, x1, x2 = symbol("t"), symbol("x1"), symbol("x2")
+    return ControlAffineModel(
+        states=TWO,
+        inputs=("u",),
+        f=matrix_of([F_TWO], TWO)[0],
+        B=matrix_of([["0.5"], ["-2"]], TWO),
+        W=matrix_of(W_TWO if W is None else W, TWO),
+        rate=Fraction(rate),
+        h=(-2 * sin(2 * t) - constant(Fraction(1, 10)) * norm([x1, x2]),),
+    )
+
+
+def scaled(rows: Sequence[Sequence[str]], factor: str) -> list[list[str]]:
+    return [[f"{factor}*({e})" for e in row] for row in rows]
+
+
+def resting() -> Plan:
+    """The three-state system at the origin."""
+    return constant_plan([Fraction(0)] * 3, [Fraction(0)], None)
+
+
+def moving() -> Plan:
+    """A plan of the two-state system that goes around for 5 s (it does not satisfy the dynamics)."""
+    t = symbol("t")
+    return Plan((2 * cos(t), -2 * sin(t) + constant(Fraction(1, 2)) * cos(2 * t)), (3 * sin(t),), Fraction(5))
+
+
+# -- independent formulas: `q` turns a decimal text into the number type ------------------------------------------
+
+
+def three_forms(x: Sequence[Any], q: Any) -> dict[str, Any]:
+    """f, f_x, W, dW/dx_1 and F_0 = -d_f W + f_x W + W f_x' of the three-state system, written out by hand."""
+    x1, x2, x3 = x
+    f = [x3 - x1, x1 * x1 - 2 * x1 * x3 - x2 + x3, -x2]
+    one, zero = q("1"), q("0")
+    f_x = [[-one, zero, one], [2 * x1 - 2 * x3, -one, one - 2 * x1], [zero, -one, zero]]
+    W = [[q(WC[i][j]) + q(WL[i][j]) * x1 + q(WQ[i][j]) * x1 * x1 for j in range(3)] for i in range(3)]
+    W_1 = [[q(WL[i][j]) + 2 * q(WQ[i][j]) * x1 for j in range(3)] for i in range(3)]
+    product = times(f_x, W)
+    F0 = [[product[i][j] + product[j][i] - f[0] * W_1[i][j] for j in range(3)] for i in range(3)]
+    return {"f": f, "f_x": f_x, "W": W, "W_1": W_1, "F0": F0}
+
+
+def two_forms(x: Sequence[Any], q: Any) -> dict[str, Any]:
+    """f, f_x and F_0 of the two-state system, written out by hand."""
+    x1, x2 = x
+    f = [2 * x2 - x1, 4 * x2 - 3 * x1 - q("0.25") * x2 * x2 * x2]
+    f_x = [[q("-1"), q("2")], [q("-3"), q("4") - q("0.75") * x2 * x2]]
+    W = [[q(e) for e in row] for row in W_TWO]
+    product = times(f_x, W)
+    F0 = [[product[i][j] + product[j][i] for j in range(2)] for i in range(2)]
+    return {"f": f, "f_x": f_x, "W": W, "F0": F0}
+
+
+def times(a: Rows, b: Rows) -> Rows:
+    return [[sum(a[i][k] * b[k][j] for k in range(len(b))) for j in range(len(b[0]))] for i in range(len(a))]
