@@ -96,7 +96,7 @@ def test_the_parser_without_c_agrees(path: Path, monkeypatch: pytest.MonkeyPatch
 def test_every_code_is_met_and_explained() -> None:
     met = {match[0] for path in BAD for match in EXPECT.findall(path.read_text())}
     assert met <= set(CODES)
-    assert set(CODES) - met == {"TC100"}
+    assert not set(CODES) - met
 
 
 # values

@@ -30,6 +30,7 @@ from tubecert.certificate.sections import (
     floor_text,
     metric_data,
     pair_data,
+    plan_data,
     witness_data,
 )
 from tubecert.conditions.kernels import Kernel
@@ -50,6 +51,7 @@ from tubecert.search.rates import search_26
 from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
+from tubecert.trajectory.make import Room, plan_of
 from tubecert.tube import Tube
 
 Result = dict[str, Any]
@@ -125,11 +127,7 @@ class _Certification:
     def __init__(self, spec: Spec, options: Options, time: Range | None, progress: Progress | None) -> None:
         self.spec, self.options, self.time = spec, options, time
         self.model: ControlAffineModel = build(spec)
-        self.plan = Plan(
-            tuple(term.expression for term in spec.trajectory.x),
-            tuple(term.expression for term in spec.trajectory.u),
-            spec.trajectory.horizon,
-        )
+        self.plan: Plan
         self.progress = progress
         self.effort = Effort(gap=float(options.gap), budget=options.budget)
         text = canonical(spec)
@@ -141,7 +139,7 @@ class _Certification:
                 "file_hash": "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
             },
             "overrides": _overrides(options),
-            "plan": {"kind": spec.trajectory.kind, "interpolation": "exact"},
+            "plan": {"kind": spec.trajectory.kind},
             "safe_set": {
                 name: [decimal_data(low), decimal_data(high)]
                 for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
@@ -155,6 +153,7 @@ class _Certification:
     def run(self) -> Result:
         """Every claim in its order; the first that fails decides."""
         if self._rank() and self._metric():
+            self._plan()
             radius = self._radius()
             if radius is not None:
                 self._conditions(radius)
@@ -176,7 +175,25 @@ class _Certification:
         if proof.verdict != "certified":
             at = proof.at if proof.verdict == "refuted" else None
             return self._stop(f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof))
+        self._lower = proof.lower_on_set
         return self._declared_metric(proof)
+
+    def _plan(self) -> None:
+        """The plan; what is planned here is refined until its defect costs next to nothing of the least tube."""
+        tube = self.spec.tube
+        assert tube.epsilon is not None
+        assert tube.rho_a is not None
+        assert self._lower is not None
+        room = Room(rho=tube.epsilon + tube.rho_a, lower=self._lower.below, effort=self.effort)
+        report = None
+        if self.progress is not None:
+            show = self.progress
+
+            def report(name: str, count: int, value: float) -> None:
+                show(Step(name=name, boxes=count, below=value, above=value))
+
+        self.plan = plan_of(self.spec, self.model, room, report)
+        self.result["plan"] = plan_data(self.spec, self.plan)
 
     def _relax_metric(self, proof: MetricProof) -> str:
         if proof.verdict == "undecided" and proof.condition != "C3":

@@ -21,6 +21,7 @@ from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, down, up
 from tubecert.enclosure.objective import Estimate, scalar
 from tubecert.model import TIME
+from tubecert.spec import Knots
 from tubecert.trajectory import Plan
 
 _WINDOWS = 64
@@ -161,6 +162,8 @@ def containment(
     effort: Effort,
 ) -> Containment:
     """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
+    if not plan.defined:
+        return _knots_outside(plan.knots, radius, states, safe_set)
     undecided: Containment | None = None
     worst: Containment | None = None
     for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
@@ -171,8 +174,8 @@ def containment(
                 t = 0.0
             else:
                 fine = Effort(gap=0.0, absolute=1e-7 * float(highest - lowest), budget=effort.budget)
-                found = supremum(scalar(sign * exact), BoxDomain(plan.time), fine)
-                low, high, t = Fraction(found.below), Fraction(found.above), found.at.get(TIME, 0.0)
+                found = supremum(scalar(sign * exact, plan.fixed), plan.domain, fine)
+                low, high, t = Fraction(found.below), Fraction(found.above), plan.moment(found.at) or 0.0
             if high + radius <= limit:
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))
@@ -191,3 +194,31 @@ def containment(
             elif case.verdict == "undecided":
                 undecided = case
     return worst or undecided or Containment(verdict="certified")
+
+
+def _knots_outside(
+    knots: Knots | None,
+    radius: Fraction,
+    states: tuple[str, ...],
+    safe_set: tuple[tuple[Fraction, Fraction], ...],
+) -> Containment:
+    """The knot that is farthest from being allowed, for a curve whose slopes are not defined everywhere.
+
+    Inside the safe set they are, so that a knot outside is to be expected.
+    """
+    worst = Containment(verdict="undecided", excess=0.0)
+    for t, x in zip(knots.t, knots.x, strict=True) if knots else ():
+        for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
+            for side, sign, excess in (("upper", 1, x[i] - highest), ("lower", -1, lowest - x[i])):
+                if excess + radius > worst.excess:
+                    place = [float(value) for value in x]
+                    place[i] += sign * float(radius)
+                    worst = Containment(
+                        verdict="refuted",
+                        state=name,
+                        side=side,
+                        t=float(t),
+                        x=tuple(place),
+                        excess=float(excess + radius),
+                    )
+    return worst

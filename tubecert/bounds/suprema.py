@@ -33,15 +33,15 @@ from tubecert.expression import (
     constant,
     derivatives,
     free_symbols,
-    is_zero,
     rebuild,
     substitute,
     symbol,
     topological,
 )
-from tubecert.expression.matrix import Matrix, column, identity, jacobian, multiply, transpose
+from tubecert.expression.matrix import Matrix, column, identity, jacobian, multiply
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.trajectory import Plan
+from tubecert.trajectory.defect import Defect
 from tubecert.tube import Tube
 
 _SEGMENT_PIECES = 512
@@ -93,7 +93,9 @@ class Suprema:
     def norms(self, name: str, matrices: list[Matrix]) -> Constant:
         """sup over the tube of the sum of spectral norms."""
         objective = SumOfNorms(matrices)
-        return Constant.exactly(0.0) if objective.is_zero else self._constant(self._over_tube(name, objective))
+        return (
+            Constant.exactly(0.0) if objective.is_zero else self._constant(self._over_tube(name, objective))
+        )
 
     def drift_on_plan(self) -> Constant:
         """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
@@ -104,7 +106,7 @@ class Suprema:
 
     def input_on_plan(self) -> Constant:
         """Dus = sup_t |u*(t)|."""
-        return self._on_plan("u_star", SumOfNorms([column(self.plan.u)]))
+        return self._on_plan("u_star", SumOfNorms([column(self.plan.u)], self.plan.fixed))
 
     # -- uncertainty -------------------------------------------------------------------------------------------
 
@@ -123,7 +125,11 @@ class Suprema:
         """|h(0, x0)|."""
         values = {TIME: ZERO, **{name: constant(q) for name, q in zip(self.model.states, x0, strict=True)}}
         start = SumOfNorms([column(substitute(self._h(), values))])
-        return Constant.exactly(0.0) if start.is_zero else self._constant(supremum(start, BoxDomain({}), self.effort))
+        return (
+            Constant.exactly(0.0)
+            if start.is_zero
+            else self._constant(supremum(start, BoxDomain({}), self.effort))
+        )
 
     def _h(self) -> tuple[Expression, ...]:
         if self.model.h is None:
@@ -165,36 +171,31 @@ class Suprema:
     def metric_input_gain(self) -> Constant:
         """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan."""
         on = self.plan.on
-        objective = Pencil(on(self.model, self.model.BBt), [on(self.model, self.model.W)])
+        objective = Pencil(
+            on(self.model, self.model.BBt), [on(self.model, self.model.W)], fixed=self.plan.fixed
+        )
         return self._root(self._search_plan("metric_input_gain", objective))
 
     def plan_defect(self) -> tuple[Constant, Constant]:
-        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*.
-
-        They matter against rate times rho: what is a millionth of that is not refined further.
-        """
-        p = column([ZERO if is_zero(row[0]) is True else row[0] for row in self.plan.defect(self.model)])
-        if all(row[0] is ZERO for row in p):
+        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
+        defect = replace(Defect.of(self.plan, self.model, self.rho, self.effort), search=self._run)
+        if defect.vanishes:
             return Constant.exactly(0.0), Constant.exactly(0.0)
-        small = 1e-6 * float(self.model.rate) * self.rho
-        W = self.plan.on(self.model, self.model.W)
-        stretch = self._search_plan("plan_defect_metric", Pencil(identity(len(p)), [W]))
-        delta_p = self._search_plan("plan_defect", SumOfNorms([p]), replace(self.effort, absolute=small))
-        rough = replace(self.effort, absolute=small**2 * stretch.above)
-        delta = self._search_plan("plan_defect_metric", Pencil(multiply(p, transpose(p)), [W]), rough)
-        return self._constant(delta_p), self._root(delta)
+        return self._constant(defect.in_state()), self._constant(defect.in_metric())
 
     def initial_distance(self, x0: tuple[Fraction, ...]) -> Constant:
         """d0: the length of the straight segment from x*(0) to x0, an upper bound of their Riemannian distance.
 
         The segment is cut into pieces; on each, delta' M delta lies between its least and largest value.
         """
-        start = substitute(self.plan.x, {TIME: ZERO})
+        start = self.plan.start
         delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
         if all(d is ZERO for d in delta):
             return Constant.exactly(0.0)
         s = symbol("s")
-        along = dict(zip(self.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True))
+        along = dict(
+            zip(self.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True)
+        )
         edges = np.linspace(0.0, 1.0, _SEGMENT_PIECES + 1)
         function = MatrixFunction([_replace(self.model.W, along), column(delta), ((s,),)])
         with np.errstate(all="ignore"):
@@ -207,7 +208,7 @@ class Suprema:
 
     def initial_offset(self, x0: tuple[Fraction, ...]) -> Interval:
         """|x0* - x0|."""
-        start = substitute(self.plan.x, {TIME: ZERO})
+        start = self.plan.start
         delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
         if all(d is ZERO for d in delta):
             return Interval(0.0)
@@ -243,10 +244,12 @@ class Suprema:
         return self._run(name, objective, tube, effort or self.effort)
 
     def _search_plan(self, name: str, objective: Objective, effort: Effort | None = None) -> Supremum:
-        return self._run(name, objective, BoxDomain(self.plan.time), effort or self.effort)
+        return self._run(name, objective, self.plan.domain, effort or self.effort)
 
     def _on_plan(self, name: str, objective: SumOfNorms) -> Constant:
-        return Constant.exactly(0.0) if objective.is_zero else self._constant(self._search_plan(name, objective))
+        return (
+            Constant.exactly(0.0) if objective.is_zero else self._constant(self._search_plan(name, objective))
+        )
 
     def _run(self, name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
         if self.report is not None:
@@ -263,7 +266,7 @@ class Suprema:
 
     def _witness(self, found: Supremum) -> Witness:
         """Where the value was found; states that do not matter are taken from the plan."""
-        t = found.at.get(TIME)
+        t = self.plan.moment(found.at)
         moment = np.array([0.0 if t is None else t])
         centre, _ = self.plan.enclose(moment, moment)
         x = tuple(float(found.at.get(name, centre.mid[0, i])) for i, name in enumerate(self.model.states))

@@ -11,10 +11,12 @@ from typing import Any
 
 from tubecert.bounds.constants import Constant, Meaning, Witness
 from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
+from tubecert.trajectory import Plan
 
 Result = dict[str, Any]
 
@@ -59,6 +61,31 @@ def metric_data(spec: Spec, proof: MetricProof) -> Result:
     for name in ("margin", "largest_rate", "lower_on_set", "upper_on_set"):
         if (value := getattr(proof, name)) is not None:
             data[name] = pair_data(value.printable())
+    return data
+
+
+def plan_data(spec: Spec, plan: Plan) -> Result:
+    """The plan as it was certified: `exact` expressions, or every knot with the rule that fills the gaps.
+
+    Between knots x* is the cubic with the slopes f(x*) + B(x*) u* at its ends.
+    """
+    trajectory = spec.trajectory
+    knots = plan.knots
+    if knots is None:
+        return {"kind": trajectory.kind, "interpolation": "exact"}
+    data: Result = {
+        "kind": trajectory.kind,
+        "interpolation": knots.interpolation,
+        "knots": {
+            "t": [number_text(t) for t in knots.t],
+            **{
+                name: [[number_text(value) for value in row] for row in rows]
+                for name, rows in (("x", knots.x), ("u", knots.u))
+            },
+        },
+    }
+    if trajectory.table is not None:
+        data |= {"file": trajectory.table.file, "file_hash": f"sha256:{trajectory.table.sha256}"}
     return data
 
 

@@ -8,6 +8,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `document` | YAML events -> a tree that knows where each node stands |
 | `reader` | a cursor that answers with values or findings |
 | `names`, `system`, `plan`, `settings` | the sections of the file |
+| `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `load` | puts the sections together |
 | `canonical` | the effective specification as plain data |
@@ -21,9 +22,13 @@ from tubecert.spec.types import (
     Adaptation,
     Bounds,
     Expectation,
+    Interpolation,
+    Knots,
     Matrix,
     Metric,
     Spec,
+    Table,
+    Task,
     Term,
     TermMatrix,
     Trajectory,
@@ -37,9 +42,13 @@ __all__ = [
     "Adaptation",
     "Bounds",
     "Expectation",
+    "Interpolation",
+    "Knots",
     "Matrix",
     "Metric",
     "Spec",
+    "Table",
+    "Task",
     "Term",
     "TermMatrix",
     "Trajectory",

@@ -27,6 +27,18 @@ def is_positive_definite(matrix: Matrix) -> bool:
     return True
 
 
+def is_positive_semidefinite(matrix: Matrix) -> bool:
+    """Whether a symmetric matrix is positive semidefinite: no pivot is negative, and a zero one has a zero row."""
+    rows = [list(row) for row in matrix]
+    for k, row in enumerate(rows):
+        if row[k] < 0 or (row[k] == 0 and any(row[k:])):
+            return False
+        for below in rows[k + 1 :] if row[k] else []:
+            ratio = below[k] / row[k]
+            below[k:] = [b - ratio * r for b, r in zip(below[k:], row[k:], strict=True)]
+    return True
+
+
 def rank(matrix: Sequence[Sequence[Fraction]]) -> int:
     """Rank over the rationals."""
     rows, found = [list(row) for row in matrix], 0

@@ -12,7 +12,7 @@ from typing import Any
 
 from tubecert.expression import number_text, to_text
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Matrix, Spec, Term
+from tubecert.spec.types import Matrix, Spec, Task, Term
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -63,12 +63,33 @@ def _uncertainty(spec: Spec) -> dict[str, Any]:
 
 def _trajectory(spec: Spec) -> dict[str, Any]:
     plan = spec.trajectory
+    if plan.table is not None:
+        knots = plan.table.knots
+        shown = {"kind": plan.kind, "file": plan.table.file, "interpolation": knots.interpolation}
+        return {**shown, **_given(horizon=plan.horizon)}
+    if plan.task is not None:
+        return _task(plan.task, plan.horizon)
     x, u = ("at", "input") if plan.kind == "equilibrium" else ("x", "u")
     return {"kind": plan.kind, x: _texts(plan.x), u: _texts(plan.u), **_given(horizon=plan.horizon)}
 
 
+def _task(task: Task, horizon: Fraction | None) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "kind": "ilqr",
+        "start": _numbers(task.start),
+        "target": _numbers(task.target),
+        "knots": str(task.knots),
+        "Q": _matrix(task.Q),
+        "R": _matrix(task.R),
+        "goal": "true" if task.goal else "false",
+        "interpolation": task.interpolation,
+        **_given(horizon=horizon),
+    }
+    return data if task.input is None else {**data, "input": _numbers(task.input)}
+
+
 def _metric(spec: Spec) -> dict[str, Any]:
-    assert spec.metric is not None  # noqa: S101
+    assert spec.metric is not None
     data: dict[str, Any] = {
         "dual_metric": [_texts(row) for row in spec.metric.dual_metric],
         "rate": number_text(spec.metric.rate),

@@ -23,6 +23,8 @@ YAML_FEATURE: Final = "TC114"
 RANK: Final = "TC115"
 SYMMETRY: Final = "TC116"
 STABILITY: Final = "TC117"
+PLAN_COLUMNS: Final = "TC118"
+PLAN_TIMES: Final = "TC119"
 
 CODES: Final[Mapping[str, str]] = {
     UNREADABLE: "the file cannot be read",
@@ -43,4 +45,6 @@ CODES: Final[Mapping[str, str]] = {
     RANK: "the input matrix B has dependent columns everywhere",
     SYMMETRY: "the dual metric is not symmetric",
     STABILITY: "the predictor matrix A_m does not suit P = I",
+    PLAN_COLUMNS: "a plan file is not a table of t, the states and the inputs",
+    PLAN_TIMES: "the times of a plan file do not increase from 0 to the horizon",
 }

@@ -13,7 +13,7 @@ from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
-from tubecert.spec.plan import read_initial_state, read_trajectory
+from tubecert.spec.plan import completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import MAX_FINDINGS, Field, Reader, root_field
 from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
 from tubecert.spec.source import Source, check_limits, read_source
@@ -97,6 +97,7 @@ def _read_named(
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
     x0 = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    plan = completed(plan, x0) if plan else None
     metric = read_metric(entries["metric"], names) if "metric" in entries else None
     tube = read_tube(entries.get("tube"), names)
     adaptation = read_adaptation(entries.get("adaptation"), names)

@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
+from typing import Final
 
 from tubecert.expression import ZERO, constant, substitute, to_text
 from tubecert.spec import codes
+from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Term, Trajectory, Vector
+from tubecert.spec.table import read_table
+from tubecert.spec.types import Interpolation, Matrix, Task, Term, Trajectory, Vector
 
-KINDS = ("equilibrium", "expressions")
-LATER_KINDS = ("csv", "ilqr")
+KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr")
+MAX_KNOTS: Final = 2_001
+
+_KNOTS: Final = 101
 
 
 def read_trajectory(field: Field, names: Names) -> Trajectory | None:
-    """The plan."""
+    """The plan; what a planner's start is by default is not known yet (see `completed`)."""
+    readers = {"equilibrium": _equilibrium, "expressions": _expressions, "csv": _csv, "ilqr": _ilqr}
     kind = _kind(field)
-    if kind == "equilibrium":
-        return _equilibrium(field, names)
-    if kind == "expressions":
-        return _expressions(field, names)
-    return None
+    return readers[kind](field, names) if kind else None
 
 
 def _kind(field: Field) -> str | None:
-    pairs = field.pairs("with a kind: equilibrium or expressions")
+    pairs = field.pairs(f"with a kind: {' or '.join(KINDS)}")
     if pairs is None:
         return None
     kind = next((field.child(key, node) for key, node in pairs if key.text == "kind"), None)
     if kind is None:
         field.fail(codes.MISSING_KEY, "trajectory lacks kind", f"add kind: {' or '.join(KINDS)}")
         return None
-    return kind.word(KINDS, LATER_KINDS)
+    return kind.word(KINDS)
 
 
 def _equilibrium(field: Field, names: Names) -> Trajectory | None:
@@ -63,6 +66,103 @@ def _expressions(field: Field, names: Names) -> Trajectory | None:
     if x is None or u is None or horizon is None:
         return None
     return Trajectory(kind="expressions", x=x, u=u, horizon=horizon)
+
+
+def _csv(field: Field, names: Names) -> Trajectory | None:
+    entries = field.mapping(required=("kind", "file"), optional=("interpolation", "horizon"))
+    if entries is None:
+        return None
+    interpolation, sound = _interpolation(entries.get("interpolation"), "linear")
+    horizon, readable = _horizon(entries.get("horizon"), names)
+    table = read_table(entries["file"], names, interpolation) if "file" in entries else None
+    if table is None or not sound or not readable:
+        return None
+    last = table.knots.t[-1]
+    if horizon is not None and horizon > last:
+        help = f"give a horizon of at most {to_text(constant(last))}, or leave it out"
+        entries["horizon"].fail(codes.RANGE, "the horizon lies beyond the plan's last time", help)
+        return None
+    return Trajectory(kind="csv", horizon=last if horizon is None else horizon, table=table)
+
+
+def _ilqr(field: Field, names: Names) -> Trajectory | None:
+    optional = ("start", "input", "knots", "Q", "R", "goal", "interpolation")
+    entries = field.mapping(required=("kind", "target", "horizon"), optional=optional)
+    if entries is None:
+        return None
+    before = len(field.reader.findings)
+    n, m = len(names.states), len(names.inputs)
+    points = {
+        key: entries[key].numbers(count, names.values) if key in entries else None
+        for key, count in (("target", n), ("start", n), ("input", m))
+    }
+    horizon, _ = _horizon(entries.get("horizon"), names)
+    knots = _count(entries.get("knots"), names)
+    Q = _weight(entries.get("Q"), n, names, definite=False)
+    R = _weight(entries.get("R"), m, names, definite=True)
+    goal = entries["goal"].word(("true", "false")) if "goal" in entries else "true"
+    interpolation, _ = _interpolation(entries.get("interpolation"), "hold")
+    target = points["target"]
+    if len(field.reader.findings) > before or target is None or horizon is None or not (knots and Q and R):
+        return None
+    task = Task(
+        start=points["start"] or (),
+        target=target,
+        input=points["input"],
+        knots=knots,
+        Q=Q,
+        R=R,
+        goal=goal == "true",
+        interpolation=interpolation,
+    )
+    return Trajectory(kind="ilqr", horizon=horizon, task=task)
+
+
+def completed(plan: Trajectory, x0: Vector | None) -> Trajectory | None:
+    """The plan with the start that a planner takes if none is given: the initial state."""
+    if plan.task is None or plan.task.start:
+        return plan
+    if x0 is None:
+        return None
+    return replace(plan, task=replace(plan.task, start=x0))
+
+
+def _interpolation(field: Field | None, default: Interpolation) -> tuple[Interpolation, bool]:
+    """What u does between knots, and whether what is written is sound."""
+    if field is None:
+        return default, True
+    word = field.word(("hold", "linear"))
+    return ("hold" if word == "hold" else "linear"), word is not None
+
+
+def _count(field: Field | None, names: Names) -> int | None:
+    if field is None:
+        return _KNOTS
+    value = field.number(names.values, least=2, most=MAX_KNOTS)
+    if value is None or value.denominator == 1:
+        return None if value is None else int(value)
+    field.fail(codes.RANGE, f"{field.path} must be a whole number")
+    return None
+
+
+def _weight(field: Field | None, n: int, names: Names, *, definite: bool) -> Matrix | None:
+    """A weight of the planner's cost; by default the identity."""
+    if field is None:
+        return tuple(tuple(Fraction(i == j) for j in range(n)) for i in range(n))
+    weight = field.matrix(n, names.values)
+    if weight is None:
+        return None
+    symmetric = all(weight[i][j] == weight[j][i] for i in range(n) for j in range(i))
+    sound = is_positive_definite(weight) if definite else is_positive_semidefinite(weight)
+    if symmetric and sound:
+        return weight
+    word = "positive definite" if definite else "positive semidefinite"
+    field.fail(
+        codes.RANGE,
+        f"{field.path} must be symmetric and {word}",
+        "write one positive number, which stands for a multiple of the identity",
+    )
+    return None
 
 
 def _horizon(field: Field | None, names: Names) -> tuple[Fraction | None, bool]:
@@ -99,6 +199,13 @@ def read_initial_state(
 
 def _start(field: Field, plan: Trajectory) -> Vector | None:
     """x*(0), if it is rational."""
+    if plan.table is not None:
+        return plan.table.knots.x[0]
+    if plan.task is not None:
+        if not plan.task.start:
+            message = "the planner needs a start"
+            field.fail(codes.MISSING_KEY, message, "add initial_state: {at: [...]}, or trajectory.start")
+        return plan.task.start or None
     start = []
     for term in plan.x:
         try:

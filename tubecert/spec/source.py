@@ -70,19 +70,25 @@ def _displayed(line: str) -> str:
 
 def read_source(path: str) -> Source:
     """The file's text; raises `TargetError` if it cannot be read, `SpecError` if it breaks a limit."""
+    return decoded(path, read_bytes(path, "give the path of a specification (a YAML file)"))
+
+
+def read_bytes(path: str, help: str, limit: int = MAX_BYTES) -> bytes:
+    """The file's bytes, `limit` of them at most."""
     try:
         with open(path, "rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(limit + 1)
     except (OSError, ValueError) as error:
         reason = (getattr(error, "strerror", None) or str(error)).lower()
-        finding = Finding(
-            code=codes.UNREADABLE,
-            message=f"cannot read {path!r}: {reason}",
-            help="give the path of a specification (a YAML file)",
-        )
+        finding = Finding(code=codes.UNREADABLE, message=f"cannot read {path!r}: {reason}", help=help)
         raise TargetError([finding]) from None
-    if len(data) > MAX_BYTES:
-        _refuse(Source.of(path, ""), 0, codes.LIMIT, f"the file is larger than {MAX_BYTES:,} bytes")
+    if len(data) > limit:
+        _refuse(Source.of(path, ""), 0, codes.LIMIT, f"the file is larger than {limit:,} bytes")
+    return data
+
+
+def decoded(path: str, data: bytes) -> Source:
+    """The bytes as text."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

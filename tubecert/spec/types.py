@@ -12,6 +12,7 @@ from tubecert.findings import Location
 
 Vector = tuple[Fraction, ...]
 Matrix = tuple[Vector, ...]
+Interpolation = Literal["hold", "linear"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +26,7 @@ class Term:
     location: Location = field(repr=False)
 
     def __post_init__(self) -> None:
-        assert len(self.obligations) == len(self.places)  # noqa: S101
+        assert len(self.obligations) == len(self.places)
 
     def owed(self) -> Iterator[tuple[Obligation, Location]]:
         """The obligations with where each stands."""
@@ -52,17 +53,71 @@ class Uncertainty:
     bounds: Bounds | None
 
     def __post_init__(self) -> None:
-        assert self.h is not None or self.bounds is not None  # noqa: S101
+        assert self.h is not None or self.bounds is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knots:
+    """A curve by its values: `t` (K) in s from 0 on, `x` (K, n), `u` (K, m), all exact.
+
+    u is held from each knot to the next, or linear between them.
+    """
+
+    t: Vector
+    x: Matrix
+    u: Matrix
+    interpolation: Interpolation
+
+    def __post_init__(self) -> None:
+        assert len(self.t) == len(self.x) == len(self.u) >= 2
+        assert self.t[0] == 0
+        assert all(a < b for a, b in zip(self.t, self.t[1:], strict=False))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A plan file: its name as written, the hash of its bytes, and its knots."""
+
+    file: str
+    sha256: str
+    knots: Knots = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What the built-in planner is asked for.
+
+    It minimises the integral of (x - target)' Q (x - target) + (u - input)' R (u - input) from `start`, with `knots`
+    knots over the horizon, and ends in `target` if that is the `goal`. `input` None: what best holds the target.
+    """
+
+    start: Vector
+    target: Vector
+    input: Vector | None
+    knots: int
+    Q: Matrix
+    R: Matrix
+    goal: bool
+    interpolation: Interpolation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
-    """The plan: x (n) and u (m) as expressions of t (constants for an equilibrium), horizon in s."""
+    """The plan: horizon in s, and what its kind needs.
 
-    kind: Literal["equilibrium", "expressions"]
-    x: tuple[Term, ...]
-    u: tuple[Term, ...]
+    x (n) and u (m) are expressions of t (constants for an equilibrium); csv has a `table`, ilqr a `task` instead.
+    """
+
+    kind: Literal["equilibrium", "expressions", "csv", "ilqr"]
+    x: tuple[Term, ...] = ()
+    u: tuple[Term, ...] = ()
     horizon: Fraction | None
+    table: Table | None = None
+    task: Task | None = None
+
+    def __post_init__(self) -> None:
+        assert (self.table is not None) == (self.kind == "csv")
+        assert (self.task is not None) == (self.kind == "ilqr")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,8 +185,8 @@ class Spec:
 
     def __post_init__(self) -> None:
         n, m = len(self.states), len(self.inputs)
-        assert len(self.f) == len(self.B) == len(self.safe_set) == len(self.x0) == n  # noqa: S101
-        assert all(len(row) == m for row in self.B)  # noqa: S101
+        assert len(self.f) == len(self.B) == len(self.safe_set) == len(self.x0) == n
+        assert all(len(row) == m for row in self.B)
 
     def location(self, path: str) -> Location | None:
         """Where the value of `path` stands, or the nearest enclosing key that is in the file."""

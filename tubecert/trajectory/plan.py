@@ -1,24 +1,35 @@
-"""Plans: the curve x*(t), its input u*(t), and how far it is from satisfying the dynamics.
+"""A plan as expressions of t, and what every plan can be asked.
 
-In: the trajectory of a specification. Out: a `Plan` that encloses itself over any window of time. The defect
-p = x*' - f(x*) - B(x*) u* is exact, as expressions of t. Trusted: yes.
+A plan is a set of expressions in variables of its own: here t, in a piecewise plan the time within a piece and the
+coefficients of the piece. `domain` is where these variables live: a supremum along any plan is a search over it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 
-from tubecert.enclosure.domain import Range
+from tubecert.enclosure.branch_and_bound import Domain
+from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import Expression, constant, derivatives, free_symbols, substitute
+from tubecert.expression import (
+    ZERO,
+    Expression,
+    constant,
+    derivatives,
+    free_symbols,
+    is_zero,
+    substitute,
+    symbol,
+)
 from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.model import TIME, ControlAffineModel
+from tubecert.spec import Knots
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,40 @@ class Plan:
         return {TIME: (Fraction(0), self.horizon)}
 
     @cached_property
+    def start(self) -> tuple[Expression, ...]:
+        """x*(0), free of variables."""
+        return tuple(substitute(self.x, {TIME: ZERO}))
+
+    @cached_property
+    def slope(self) -> tuple[Expression, ...]:
+        """x*' in the variables of the plan."""
+        return tuple(derivatives(self.x, TIME))
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Where the variables of the plan live."""
+        return BoxDomain(self.time)
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Variables that are data, known up to a rounding."""
+        return frozenset()
+
+    @property
+    def defined(self) -> bool:
+        """Whether the curve is known everywhere."""
+        return True
+
+    @property
+    def knots(self) -> Knots | None:
+        """The exact knots that the curve is given by, if it is."""
+        return None
+
+    def moment(self, at: Mapping[str, float]) -> float | None:
+        """The time at a point of the domain; None if time does not matter there."""
+        return at.get(TIME)
+
+    @cached_property
     def _tapes(self) -> tuple[Tape, Tape]:
         both = [*self.x, *self.u]
         return Tape(both, (TIME,)), Tape(derivatives(both, TIME), (TIME,))
@@ -65,22 +110,26 @@ class Plan:
         return both[:, :n], both[:, n:]
 
     def on(self, model: ControlAffineModel, rows: Matrix) -> Matrix:
-        """A matrix of the model's expressions evaluated along the plan: expressions of t."""
+        """A matrix of the model's expressions along the plan: expressions in the variables of the plan."""
         values = dict(zip((*model.states, *model.inputs), (*self.x, *self.u), strict=True))
         width = len(rows[0])
         flat = substitute([e for row in rows for e in row], values)
         return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
 
     def defect(self, model: ControlAffineModel) -> Matrix:
-        """p(t) = x*' - f(x*) - B(x*) u*, (n, 1)."""
-        drift = self.on(model, combine(1, column(model.f), 1, multiply(model.B, column(inputs(model)))))
-        return combine(1, column(derivatives(self.x, TIME)), -1, drift)
+        """p = x*' - f(x*) - B(x*) u*, (n, 1); entries that are proven to vanish are the constant 0."""
+        p = missing(self, model)
+        return column([ZERO if is_zero(row[0]) is True else row[0] for row in p])
+
+
+def missing(plan: Plan, model: ControlAffineModel) -> Matrix:
+    """x*' - f(x*) - B(x*) u*, (n, 1)."""
+    drift = combine(1, column(model.f), 1, multiply(model.B, column(inputs(model))))
+    return combine(1, column(plan.slope), -1, plan.on(model, drift))
 
 
 def inputs(model: ControlAffineModel) -> list[Expression]:
     """The input names as symbols, standing for u*."""
-    from tubecert.expression import symbol
-
     return [symbol(name) for name in model.inputs]
 
 

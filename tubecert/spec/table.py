@@ -1,0 +1,206 @@
+"""A plan file (CSV): text -> exact knots, or every problem of the file as located findings.
+
+The first line names the columns: t, every state and every input, in any order. Each further line is a knot; times
+begin at 0 and increase. Numbers are read exactly from their text.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Final
+
+from tubecert.errors import TubecertError
+from tubecert.expression import ExpressionError, parse_number, suggestion
+from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
+from tubecert.findings import Finding
+from tubecert.spec import codes
+from tubecert.spec.names import TIME, Names
+from tubecert.spec.reader import Field
+from tubecert.spec.source import Mark, Source, decoded, read_bytes
+from tubecert.spec.types import Interpolation, Knots, Table
+
+MAX_FILE: Final = 10_000_000
+MAX_ROWS: Final = 10_001
+
+_DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?", re.ASCII)
+_ENOUGH: Final = 20  # findings of one file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Cell:
+    """A cell's text without its surroundings, and where it stands in its line."""
+
+    text: str
+    line: int
+    column: int
+
+
+@dataclass(slots=True, kw_only=True)
+class _Sheet:
+    """A file being read, and what is wrong with it."""
+
+    source: Source
+    findings: list[Finding] = field(default_factory=list)
+
+    def fail(self, cell: _Cell, code: str, message: str, help: str = "") -> None:
+        """Adds a finding at a cell."""
+        mark = Mark(line=cell.line, column=cell.column)
+        location = self.source.location(mark, len(cell.text))
+        self.findings.append(Finding(code=code, message=message, location=location, help=help))
+
+
+def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Table | None:
+    """The plan file that a specification names, relative to the specification's own folder."""
+    name = entry.text("the name of a CSV file")
+    if name is None:
+        return None
+    path = Path(entry.reader.source.file).parent / name
+    try:
+        data = read_bytes(str(path), "", MAX_FILE)
+        sheet = _Sheet(source=decoded(str(path), data))
+    except TubecertError as error:
+        _forward(entry, error)
+        return None
+    knots = _read(sheet, names, interpolation)
+    entry.reader.findings.extend(sheet.findings)
+    if knots is None or sheet.findings:
+        return None
+    return Table(file=name, sha256=hashlib.sha256(data).hexdigest(), knots=knots)
+
+
+def _forward(entry: Field, error: TubecertError) -> None:
+    """What is wrong with the file as a whole: located in it if it could be read, else where it is named."""
+    for finding in error.findings:
+        if finding.location is not None:
+            entry.reader.findings.append(finding)
+        else:
+            entry.fail(
+                finding.code, finding.message, "the name is relative to the folder of the specification"
+            )
+
+
+def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | None:
+    rows = _rows(sheet.source)
+    header = next(rows, None)
+    if header is None:
+        message = "the plan file is empty"
+        sheet.fail(_Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(names))
+        return None
+    columns = _columns(sheet, header, names)
+    if columns is None:
+        return None
+    values: list[list[Fraction]] = []
+    for row in rows:
+        if len(values) == MAX_ROWS:
+            sheet.fail(row[0], codes.LIMIT, f"a plan has at most {MAX_ROWS:,} rows", "give every second knot")
+            return None
+        numbers = _numbers(sheet, row, len(header))
+        if numbers is not None:
+            _check_time(
+                sheet, row[columns[0]], numbers[columns[0]], [line[columns[0]] for line in values[-1:]]
+            )
+            values.append(numbers)
+        if len(sheet.findings) >= _ENOUGH:
+            return None
+    if sheet.findings:
+        return None
+    if len(values) < 2:
+        last = header[0] if not values else _Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+        sheet.fail(last, codes.PLAN_TIMES, f"a plan needs 2 rows or more below its header, not {len(values)}")
+        return None
+    n = len(names.states)
+    return Knots(
+        t=tuple(row[columns[0]] for row in values),
+        x=tuple(tuple(row[c] for c in columns[1 : n + 1]) for row in values),
+        u=tuple(tuple(row[c] for c in columns[n + 1 :]) for row in values),
+        interpolation=interpolation,
+    )
+
+
+def _rows(source: Source) -> Iterator[list[_Cell]]:
+    """The cells of every line that is not blank."""
+    for number, line in enumerate(source.lines):
+        if line.strip():
+            yield list(_cells(line, number))
+
+
+def _cells(line: str, number: int) -> Iterator[_Cell]:
+    start = 0
+    for part in line.split(","):
+        text = part.strip()
+        column = start + len(part) - len(part.lstrip())
+        if len(text) >= 2 and text[0] == text[-1] == '"':
+            text, column = text[1:-1].strip(), column + 1
+        yield _Cell(text=text, line=number, column=min(column, len(line)))
+        start += len(part) + 1
+
+
+def _columns(sheet: _Sheet, header: list[_Cell], names: Names) -> list[int] | None:
+    """Where t, the states and the inputs stand."""
+    wanted = (TIME, *names.states, *names.inputs)
+    place: dict[str, int] = {}
+    if header[0].text.startswith("#"):  # as numpy.savetxt writes it
+        bare = header[0].text.lstrip("# \t")
+        moved = header[0].column + len(header[0].text) - len(bare)
+        header[0] = _Cell(text=bare, line=header[0].line, column=moved)
+    for index, cell in enumerate(header):
+        if cell.text in place:
+            sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
+        elif cell.text not in wanted:
+            help = suggestion(cell.text, wanted, what="columns")
+            if len(header) == 1 and re.search(r"[;\t ]", cell.text):
+                help = "separate columns by commas"
+            sheet.fail(
+                cell, codes.PLAN_COLUMNS, f"{cell.text[:60]!r} is neither t nor a state nor an input", help
+            )
+        else:
+            place[cell.text] = index
+    missing = [name for name in wanted if name not in place]
+    if missing and not sheet.findings:
+        message = f"the plan file lacks {'a column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
+        sheet.fail(header[0], codes.PLAN_COLUMNS, message, _wanted(names))
+    return None if sheet.findings else [place[name] for name in wanted]
+
+
+def _wanted(names: Names) -> str:
+    return f"the first line names the columns: {','.join((TIME, *names.states, *names.inputs))}"
+
+
+def _numbers(sheet: _Sheet, row: list[_Cell], width: int) -> list[Fraction] | None:
+    """The numbers of a row; another number of cells than in the header is a finding."""
+    if len(row) != width:
+        count = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+        where = row[-1] if len(row) < width else row[width]
+        sheet.fail(where, codes.PLAN_COLUMNS, f"the row has {count}; the header names {width} columns")
+        return None
+    numbers = [_number(sheet, cell) for cell in row]
+    kept = [number for number in numbers if number is not None]
+    return kept if len(kept) == width else None
+
+
+def _number(sheet: _Sheet, cell: _Cell) -> Fraction | None:
+    match = _DECIMAL.fullmatch(cell.text)
+    if match and len(cell.text) <= MAX_NUMBER_LENGTH and abs(int(match[1] or 0)) <= MAX_NUMBER_EXPONENT:
+        return Fraction(cell.text)
+    code, message, help = codes.NUMBER, f"{cell.text[:40]!r} is not a decimal number", ""
+    try:
+        parse_number(cell.text)
+    except ExpressionError as error:
+        code = codes.LIMIT if error.kind == "limit" else codes.NUMBER
+        message, help = error.message, error.help
+    sheet.fail(cell, code, message, help)
+    return None
+
+
+def _check_time(sheet: _Sheet, cell: _Cell, t: Fraction, before: list[Fraction]) -> None:
+    """Times begin at 0 and increase."""
+    if not before and t != 0:
+        sheet.fail(cell, codes.PLAN_TIMES, f"the plan begins at t = {cell.text}, not at 0", "shift the times")
+    elif before and t <= before[0]:
+        message = f"t = {cell.text} does not lie after the time before it"
+        sheet.fail(cell, codes.PLAN_TIMES, message, "times must increase from row to row")

@@ -1,0 +1,18 @@
+"""Plans: the curve x*(t), its input u*(t), and how far it is from satisfying the dynamics.
+
+In: the trajectory of a specification. Out: a `Plan` that encloses itself over any window of time, with a proven bound
+of its defect p = x*' - f(x*) - B(x*) u*. Trusted: yes, but for the planner.
+
+| module | what it does | trusted |
+|---|---|---|
+| `plan` | a plan as expressions of t: what every plan can be asked | yes |
+| `pieces`, `hermite` | a plan through knots: cubic Hermite pieces, and their data as intervals | yes |
+| `defect` | sup |p| and sup |Theta(x*) p| | yes |
+| `make` | specification -> plan; sub-knots until the defect is negligible | yes |
+| `rollout`, `ilqr` | dynamics in floats, and the planner: they only propose knots | no |
+| `cache` | the planner's inputs, kept between runs | no |
+"""
+
+from tubecert.trajectory.plan import Plan, constant_plan, inputs
+
+__all__ = ["Plan", "constant_plan", "inputs"]

@@ -1,0 +1,72 @@
+"""How far a plan is from satisfying the dynamics, proven over its whole horizon.
+
+Implements: delta_p = sup |p| and delta = sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u* (theory, sections 3 and 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.metric_norm import MetricNorm
+from tubecert.enclosure.objective import Objective, Pencil, SumOfNorms
+from tubecert.expression import ZERO
+from tubecert.expression.matrix import Matrix, identity
+from tubecert.model import ControlAffineModel
+from tubecert.trajectory.plan import Plan
+
+Search = Callable[[str, Objective, Domain, Effort], Supremum]
+_NEGLIGIBLE = 1e-6
+
+
+def plain_search(name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
+    """The supremum, without any report of progress."""
+    del name
+    return supremum(objective, domain, effort)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Defect:
+    """The defect p of a plan, (n, 1), to be bounded for a tube of radius `rho`.
+
+    It matters against rate times rho: what is a millionth of that is not refined further.
+    """
+
+    p: Matrix
+    plan: Plan
+    model: ControlAffineModel
+    rho: float
+    effort: Effort
+    search: Search = plain_search
+
+    @classmethod
+    def of(cls, plan: Plan, model: ControlAffineModel, rho: float, effort: Effort) -> Defect:
+        """The defect of a plan."""
+        return cls(p=plan.defect(model), plan=plan, model=model, rho=rho, effort=effort)
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether the plan satisfies the dynamics exactly."""
+        return all(row[0] is ZERO for row in self.p)
+
+    def in_state(self) -> Supremum:
+        """delta_p."""
+        small = replace(self.effort, absolute=self._negligible)
+        return self.search("plan_defect", SumOfNorms([self.p], self.plan.fixed), self.plan.domain, small)
+
+    def in_metric(self) -> Supremum:
+        """Delta; negligible is what is negligible for |p|, in the units of the metric."""
+        W, fixed, domain = self.plan.on(self.model, self.model.W), self.plan.fixed, self.plan.domain
+        name, eye = "plan_defect_metric", identity(len(self.p))
+        stretch = self.search(name, Pencil(eye, [W], fixed=fixed), domain, self.effort)
+        absolute = self._negligible * float(np.sqrt(max(stretch.below, 0.0)))
+        return self.search(
+            name, MetricNorm(self.p, W, fixed), domain, replace(self.effort, absolute=absolute)
+        )
+
+    @property
+    def _negligible(self) -> float:
+        return _NEGLIGIBLE * float(self.model.rate) * self.rho
