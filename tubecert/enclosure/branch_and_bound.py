@@ -197,14 +197,14 @@ class _Search:
         caused = np.concatenate([estimate.caused, extra], axis=1)
         spread = np.concatenate([estimate.spread, extra], axis=1)
         # where nothing is known yet, every variable is split in turn: NaN and inf would choose one for ever
-        known = (caused < _UNKNOWN).all(axis=1) & (spread < _UNKNOWN).all(axis=1)
+        known = np.all((caused < _UNKNOWN) & (spread < _UNKNOWN), axis=1, keepdims=True)
         share = np.where(self.extent > 0, (hi - lo) / np.where(self.extent > 0, self.extent, 1.0), 0.0)
         share[:, self.own :] = 0.0
         return Estimate(
             estimate.upper,
             np.concatenate([estimate.corner, middle], axis=1),
-            np.where(known[:, None], caused, share),
-            np.where(known[:, None], spread, share),
+            np.where(known, caused, share),
+            np.where(known, spread, share),
         )
 
     def _settle(self, bound: Array) -> None:
