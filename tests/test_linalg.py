@@ -314,6 +314,30 @@ def test_false_enclosures_would_be_noticed(seed):
     assert not all(holds(v, found.lo[0, k] + 1e-3, found.hi[0, k] + 1e-3) for k, v in enumerate(exact))
 
 
+@pytest.mark.parametrize("name", ["congruence", "product"])
+def test_forgotten_roundings_are_noticed(name, monkeypatch):
+    monkeypatch.setattr(linalg, "_gamma", lambda k: 0.0)
+    honest = {"congruence": exact_congruence, "product": exact_product}[name]
+    assert sum(not honest(seed) for seed in range(20)) > 10
+
+
+def exact_congruence(seed):
+    rng = np.random.default_rng(seed)
+    t, s = rng.standard_normal((3, 3)), symmetric(seed, "plain", 3)
+    return covers(balls(t) * balls(s) * balls(t).transpose(), *congruence(t, s, np.zeros_like(s)))
+
+
+def exact_product(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.standard_normal((3, 3)), rng.standard_normal((3, 3))
+    return covers(balls(a) * balls(b), *product((a, np.zeros_like(a)), (b, np.zeros_like(b))))
+
+
+def covers(exact, mid, rad):
+    places = np.ndindex(mid.shape)
+    return all(abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j])) for i, j in places)
+
+
 def test_thin_matrices_have_thin_norms():
     found = spectral_norm_midrad(np.array([[[3.0], [4.0]]]), np.zeros((1, 2, 1)))
     assert found.lo[0] <= 5 <= found.hi[0]

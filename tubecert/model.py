@@ -205,7 +205,9 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
         return None
     if not rational and not of_pi:
         return Interval(0.0)
-    frequencies = rational or of_pi
+    frequencies = [q for q in rational or of_pi if q]
+    if not frequencies:
+        return Interval(1.0)  # t occurs, as in sin((t + 1) - t), but changes nothing
     common = Fraction(
         reduce(gcd, (q.numerator for q in frequencies)), reduce(lcm, (q.denominator for q in frequencies))
     )
