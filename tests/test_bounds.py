@@ -12,6 +12,7 @@ from systems import moving, polynomial_three, resting, scaled, three_forms, thre
 from systems import two_state as two_state_model
 
 from tubecert.bounds.compute import bound_constants, least_radius, time_range
+from tubecert.bounds.start import KnownStart
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import graph, symbol
@@ -167,9 +168,9 @@ def three():
     model = build(spec)
     suprema = Suprema(model, resting(), 1.0, time_range(None, time_period(model.h)), EFFORT)
     width = spec.tube.epsilon + spec.tube.rho_a
-    radius = least_radius(suprema, spec.safe_set, suprema.initial_offset(spec.x0), width, None)
+    radius = least_radius(suprema, spec.safe_set, KnownStart(spec.x0).offset(suprema), width, None)
     suprema = suprema.with_radius(radius.rho)
-    return suprema, bound_constants(suprema, spec.x0, (radius.lower, radius.upper), {}), radius, spec
+    return suprema, bound_constants(suprema, KnownStart(spec.x0), (radius.lower, radius.upper), {}), radius, spec
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +244,7 @@ def two_samples(rho, rate):
 def constants_of_two(model=None, rho=RHO_TWO, effort=EFFORT):
     model = model or two_state_model()
     suprema = Suprema(model, moving(), rho, time_range(Fraction(5), time_period(model.h)), effort)
-    return bound_constants(suprema, X0_TWO, suprema.metric_bounds(), {})
+    return bound_constants(suprema, KnownStart(X0_TWO), suprema.metric_bounds(), {})
 
 
 @pytest.fixture(scope="module")
@@ -361,7 +362,7 @@ def test_the_radius_is_a_proven_fixed_point_and_nearly_the_least(three):
 def test_a_tube_that_does_not_fit_has_no_constants(three):
     suprema, _, _, spec = three
     narrow = ((Fraction(-1, 50), Fraction(1, 50)),) * 3
-    found = least_radius(suprema, narrow, suprema.initial_offset(spec.x0), Fraction(1, 50), None)
+    found = least_radius(suprema, narrow, KnownStart(spec.x0).offset(suprema), Fraction(1, 50), None)
     assert found.contained.verdict == "refuted"
     assert found.lower is None
 
@@ -377,7 +378,7 @@ def test_scaling_the_metric_scales_every_constant_as_theory_says(three, factor):
     suprema, plain, _, spec = three
     model = three_state(scaled(polynomial_three(), factor))
     other = replace(suprema, model=model)
-    found = bound_constants(other, spec.x0, other.metric_bounds(), {})
+    found = bound_constants(other, KnownStart(spec.x0), other.metric_bounds(), {})
     for name, constant, _ in plain.items():
         scale = float(factor) ** POWERS.get(name, 0)
         changed = getattr(found, name)
@@ -412,7 +413,7 @@ def test_permuted_states_have_the_same_constants(three):
         h=m.h,
     )
     other = replace(suprema, model=model)
-    found = bound_constants(other, tuple(spec.x0[i] for i in order), other.metric_bounds(), {})
+    found = bound_constants(other, KnownStart(tuple(spec.x0[i] for i in order)), other.metric_bounds(), {})
     for name, constant, _ in plain.items():
         changed = getattr(found, name)
         assert changed.below <= constant.above * (1 + 1e-12)

@@ -303,3 +303,20 @@ def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
     assert result["reasons"][0]["claim"] == "rank of B"
     x = result["reasons"][0]["at"]["x"]
     assert x[0] + x[1] == pytest.approx(0.05, abs=1e-6)
+
+
+def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_the_ball(three):
+    around = run(edited(THREE, ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01732050808}")))  # |x0| of the point
+    assert around["verdict"] == "certified"
+    assert around["spec"]["effective"]["initial_state"] == {"within": "0.01732050808"}
+    assert around["tube"]["rho"] == pytest.approx(three["tube"]["rho"], rel=1e-6)
+    d0, point = around["constants"]["initial_distance"], three["constants"]["initial_distance"]
+    assert point["above"] <= d0["above"] == pytest.approx(0.01732050808 * around["metric"]["upper"][1] ** 0.5, rel=1e-6)
+    assert around["conditions_26"]["bandwidth"] > three["conditions_26"]["bandwidth"]  # E0 is larger
+
+
+def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
+    text = edited(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}"))
+    result = run(text, conditions="distance")
+    assert result["constants"]["h_initial"]["below"] <= 0.01 <= result["constants"]["h_initial"]["above"] * (1 + 1e-9)
+    assert result["constants"]["h_initial"]["above"] <= 0.0101

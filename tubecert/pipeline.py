@@ -16,6 +16,7 @@ from typing import Any
 
 from tubecert.bounds.compute import Radius, bound_constants, least_radius, time_range
 from tubecert.bounds.constants import DERIVED, BoundConstants, Constant, Witness
+from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
 from tubecert.certificate.reasons import reasons_26, reasons_distance, reasons_sampled
@@ -48,6 +49,7 @@ from tubecert.model import TIME, ControlAffineModel, build, domain_findings, pla
 from tubecert.search.distance import search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.rates import search_26
+from tubecert.search.results import recipe_json
 from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
@@ -128,6 +130,8 @@ class _Certification:
         self.spec, self.options, self.time = spec, options, time
         self.model: ControlAffineModel = build(spec)
         self.plan: Plan
+        within = spec.within
+        self.start: InitialState = KnownStart(spec.x0) if within is None else StartWithin(within)
         self.progress = progress
         self.effort = Effort(gap=float(options.gap), budget=options.budget)
         text = canonical(spec)
@@ -247,7 +251,7 @@ class _Certification:
         declared = declared_metric(self.spec)
         width = tube.epsilon + tube.rho_a
         radius = least_radius(
-            suprema, self.spec.safe_set, suprema.initial_offset(self.spec.x0), width, declared
+            suprema, self.spec.safe_set, self.start.offset(suprema), width, declared
         )
         contained = radius.contained
         if contained.verdict == "certified":
@@ -270,7 +274,7 @@ class _Certification:
         assert radius.upper is not None
         suprema = self._suprema().with_radius(radius.rho)
         declared = declared_uncertainty(self.spec)
-        constants = bound_constants(suprema, self.spec.x0, (radius.lower, radius.upper), declared)
+        constants = bound_constants(suprema, self.start, (radius.lower, radius.upper), declared)
         self.result["metric"] |= {"lower": pair_data(constants.lower), "upper": pair_data(constants.upper)}
         self.result["constants"] = {name: constant_data(value, meaning) for name, value, meaning in constants.items()}
         if not (self._finite(constants) and self._declared_holds(suprema, declared)):
@@ -321,7 +325,7 @@ class _Certification:
             rho_a=tube.rho_a,
             rho_r=rho - tube.rho_a,
             rho=rho,
-            initial_offset=suprema.initial_offset(self.spec.x0),
+            initial_offset=self.start.offset(suprema),
             horizon=self.spec.trajectory.horizon,
             states=len(self.spec.states),
             A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
@@ -391,6 +395,12 @@ class _Certification:
             "distance": distance.to_dict(),
             "sampled": sampled.to_dict(),
             "elasticities": slopes,
+        }
+        pairs = {"conditions_26": rates.pair, "distance": distance.decisive, "sampled": sampled.pair}
+        self.result["proof"] = {
+            name: recipe_json(pair.recipe)
+            for name, pair in pairs.items()
+            if pair is not None and self.result[name]["verdict"] == "certified"
         }
         every = self.options.conditions == "all"
         chosen = list(CONDITIONS.values()) if every else [CONDITIONS[self.options.conditions]]

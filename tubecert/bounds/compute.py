@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.interval import Interval, sqrt
@@ -68,7 +69,7 @@ def least_radius(
 
 def bound_constants(
     suprema: Suprema,
-    x0: tuple[Fraction, ...],
+    start: InitialState,
     metric: tuple[Constant, Constant],
     declared: Mapping[str, Constant],
 ) -> BoundConstants:
@@ -82,7 +83,7 @@ def bound_constants(
     derived: dict[str, Constant] = {}
     if model.h is not None:
         derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
-        derived["h_initial"] = suprema.initial_uncertainty(x0)
+        derived["h_initial"] = start.uncertainty(suprema)
     delta_p, delta = suprema.plan_defect()
     constants = BoundConstants(
         lower=metric[0],
@@ -100,7 +101,7 @@ def bound_constants(
         feedback_gain=suprema.feedback_gain(),
         metric_input_gain=suprema.metric_input_gain(),
         drift_on_plan=suprema.drift_on_plan(),
-        initial_distance=suprema.initial_distance(x0),
+        initial_distance=start.distance(suprema, metric),
         plan_defect=delta_p,
         plan_defect_metric=delta,
         input_gain_least=suprema.input_gain_least(),

@@ -14,9 +14,8 @@ import numpy as np
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import ClosedFormGain
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
-from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
-from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
 from tubecert.enclosure.objective import (
     LeastInputGain,
     Lipschitz,
@@ -25,12 +24,10 @@ from tubecert.enclosure.objective import (
     SumOfNorms,
     SumOfPencils,
 )
-from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import (
     ONE,
     ZERO,
     Expression,
-    constant,
     derivatives,
     free_symbols,
     rebuild,
@@ -44,7 +41,6 @@ from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
 from tubecert.tube import Tube
 
-_SEGMENT_PIECES = 512
 MU = "mu#"  # no state can have this name
 Report = Callable[[str, int, float, float], None]
 
@@ -101,7 +97,7 @@ class Suprema:
         """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
         drift = self.model.drift_on_plan()
         if self.plan.is_constant:
-            drift = _replace(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
+            drift = substituted(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
         return self.norms("drift_on_plan", [drift])
 
     def input_on_plan(self) -> Constant:
@@ -112,7 +108,7 @@ class Suprema:
 
     def uncertainty(self) -> tuple[Constant, Constant, Constant]:
         """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks."""
-        h = self._h()
+        h = self.h
         by_time = derivatives(h, TIME)
         states = set(self.model.states)
         if not free_symbols(h) & states:
@@ -121,17 +117,9 @@ class Suprema:
             lipschitz = self._constant(self._over_tube("h_x", _lipschitz(h, self.model.states)))
         return self.norms("h", [column(h)]), lipschitz, self.norms("h_t", [column(by_time)])
 
-    def initial_uncertainty(self, x0: tuple[Fraction, ...]) -> Constant:
-        """|h(0, x0)|."""
-        values = {TIME: ZERO, **{name: constant(q) for name, q in zip(self.model.states, x0, strict=True)}}
-        start = SumOfNorms([column(substitute(self._h(), values))])
-        return (
-            Constant.exactly(0.0)
-            if start.is_zero
-            else self._constant(supremum(start, BoxDomain({}), self.effort))
-        )
-
-    def _h(self) -> tuple[Expression, ...]:
+    @property
+    def h(self) -> tuple[Expression, ...]:
+        """The uncertainty as expressions; raises `ValueError` if it is declared by bounds only."""
         if self.model.h is None:
             raise ValueError("h is declared by bounds, not by expressions")
         return self.model.h
@@ -182,38 +170,6 @@ class Suprema:
         if defect.vanishes:
             return Constant.exactly(0.0), Constant.exactly(0.0)
         return self._constant(defect.in_state()), self._constant(defect.in_metric())
-
-    def initial_distance(self, x0: tuple[Fraction, ...]) -> Constant:
-        """d0: the length of the straight segment from x*(0) to x0, an upper bound of their Riemannian distance.
-
-        The segment is cut into pieces; on each, delta' M delta lies between its least and largest value.
-        """
-        start = self.plan.start
-        delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
-        if all(d is ZERO for d in delta):
-            return Constant.exactly(0.0)
-        s = symbol("s")
-        along = dict(
-            zip(self.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True)
-        )
-        edges = np.linspace(0.0, 1.0, _SEGMENT_PIECES + 1)
-        function = MatrixFunction([_replace(self.model.W, along), column(delta), ((s,),)])
-        with np.errstate(all="ignore"):
-            speed = _speed(function, edges[:-1, None], edges[1:, None])
-        widths = np.diff(edges)
-        return Constant(
-            below=float((speed.lo * widths).sum() * (1 - 1e-13)),
-            above=float((speed.hi * widths).sum() * (1 + 1e-13)),
-        )
-
-    def initial_offset(self, x0: tuple[Fraction, ...]) -> Interval:
-        """|x0* - x0|."""
-        start = self.plan.start
-        delta = [constant(q) - s for q, s in zip(x0, start, strict=True)]
-        if all(d is ZERO for d in delta):
-            return Interval(0.0)
-        found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), self.effort)
-        return Interval(found.below, found.above)
 
     def half_widths(self) -> tuple[Constant, ...]:
         """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
@@ -279,25 +235,11 @@ def _mu_weights(lo: Array, hi: Array) -> tuple[Array, Array]:
     return inverse, lo[:, 0]
 
 
-def _replace(rows: Matrix, values: dict[str, Expression]) -> Matrix:
+def substituted(rows: Matrix, values: dict[str, Expression]) -> Matrix:
+    """A matrix with variables replaced."""
     width = len(rows[0])
     flat = substitute([e for row in rows for e in row], values)
     return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
-
-
-def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
-    """sqrt(delta' M delta) over pieces of the segment: |T delta|^2 over the eigenvalues of T W T', T any matrix."""
-    w, delta, _ = function.at(lo, hi)
-    mid, rad = midrad(w)
-    t = whitening(mid)
-    scaled = eigenvalues_midrad(*congruence(t, mid, rad))
-    total = Interval(np.zeros(len(lo)))
-    for i in range(t.shape[-2]):
-        entry = Interval(np.zeros(len(lo)))
-        for j in range(t.shape[-1]):
-            entry = entry + delta[:, j, 0] * t[:, i, j]
-        total = total + entry**2
-    return sqrt(total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])).sanitised()
 
 
 def _lipschitz(h: tuple[Expression, ...], states: tuple[str, ...]) -> Lipschitz:
@@ -316,6 +258,6 @@ def _lipschitz(h: tuple[Expression, ...], states: tuple[str, ...]) -> Lipschitz:
     names = list(back)
     levels = []
     for depth, entries in enumerate([*arguments, tuple(plain[e] for e in h)]):
-        gains = [_replace(column(derivatives(entries, name)), back) for name in names[:depth]]
-        levels.append((_replace(jacobian(entries, states), back), gains))
+        gains = [substituted(column(derivatives(entries, name)), back) for name in names[:depth]]
+        levels.append((substituted(jacobian(entries, states), back), gains))
     return Lipschitz(jacobian(h, states), levels)

@@ -24,7 +24,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
         "safe_set": {name: _numbers(side) for name, side in zip(spec.states, spec.safe_set, strict=True)},
         "uncertainty": _uncertainty(spec),
         "trajectory": _trajectory(spec),
-        "initial_state": {"at": _numbers(spec.x0)},
+        "initial_state": _given(within=spec.within) if spec.within is not None else {"at": _numbers(spec.x0)},
         "tube": _given(epsilon=spec.tube.epsilon, rho_a=spec.tube.rho_a),
         "adaptation": {
             "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),

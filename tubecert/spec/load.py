@@ -96,7 +96,7 @@ def _read_named(
     uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
-    x0 = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    x0, within = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     plan = completed(plan, x0) if plan else None
     metric = read_metric(entries["metric"], names) if "metric" in entries else None
     tube = read_tube(entries.get("tube"), names)
@@ -121,6 +121,7 @@ def _read_named(
         uncertainty=uncertainty,
         trajectory=plan,
         x0=x0,
+        within=within,
         metric=metric,
         tube=tube,
         adaptation=adaptation,

@@ -187,14 +187,21 @@ def _constant_term(field: Field, value: Fraction) -> Term:
 
 def read_initial_state(
     field: Field | None, trajectory: Field | None, plan: Trajectory | None, names: Names
-) -> Vector | None:
-    """The initial state; by default the start of the plan."""
+) -> tuple[Vector | None, Fraction | None]:
+    """The initial state, by default the start of the plan; or that start and the radius around it that is allowed."""
     if field is None:
-        return _start(trajectory, plan) if trajectory and plan else None
-    entries = field.mapping(required=("at",), reserved=("within",))
-    if entries is None or "at" not in entries:
-        return None
-    return entries["at"].numbers(len(names.states), names.values)
+        return _start(trajectory, plan) if trajectory and plan else None, None
+    entries = field.mapping(optional=("at", "within"))
+    if entries is None:
+        return None, None
+    if len(entries) != 1:
+        message = "the initial state is either a point or a radius around the plan's start"
+        field.fail(codes.MISSING_KEY, message, "write at: [...], or within: r")
+        return None, None
+    if "at" in entries:
+        return entries["at"].numbers(len(names.states), names.values), None
+    radius = entries["within"].number(names.values, above=0)
+    return _start(trajectory, plan) if trajectory and plan else None, radius
 
 
 def _start(field: Field, plan: Trajectory) -> Vector | None:

@@ -176,6 +176,7 @@ class Spec:
     uncertainty: Uncertainty
     trajectory: Trajectory
     x0: Vector
+    within: Fraction | None  # instead of x0: any start this near to the plan's
     metric: Metric | None
     tube: Tube
     adaptation: Adaptation

@@ -1,0 +1,136 @@
+"""Where the state may start: at a point, or anywhere within a radius of the plan's start.
+
+Either answers with |x*(0) - x(0)|, with d0 (any upper bound of the Riemannian distance), and with a bound of
+|h(0, x(0))|.
+Implements: d0 and H0 of theory section 4. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Protocol
+
+import numpy as np
+
+from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.enclosure.branch_and_bound import supremum
+from tubecert.enclosure.constant import Constant
+from tubecert.enclosure.domain import BoxDomain
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
+from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
+from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.taylor import MatrixFunction
+from tubecert.expression import ZERO, Expression, constant, substitute, symbol
+from tubecert.expression.matrix import column
+from tubecert.model import TIME
+from tubecert.trajectory import Plan
+
+_PIECES = 512
+
+
+class InitialState(Protocol):
+    """What the certificates need to know about x(0)."""
+
+    def offset(self, suprema: Suprema) -> Interval:
+        """|x*(0) - x(0)|, at most its upper end."""
+        ...
+
+    def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
+        """d0, given (a, A) over the tube."""
+        ...
+
+    def uncertainty(self, suprema: Suprema) -> Constant:
+        """H0, a bound of |h(0, x(0))|."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class KnownStart:
+    """x(0) is the point `x0`, shape (n,)."""
+
+    x0: tuple[Fraction, ...]
+
+    def offset(self, suprema: Suprema) -> Interval:
+        """|x*(0) - x(0)|."""
+        delta = self._delta(suprema.plan.start)
+        if all(d is ZERO for d in delta):
+            return Interval(0.0)
+        found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), suprema.effort)
+        return Interval(found.below, found.above)
+
+    def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
+        """The length of the straight segment from x*(0) to x0.
+
+        The segment is cut into pieces; on each, delta' M delta lies between its least and largest value.
+        """
+        start = suprema.plan.start
+        delta = self._delta(start)
+        if all(d is ZERO for d in delta):
+            return Constant.exactly(0.0)
+        s = symbol("s")
+        along = dict(zip(suprema.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True))
+        edges = np.linspace(0.0, 1.0, _PIECES + 1)
+        function = MatrixFunction([substituted(suprema.model.W, along), column(delta), ((s,),)])
+        with np.errstate(all="ignore"):
+            speed = _speed(function, edges[:-1, None], edges[1:, None])
+        widths = np.diff(edges)
+        return Constant(
+            below=float((speed.lo * widths).sum() * (1 - 1e-13)),
+            above=float((speed.hi * widths).sum() * (1 + 1e-13)),
+        )
+
+    def uncertainty(self, suprema: Suprema) -> Constant:
+        """|h(0, x0)|."""
+        states = zip(suprema.model.states, map(constant, self.x0), strict=True)
+        start = SumOfNorms([column(substitute(suprema.h, {TIME: ZERO, **dict(states)}))])
+        if start.is_zero:
+            return Constant.exactly(0.0)
+        found = supremum(start, BoxDomain({}), suprema.effort)
+        return Constant(below=found.below, above=found.above)
+
+    def _delta(self, start: Sequence[Expression]) -> list[Expression]:
+        return [constant(q) - s for q, s in zip(self.x0, start, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class StartWithin:
+    """x(0) is any point with |x*(0) - x(0)| <= `radius`."""
+
+    radius: Fraction
+
+    def offset(self, suprema: Suprema) -> Interval:
+        """The radius."""
+        del suprema
+        return Interval.of(self.radius)
+
+    def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
+        """sqrt(A) times the radius: the segment lies in the tube."""
+        del suprema
+        a, A = metric
+        least = sqrt(Interval(a.below)) * Interval.of(self.radius)
+        most = sqrt(Interval(A.above)) * Interval.of(self.radius)
+        return Constant(below=float(least.lo), above=float(most.hi))
+
+    def uncertainty(self, suprema: Suprema) -> Constant:
+        """sup |h(0, x)| over the ball of starts."""
+        still = Plan(tuple(suprema.plan.start), tuple(ZERO for _ in suprema.model.inputs), None)
+        radius = fraction_bounds(self.radius)[1]
+        ball = replace(suprema, plan=still, rho=radius, time=(Fraction(0), Fraction(0)))
+        return ball.norms("h_initial", [column(suprema.h)])
+
+
+def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
+    """sqrt(delta' M delta) over pieces of the segment: |T delta|^2 over the eigenvalues of T W T', T any matrix."""
+    w, delta, _ = function.at(lo, hi)
+    mid, rad = midrad(w)
+    t = whitening(mid)
+    scaled = eigenvalues_midrad(*congruence(t, mid, rad))
+    total = Interval(np.zeros(len(lo)))
+    for i in range(t.shape[-2]):
+        entry = Interval(np.zeros(len(lo)))
+        for j in range(t.shape[-1]):
+            entry = entry + delta[:, j, 0] * t[:, i, j]
+        total = total + entry**2
+    return sqrt(total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])).sanitised()
