@@ -4,7 +4,7 @@ With G >= |Gamma(x)| and L >= |dGamma(x)| over O(rho), as multilinear maps betwe
     G rho + L rho^2/8 < 1
 makes the geodesic of length below dbar = sqrt(a) rho from x*(t) to any state unique, free of conjugate points,
 and hence the minimiser. In: a model and the tube as a domain. Out: the value of the test, proven on both sides.
-Implements: (T7) of docs/theory. Trusted: yes.
+Implements: theory (5.1) and (5.2). Trusted: yes.
 
 From W alone: with M = W^-1, W_i = dW/dx_i and D_i = W_i M, S_i = M W_i M, the symbols are
     Gamma^k_ij = (-(D_i)_kj - (D_j)_ki + sum_l W_kl (S_l)_ij)/2,

@@ -55,6 +55,7 @@ class RatePair:
             "bandwidth": _gain(self.recipe.bandwidth),
             "adaptation_rate": _gain(self.recipe.adaptation_rate),
             "predictor_gain": _gain(self.recipe.predictor_gain),
+            "projection_radius": _gain(self.recipe.projection_radius),
             "margins": {claim: margin_json(margin) for claim, margin in self.margins.items()},
         }
 
@@ -73,6 +74,7 @@ class DistancePair:
             "bandwidth": _gain(self.recipe.bandwidth),
             "adaptation_rate": _gain(self.recipe.adaptation_rate),
             "predictor_gain": _gain(self.recipe.predictor_gain),
+            "projection_radius": _gain(self.recipe.projection_radius),
             "margin": margin_json(self.margin),
             "ultimate_radius": self.ultimate_radius,
         }
@@ -92,6 +94,7 @@ class SampledPair:
             "sample_time": _gain(self.recipe.sample_time),
             "bandwidth": _gain(self.recipe.bandwidth),
             "predictor_gain": _gain(self.recipe.predictor_gain),
+            "projection_radius": _gain(self.recipe.projection_radius),
             "margin": margin_json(self.margin),
             "ultimate_radius": self.ultimate_radius,
         }
@@ -133,6 +136,7 @@ class Conditions26:
             "A_m": None if self.A_m is None else [[_gain(x) for x in row] for row in self.A_m],
             "P": None if self.A_m is None else [[float(i == j) for j in range(n)] for i in range(n)],
             "Q": None if Q is None else [[_gain(x) for x in row] for row in Q],
+            "projection_radius": pair and pair["projection_radius"],
             "margins": pair and pair["margins"],
             "ultimate_radius": self.pair and self.pair.ultimate_radius,
             "least_adaptation": self.least_adaptation and self.least_adaptation.to_dict(),
@@ -202,7 +206,8 @@ class SampledResult:
     def to_dict(self) -> Json:
         """The section `sampled` of the certificate."""
         pair: Json = dict.fromkeys(
-            ("sample_time", "bandwidth", "predictor_gain", "margin", "ultimate_radius"), None
+            ("sample_time", "bandwidth", "predictor_gain", "projection_radius", "margin", "ultimate_radius"),
+            None,
         )
         return {
             "verdict": str(self.verdict),
