@@ -1,0 +1,449 @@
+"""Plans through knots: what their enclosures contain, how their defect is bounded, and what a plan file may say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tubecert.certificate import exit_code
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.metric_norm import MetricNorm
+from tubecert.errors import SpecError
+from tubecert.expression import constant, cos, sin, symbol
+from tubecert.model import ControlAffineModel
+from tubecert.pipeline import Options, certify
+from tubecert.spec import Knots, load, load_text
+from tubecert.spec.table import MAX_ROWS
+from tubecert.trajectory.defect import Defect
+from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.tube import containment
+
+x, y = symbol("x"), symbol("y")
+EYE = ((constant(1), constant(0)), (constant(0), constant(1)))
+POLYNOMIAL = ControlAffineModel(
+    states=("x", "y"),
+    inputs=("u",),
+    f=(2 * y - x, -(y**3) / 4 - 3 * x + 4 * y),
+    B=((constant(Fraction(1, 2)),), (constant(-2),)),
+    W=EYE,
+    rate=Fraction(1),
+    h=None,
+)
+SWINGING = replace(
+    POLYNOMIAL,
+    f=(y, -sin(x) - y / 10),
+    B=((constant(0),), (1 + cos(x) ** 2,)),
+    W=((2 + sin(x), constant(0)), EYE[1]),
+)
+
+
+def knots(interpolation="hold"):
+    """Five rough knots at uneven times that are no floats."""
+    t = [Fraction(n, 10) for n in (0, 3, 4, 11, 13)]
+    rows = [("1", "-0.5"), ("0.7", "0.1"), ("0.9", "0.3"), ("-0.2", "0.4"), ("-0.3", "-0.1")]
+    u = ("0.3", "-1.1", "2", "-0.7", "0.4")
+    return Knots(
+        t=tuple(t),
+        x=tuple(tuple(map(Fraction, row)) for row in rows),
+        u=tuple((Fraction(v),) for v in u),
+        interpolation=interpolation,
+    )
+
+
+def one_sided(data: Knots, k: int, t: Fraction):
+    """x*, x*' and u* on piece k of the plan of `POLYNOMIAL`, exactly, by the Hermite basis."""
+
+    def rate(p, q):
+        return (2 * p[1] - p[0] + q / 2, -(p[1] ** 3) / 4 - 3 * p[0] + 4 * p[1] - 2 * q)
+
+    h = data.t[k + 1] - data.t[k]
+    s = (t - data.t[k]) / h
+    left, right = data.u[k][0], data.u[k if data.interpolation == "hold" else k + 1][0]
+    m0, m1 = rate(data.x[k], left), rate(data.x[k + 1], right)
+    value, slope = [], []
+    for i in range(2):
+        a, b = data.x[k][i], data.x[k + 1][i]
+        value.append(
+            a * (2 * s**3 - 3 * s**2 + 1)
+            + h * m0[i] * (s**3 - 2 * s**2 + s)
+            + b * (3 * s**2 - 2 * s**3)
+            + h * m1[i] * (s**3 - s**2)
+        )
+        slope.append(
+            (a - b) * (6 * s**2 - 6 * s) / h + m0[i] * (3 * s**2 - 4 * s + 1) + m1[i] * (3 * s**2 - 2 * s)
+        )
+    u = left + s * (right - left)
+    return value, u, [d - r for d, r in zip(slope, rate(value, u), strict=True)]
+
+
+def pieces_at(data: Knots, t: Fraction):
+    return [k for k in range(len(data.t) - 1) if data.t[k] <= t <= data.t[k + 1]]
+
+
+# -- the curve -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+@given(ends=st.tuples(*[st.fractions(0, Fraction(13, 10), max_denominator=500)] * 3))
+@settings(max_examples=150, deadline=None)
+def test_windows_contain_every_point_and_both_sides_of_a_jump(interpolation, ends):
+    data = knots(interpolation)
+    plan = piecewise_plan(POLYNOMIAL, data)
+    low, t, high = sorted(ends)
+    window = np.nextafter(float(low), -np.inf), np.nextafter(float(high), np.inf)
+    states, inputs = plan.enclose(np.array([window[0]]), np.array([window[1]]))
+    for k in pieces_at(data, t):
+        value, u, _ = one_sided(data, k, t)
+        for i in range(2):
+            assert Fraction(float(states.lo[0, i])) <= value[i] <= Fraction(float(states.hi[0, i]))
+        assert Fraction(float(inputs.lo[0, 0])) <= u <= Fraction(float(inputs.hi[0, 0]))
+
+
+def test_windows_are_tight():
+    data = knots()
+    plan = piecewise_plan(POLYNOMIAL, data)
+    times = [Fraction(n, 2000) * Fraction(13, 10) for n in range(2001)]
+    for low, high, factor in ((0, 2000, 3), (700, 800, 1.2), (700, 720, 1.06), (900, 901, 1.05)):
+        seen = np.array(
+            [one_sided(data, pieces_at(data, t)[0], t)[0] for t in times[low : high + 1]], dtype=float
+        )
+        found, _ = plan.enclose(np.array([float(times[low])]), np.array([float(times[high])]))
+        width = seen.max(axis=0) - seen.min(axis=0)
+        assert ((found.hi - found.lo)[0] <= factor * width + 1e-9).all()
+
+
+def test_a_point_is_enclosed_to_a_few_roundings():
+    plan = piecewise_plan(POLYNOMIAL, knots())
+    t = np.linspace(0.31, 0.39, 7)
+    states, inputs = plan.enclose(t, t)
+    assert (states.hi - states.lo).max() < 1e-13
+    assert (inputs.hi - inputs.lo).max() < 1e-14
+
+
+def test_the_hull_of_many_pieces_is_found_by_halves():
+    count = 300
+    t = tuple(Fraction(k, 7) for k in range(count + 1))
+    x = tuple((Fraction(k * k % 101, 50), Fraction(-(k % 17))) for k in range(count + 1))
+    plan = piecewise_plan(
+        POLYNOMIAL, Knots(t=t, x=x, u=((Fraction(0),),) * (count + 1), interpolation="hold")
+    )
+    rng = np.random.default_rng(0)
+    ends = np.sort(rng.uniform(0, count / 7, (200, 2)), axis=1)
+    wide, _ = plan.enclose(ends[:, 0], ends[:, 1])
+    whole = plan.pieces._levels[0]  # each piece by itself
+    for (low, high), lo, hi in zip(ends, wide.lo, wide.hi, strict=True):
+        inner = [k for k in range(count) if low <= float(t[k]) and float(t[k + 1]) <= high]
+        if inner:
+            assert (lo <= whole.lo[inner].min(axis=0)[:2]).all()
+            assert (hi >= whole.hi[inner].max(axis=0)[:2]).all()
+        touched = [k for k in range(count) if float(t[k + 1]) >= low - 1e-9 and float(t[k]) <= high + 1e-9]
+        assert (lo >= whole.lo[touched].min(axis=0)[:2] - 1e-9).all()
+        assert (hi <= whole.hi[touched].max(axis=0)[:2] + 1e-9).all()
+
+
+def test_a_horizon_may_cut_the_last_piece():
+    plan = piecewise_plan(POLYNOMIAL, knots(), Fraction(6, 10))
+    assert plan.horizon == Fraction(6, 10)
+    assert len(plan.pieces) == 3
+    full = piecewise_plan(POLYNOMIAL, knots())
+    effort = Effort(gap=1e-4)
+    short = Defect.of(plan, POLYNOMIAL, 1.0, effort).in_state()
+    assert short.above <= Defect.of(full, POLYNOMIAL, 1.0, effort).in_state().above
+    assert plan.moment(short.at) <= 0.6
+
+
+# -- the defect ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+def test_the_defect_lies_between_its_bounds(interpolation):
+    data = knots(interpolation)
+    found = Defect.of(piecewise_plan(POLYNOMIAL, data), POLYNOMIAL, 1.0, Effort()).in_state()
+    worst = Fraction(0)
+    for k in range(4):
+        for n in range(201):
+            t = data.t[k] + Fraction(n, 200) * (data.t[k + 1] - data.t[k])
+            worst = max(worst, sum(p * p for p in one_sided(data, k, t)[2]))
+    seen = float(worst) ** 0.5
+    assert seen * (1 - 1e-12) <= found.above <= 1.01 * found.below
+    assert found.below <= seen * (1 + 1e-4)
+    at = piecewise_plan(POLYNOMIAL, data).moment(found.at)
+    there = max(
+        float(sum(p * p for p in one_sided(data, k, Fraction(at))[2])) ** 0.5
+        for k in pieces_at(data, Fraction(at))
+    )
+    assert there == pytest.approx(found.below, rel=1e-6)
+
+
+def floats(data: Knots, f, count: int):
+    """Samples of x*, x*' and u* in floats, (3 arrays of (samples, .)), for dynamics f(x, u)."""
+    found = []
+    for k in range(len(data.t) - 1):
+        a, b = (np.array(data.x[j], dtype=float) for j in (k, k + 1))
+        h = float(data.t[k + 1] - data.t[k])
+        left = np.array(data.u[k], dtype=float)
+        right = left if data.interpolation == "hold" else np.array(data.u[k + 1], dtype=float)
+        m0, m1 = f(a, left), f(b, right)
+        for s in np.linspace(0, 1, count):
+            at = (
+                a * (2 * s**3 - 3 * s**2 + 1)
+                + h * m0 * (s**3 - 2 * s**2 + s)
+                + b * (3 * s**2 - 2 * s**3)
+                + h * m1 * (s**3 - s**2)
+            )
+            slope = (a - b) * (6 * s**2 - 6 * s) / h + m0 * (3 * s**2 - 4 * s + 1) + m1 * (3 * s**2 - 2 * s)
+            found.append((at, slope, left + s * (right - left)))
+    return (np.array(column) for column in zip(*found, strict=True))
+
+
+def swing(p, q):
+    return np.array([p[1], -np.sin(p[0]) - p[1] / 10 + (1 + np.cos(p[0]) ** 2) * q[0]])
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+def test_the_defect_in_a_metric_that_depends_on_the_state(interpolation):
+    data = knots(interpolation)
+    found = Defect.of(piecewise_plan(SWINGING, data), SWINGING, 1.0, Effort()).in_metric()
+    at, slope, u = floats(data, swing, 2001)
+    p = slope - np.array([swing(a, b) for a, b in zip(at, u, strict=True)])
+    seen = np.sqrt(p[:, 0] ** 2 / (2 + np.sin(at[:, 0])) + p[:, 1] ** 2).max()
+    assert seen <= found.above * (1 + 1e-12)
+    assert found.below <= seen * (1 + 1e-5)
+    assert found.above <= 1.01 * found.below
+
+
+def integrated(steps: int) -> Knots:
+    """Knots of an accurate integration of the swinging system with a held input."""
+    h = 1 / steps
+    state, states = np.array([1.0, 0.0]), [np.array([1.0, 0.0])]
+    for k in range(steps):
+        u = np.array([np.sin(3.0 * (k * 10 // steps))])
+        for _ in range(20):
+            d = h / 20
+            k1 = swing(state, u)
+            k2 = swing(state + d / 2 * k1, u)
+            k3 = swing(state + d / 2 * k2, u)
+            k4 = swing(state + d * k3, u)
+            state = state + d / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(state)
+    return Knots(
+        t=tuple(Fraction(k, steps) for k in range(steps + 1)),
+        x=tuple(tuple(Fraction(f"{v:.14f}") for v in row) for row in states),
+        u=tuple((Fraction(f"{np.sin(3.0 * (k * 10 // steps)):.17g}"),) for k in range(steps + 1)),
+        interpolation="hold",
+    )
+
+
+def test_the_defect_of_integrated_knots_is_of_third_order_in_the_step():
+    effort = Effort(gap=1e-3)
+    found = [
+        Defect.of(piecewise_plan(SWINGING, integrated(n)), SWINGING, 1e-4, effort).in_state().above
+        for n in (10, 20, 40)
+    ]
+    orders = np.log2(np.array(found[:-1]) / found[1:])
+    assert (orders > 2.8).all()
+    assert (orders < 3.4).all()
+
+
+def test_a_curve_that_is_a_solution_has_no_defect_to_speak_of():
+    model = replace(POLYNOMIAL, f=(y, constant(0)), B=((constant(0),), (constant(1),)))
+    t = [Fraction(0), Fraction(1, 3), Fraction(2, 3)]
+    data = Knots(  # x'' = 6 t: a cubic, which a piece reproduces
+        t=tuple(t), x=tuple((s**3, 3 * s**2) for s in t), u=tuple((6 * s,) for s in t), interpolation="linear"
+    )
+    found = Defect.of(piecewise_plan(model, data), model, 1.0, Effort()).in_state()
+    assert found.above < 1e-12
+
+
+def test_the_norm_in_a_metric_is_proven_from_both_sides():
+    v, W = (
+        ((x - y,), (x * y + constant(1),)),
+        ((2 + sin(x), constant(Fraction(1, 2))), (constant(Fraction(1, 2)), 1 + y**2)),
+    )
+    norm = MetricNorm(v, W)
+    rng = np.random.default_rng(1)
+    lo = rng.uniform(-1, 1, (50, 2))
+    hi = lo + rng.uniform(0, 0.2, (50, 2))
+    upper = norm.upper(lo, hi, np.inf).upper
+    for _ in range(50):
+        point = lo + rng.uniform(0, 1, lo.shape) * (hi - lo)
+        a, b = point.T
+        value = np.stack([a - b, a * b + 1], axis=-1)
+        dual = np.stack(
+            [np.stack([2 + np.sin(a), 0.5 + 0 * a], -1), np.stack([0.5 + 0 * a, 1 + b**2], -1)], -2
+        )
+        exact = np.sqrt(np.einsum("ni,ni->n", value, np.linalg.solve(dual, value[..., None])[..., 0]))
+        assert (exact <= upper * (1 + 1e-12)).all()
+        below = norm.lower(point, point)
+        assert (below <= exact * (1 + 1e-12)).all()
+        assert (below >= exact * (1 - 1e-9)).all()
+
+
+# -- the safe set ----------------------------------------------------------------------------------------------
+
+
+def test_a_curve_may_leave_between_its_knots():
+    data = Knots(
+        t=(Fraction(0), Fraction(1)),
+        x=((Fraction(0),) * 2,) * 2,
+        u=((Fraction(4),), (Fraction(4),)),
+        interpolation="hold",
+    )
+    plan = piecewise_plan(
+        POLYNOMIAL, data
+    )  # the slope at both knots is (2, -8): a wave that goes out and comes back
+    box = ((Fraction(-4, 5), Fraction(4, 5)),) * 2
+    found = containment(plan, Fraction(1, 10), ("x", "y"), box, Effort())
+    assert found.verdict == "refuted"
+    assert found.state == "y"
+    top = 8 / (6 * 3**0.5)  # of |8 t (1 - t) (1 - 2 t)|
+    assert found.excess == pytest.approx(top + 0.1 - 0.8, abs=1e-5)
+    wide = containment(plan, Fraction(1, 10), ("x", "y"), ((Fraction(-2), Fraction(2)),) * 2, Effort())
+    assert wide.verdict == "certified"
+
+
+# -- plan files ------------------------------------------------------------------------------------------------
+
+SPEC = """tubecert: 1
+name: line
+system: {states: [p, q], inputs: [u], f: ["q - p", "-q"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], q: [-2, 2]}
+uncertainty: {h: ["0.05*sin(t)"]}
+metric: {rate: 0.5, dual_metric: [[1, 0], [0, 1]]}
+tube: {epsilon: 0.5, rho_a: 0.1}
+trajectory: {kind: csv, file: FILE}
+"""
+
+
+def written(folder: Path, table: str | bytes, more: str = "") -> Path:
+    """A specification in a folder of its own, beside its plan file."""
+    data = table.encode() if isinstance(table, str) else table
+    (folder / "plan.csv").write_bytes(data)
+    path = folder / "spec.yaml"
+    path.write_text(SPEC.replace("FILE", f"plan.csv{more}"), encoding="utf-8")
+    return path
+
+
+def table_of(path: Path):
+    table = load(str(path)).trajectory.table
+    assert table is not None
+    return table
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,p,q,u\n0,1,0,0.5\n0.1,0.9,0.05,-1e-1\n",
+        "u,q,t,p\n0.5,0,0,1\n-.1,5E-2,+0.1,.9\n",
+        "# t, p, q, u\r\n 0 , 1 , 0 , 0.5 \r\n 0.10 ,0.9, 0.05,-0.1\r\n\r\n",
+        '\ufeff"t","p","q","u"\n"0","1.","0","0.5"\n\n1.000e-01,9.0e-1,0.05,-0.1',
+    ],
+    ids=["plain", "permuted", "numpy", "quoted"],
+)
+def test_a_plan_file_is_read_exactly(tmp_path, text):
+    data = table_of(written(tmp_path, text)).knots
+    assert data.t == (0, Fraction(1, 10))
+    assert data.x == ((1, 0), (Fraction(9, 10), Fraction(1, 20)))
+    assert data.u == ((Fraction(1, 2),), (Fraction(-1, 10),))
+    assert data.interpolation == "linear"
+
+
+def test_the_file_is_found_beside_its_specification_and_its_bytes_are_hashed(tmp_path, monkeypatch):
+    import hashlib
+
+    path = written(tmp_path, "t,p,q,u\n0,0,0,0\n1,0,0,0\n", ", interpolation: hold")
+    monkeypatch.chdir(tmp_path.parent)
+    table = table_of(path)
+    assert table.file == "plan.csv"
+    assert table.sha256 == hashlib.sha256((tmp_path / "plan.csv").read_bytes()).hexdigest()
+    assert table.knots.interpolation == "hold"
+
+
+def test_findings_of_a_plan_file_point_into_it(tmp_path):
+    path = written(tmp_path, "t,p,q,u\n0,0,0,0\n1,0,inf,0\n1,0,0,0\n")
+    with pytest.raises(SpecError) as caught:
+        load(str(path))
+    places = [str(item.location) for item in caught.value.findings]
+    assert places == [f"{tmp_path / 'plan.csv'}:3:5"]
+    (finding,) = caught.value.findings
+    assert finding.location.source == "1,0,inf,0"
+
+
+def test_a_plan_file_of_too_many_rows_or_bytes_is_refused(tmp_path):
+    rows = "".join(f"{k},0,0,0\n" for k in range(MAX_ROWS + 1))
+    with pytest.raises(SpecError, match="at most 10,001 rows") as caught:
+        load(str(written(tmp_path, "t,p,q,u\n" + rows)))
+    assert caught.value.findings[0].location.line == MAX_ROWS + 2
+    with pytest.raises(SpecError, match="larger than 10,000,000 bytes"):
+        load(str(written(tmp_path, "t,p,q,u\n" + " " * 10_000_000)))
+
+
+def test_many_mistakes_are_not_all_listed(tmp_path):
+    rows = "".join(f"{k},nan,0,0\n" for k in range(1000))
+    with pytest.raises(SpecError) as caught:
+        load(str(written(tmp_path, "t,p,q,u\n" + rows)))
+    assert len(caught.value.findings) <= 25
+
+
+def resting(count: int) -> str:
+    return "t,p,q,u\n" + "".join(f"{k / 10},0.5,0.5,0.5\n" for k in range(count))
+
+
+def test_a_plan_from_a_file_is_certified_and_recorded(tmp_path):
+    result = certify(load(str(written(tmp_path, resting(21)))), Options(conditions="all"))
+    assert result["verdict"] == "certified"
+    assert result["constants"]["plan_defect"]["above"] < 1e-12
+    assert result["constants"]["u_star"]["above"] == pytest.approx(0.5)
+    plan = result["plan"]
+    assert plan["kind"] == "csv"
+    assert plan["interpolation"] == "linear"
+    assert plan["file"] == "plan.csv"
+    assert plan["file_hash"].startswith("sha256:")
+    assert plan["knots"]["t"][:3] == ["0", "0.1", "0.2"]
+    assert plan["knots"]["x"][7] == ["0.5", "0.5"]
+    assert result["spec"]["effective"]["trajectory"]["horizon"] == "2"
+
+
+def test_the_initial_state_is_the_first_row_unless_it_is_given(tmp_path):
+    path = written(tmp_path, resting(3))
+    assert load(str(path)).x0 == (Fraction(1, 2), Fraction(1, 2))
+    text = path.read_text(encoding="utf-8") + "initial_state: {at: [0.6, 0.5]}\n"
+    spec = load_text(text, str(path))
+    result = certify(spec, Options())
+    assert result["constants"]["initial_distance"]["above"] == pytest.approx(0.1)
+
+
+def test_a_plan_outside_the_safe_set_is_refuted_with_time_and_point(tmp_path):
+    rows = "t,p,q,u\n0,0,0,0\n1,0,1.7,0\n2,0,0,0\n"
+    result = certify(load(str(written(tmp_path, rows))), Options())
+    assert result["verdict"] == "refuted"
+    assert exit_code(result) == 1
+    (reason,) = result["reasons"]
+    assert reason["claim"].startswith("assumption 1")
+    assert 0.5 < reason["at"]["t"] < 1.5
+    assert reason["at"]["x"][1] > 2
+
+
+def test_a_plan_that_goes_where_the_dynamics_are_undefined_is_refuted_at_a_knot(tmp_path):
+    rows = "t,p,q,u\n0,0,0,0\n1,-5,0,0\n2,0,0,0\n"
+    text = written(tmp_path, rows).read_text(encoding="utf-8").replace('"q - p"', '"q - p - sqrt(3 + p)"')
+    result = certify(load_text(text, str(tmp_path / "spec.yaml")), Options())
+    assert result["verdict"] == "refuted"
+    (reason,) = result["reasons"]
+    assert reason["at"]["t"] == 1
+    assert reason["at"]["x"][0] == pytest.approx(-5.6)
+
+
+def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):
+    rows = "t,p,q,u\n0,0,0,0\n1,1,1,0\n2,-1,-1,0\n"
+    result = certify(load(str(written(tmp_path, rows))), Options(conditions="distance"))
+    assert result["verdict"] == "refuted"
+    assert "dbar <= delta/lambda" in result["distance"]["shortfalls"][0]["claim"]
+    (reason,) = result["reasons"]
+    assert "is needed" in reason["message"]
