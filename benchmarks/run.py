@@ -14,6 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "three_state.yaml"
+TRACKING = ROOT / "configs" / "two_state.yaml"
 RUNS = 7
 
 
@@ -38,15 +39,21 @@ def startup() -> None:
 
 
 def certify() -> None:
-    """The whole command against its imports alone."""
+    """The whole command against its imports alone; the plan of the two-state system is cached by the first run."""
+    for config in (CONFIG, TRACKING):
+        command_line(config)
+
+
+def command_line(config: Path) -> None:
+    """One configuration through the command line."""
     imports = "import tubecert.pipeline, tubecert.report.console, tubecert.spec, tubecert.certificate"
     bare, _ = wall([sys.executable, "-c", imports])
     with tempfile.TemporaryDirectory() as folder:
         target = str(Path(folder) / "certificate.json")
-        command = [sys.executable, "-m", "tubecert", "certify", str(CONFIG), "-q", "-o", target]
+        command = [sys.executable, "-m", "tubecert", "certify", str(config), "-q", "-o", target]
         whole, memory = wall(command)
     print(
-        f"certify three_state: {whole:.2f} s, imports alone {bare:.2f} s, after import {whole - bare:.2f} s, "
+        f"certify {config.stem}: {whole:.2f} s, imports alone {bare:.2f} s, after import {whole - bare:.2f} s, "
         f"peak memory {memory:.0f} MB"
     )
 
@@ -62,9 +69,36 @@ def timed(work: Callable[[], object]) -> tuple[float, object]:
     return statistics.median(times), value
 
 
+def growth() -> None:
+    """Certification of the two-state plan against its number of knots and against rho, in this process, plan cached."""
+    from tubecert.pipeline import Options, certify
+    from tubecert.spec import load_text
+
+    text = TRACKING.read_text(encoding="utf-8")
+    reference = None
+    for knots in (51, 101, 201):
+        spec = load_text(text.replace("knots: 101", f"knots: {knots}"), str(TRACKING))
+        planning, _ = once(lambda spec=spec: certify(spec, Options()))
+        seconds, _ = timed(lambda spec=spec: certify(spec, Options()))
+        reference = reference or seconds
+        print(f"{knots} knots: {seconds:.2f} s ({seconds / reference:.2f} x), first run with planning {planning:.2f} s")
+    spec = load_text(text, str(TRACKING))
+    reference = None
+    for rho in ("0.1", "0.3", "0.6"):
+        seconds, result = timed(lambda rho=rho: certify(spec, Options(epsilon=Fraction(rho))))
+        reference = reference or seconds
+        print(f"epsilon {rho}: {seconds:.2f} s ({seconds / reference:.2f} x), {result['verdict']}")
+
+
+def once(work: Callable[[], object]) -> tuple[float, object]:
+    """Time of one call and its value."""
+    start = time.perf_counter()
+    value = work()
+    return time.perf_counter() - start, value
+
+
 def suprema() -> None:
     """Suprema over the safe set of the three-state system to a relative gap of 1e-3, three ways."""
-    import numpy as np
 
     from tubecert.enclosure.branch_and_bound import Effort, supremum
     from tubecert.enclosure.domain import BoxDomain
@@ -95,7 +129,6 @@ def suprema() -> None:
             f"({found.boxes} boxes); mean value form {mean_seconds / seconds:.1f} x ({mean_found.boxes} boxes); "
             f"grid of equal accuracy ({points:.1e} points, not proven) {grid_seconds / seconds:.1f} x"
         )
-    del np
 
 
 def grid(function: object, safe_set: tuple[tuple[Fraction, Fraction], ...], value: float) -> tuple[float, float]:
@@ -122,6 +155,6 @@ def grid(function: object, safe_set: tuple[tuple[Fraction, Fraction], ...], valu
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["startup", "certify", "suprema"]
-    for part in chosen:
-        {"startup": startup, "certify": certify, "suprema": suprema}[part]()
+    parts = {"startup": startup, "certify": certify, "suprema": suprema, "growth": growth}
+    for part in sys.argv[1:] or parts:
+        parts[part]()
