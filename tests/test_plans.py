@@ -447,3 +447,4 @@ def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):
     assert "dbar <= delta/lambda" in result["distance"]["shortfalls"][0]["claim"]
     (reason,) = result["reasons"]
     assert "is needed" in reason["message"]
+    assert "give more knots" in reason["relax"]

@@ -19,7 +19,7 @@ from tubecert.bounds.constants import DERIVED, BoundConstants, Constant, Witness
 from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
-from tubecert.certificate.reasons import reasons_26, reasons_distance, reasons_sampled
+from tubecert.certificate.reasons import defect_advice, reasons_26, reasons_distance, reasons_sampled
 from tubecert.certificate.sections import (
     assumptions,
     ceiling_text,
@@ -53,11 +53,12 @@ from tubecert.search.results import recipe_json
 from tubecert.search.sampled import search_sampled
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
-from tubecert.trajectory.make import Room, plan_of
+from tubecert.trajectory.make import Room, plan_of, remedy
 from tubecert.tube import Tube
 
 Result = dict[str, Any]
 _ORDER = ("refuted", "undecided", "certified")
+_NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
 CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
 
 
@@ -170,7 +171,11 @@ class _Certification:
         if decision.verdict == "proven":
             return True
         x = tuple(decision.at.get(name, 0.0) for name in self.model.states)
-        word = "loses rank in the safe set" if decision.verdict == "refuted" else "could not be proven of full rank"
+        word = (
+            "loses rank in the safe set"
+            if decision.verdict == "refuted"
+            else "could not be proven of full rank"
+        )
         return self._stop("rank of B", decision.verdict, f"B {word}", Witness(x=x))
 
     def _metric(self) -> bool:
@@ -178,17 +183,14 @@ class _Certification:
         self.result["metric"] = metric_data(self.spec, proof)
         if proof.verdict != "certified":
             at = proof.at if proof.verdict == "refuted" else None
-            return self._stop(f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof))
+            return self._stop(
+                f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof)
+            )
         self._lower = proof.lower_on_set
         return self._declared_metric(proof)
 
     def _plan(self) -> None:
         """The plan; what is planned here is refined until its defect costs next to nothing of the least tube."""
-        tube = self.spec.tube
-        assert tube.epsilon is not None
-        assert tube.rho_a is not None
-        assert self._lower is not None
-        room = Room(rho=tube.epsilon + tube.rho_a, lower=self._lower.below, effort=self.effort)
         report = None
         if self.progress is not None:
             show = self.progress
@@ -196,8 +198,16 @@ class _Certification:
             def report(name: str, count: int, value: float) -> None:
                 show(Step(name=name, boxes=count, below=value, above=value))
 
-        self.plan = plan_of(self.spec, self.model, room, report)
+        self.plan = plan_of(self.spec, self.model, self._room(), report)
         self.result["plan"] = plan_data(self.spec, self.plan)
+
+    def _room(self) -> Room:
+        """What a defect is measured against: the least tube that there can be."""
+        tube = self.spec.tube
+        assert tube.epsilon is not None
+        assert tube.rho_a is not None
+        assert self._lower is not None
+        return Room(rho=tube.epsilon + tube.rho_a, lower=self._lower.below, effort=self.effort)
 
     def _relax_metric(self, proof: MetricProof) -> str:
         if proof.verdict == "undecided" and proof.condition != "C3":
@@ -250,9 +260,7 @@ class _Certification:
         suprema = self._suprema()
         declared = declared_metric(self.spec)
         width = tube.epsilon + tube.rho_a
-        radius = least_radius(
-            suprema, self.spec.safe_set, self.start.offset(suprema), width, declared
-        )
+        radius = least_radius(suprema, self.spec.safe_set, self.start.offset(suprema), width, declared)
         contained = radius.contained
         if contained.verdict == "certified":
             return radius
@@ -276,7 +284,9 @@ class _Certification:
         declared = declared_uncertainty(self.spec)
         constants = bound_constants(suprema, self.start, (radius.lower, radius.upper), declared)
         self.result["metric"] |= {"lower": pair_data(constants.lower), "upper": pair_data(constants.upper)}
-        self.result["constants"] = {name: constant_data(value, meaning) for name, value, meaning in constants.items()}
+        self.result["constants"] = {
+            name: constant_data(value, meaning) for name, value, meaning in constants.items()
+        }
         if not (self._finite(constants) and self._declared_holds(suprema, declared)):
             return
         self._tube(suprema, radius)
@@ -413,6 +423,19 @@ class _Certification:
             if "conditions_26" not in chosen:
                 self.result["reasons"] += explained["conditions_26"]
         self.result["verdict"] = next(word for word in _ORDER if word in verdicts)
+        self._advise(problem)
+
+    def _advise(self, problem: TubeProblem) -> None:
+        """Where gains are missing and the plan's defect takes a part of the tube that matters, say so."""
+        failed = [reason for reason in self.result["reasons"] if reason["verdict"] != "certified"]
+        constants = problem.constants
+        reach = float(problem.rate) * math.sqrt(constants.lower.below) * float(problem.rho)
+        share = constants.plan_defect_metric.above / reach
+        if not failed or share < _NOTABLE:
+            return
+        advice = defect_advice(constants.plan_defect, share, remedy(self.plan, self.model, self._room()))
+        for reason in failed:
+            reason["relax"] = "; ".join(filter(None, (reason.get("relax"), advice)))
 
     def _stop(
         self, claim: str, verdict: str, message: str, at: Witness | None = None, relax: str = ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tubecert.bounds.constants import TABLE
+from tubecert.bounds.constants import TABLE, Constant
 from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.search.results import Conditions26, DistanceResult, SampledResult
 
@@ -25,6 +25,15 @@ _EXPLAINED = {
     "sampled": "the distance bound with sampled adaptation must stay below dbar",
     "as-printed": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
 }
+
+
+def defect_advice(defect: Constant, share: float, remedy: str) -> str:
+    """What a plan's defect does to the tube: `share` of it, if nothing else disturbed."""
+    where = "" if defect.at is None or defect.at.t is None else f" (at t = {defect.at.t:.4g} s)"
+    return (
+        f"the plan misses x' = f + B u by up to {defect.above:.3g}{where}, which alone takes {100 * share:.2g} % "
+        f"of the tube: {remedy}"
+    )
 
 
 def reasons_26(result: Conditions26, halved: Mapping[str, float]) -> list[Reason]:
@@ -79,5 +88,9 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...]) -> l
             message += f": its margin lies in [{low:.3g}, {high:.3g}]"
         reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})
     return reasons or [
-        {"claim": claim, "verdict": str(verdict), "message": "no gains were found that can be proven to serve"}
+        {
+            "claim": claim,
+            "verdict": str(verdict),
+            "message": "no gains were found that can be proven to serve",
+        }
     ]

@@ -7,7 +7,7 @@ placed until the proven defect costs less than a thousandth of the tube.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -19,7 +19,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import number_text
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Knots, Spec, Task, canonical
+from tubecert.spec import Interpolation, Knots, Spec, Task, canonical
 from tubecert.trajectory import cache, ilqr
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
@@ -57,6 +57,20 @@ def plan_of(spec: Spec, model: ControlAffineModel, room: Room, report: Report | 
         return _planned(spec, trajectory.task, model, room, report)
     x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
     return Plan(x, u, trajectory.horizon)
+
+
+def remedy(plan: Plan, model: ControlAffineModel, room: Room) -> str:
+    """What would lower a plan's defect, in words."""
+    knots = plan.knots
+    if knots is None:
+        return "correct x or u there"
+    other: Interpolation = "linear" if knots.interpolation == "hold" else "hold"
+    mended = piecewise_plan(model, replace(knots, interpolation=other), plan.horizon)
+    rho, effort = fraction_bounds(room.rho)[1], replace(room.effort, gap=0.05)
+    own, instead = (Defect.of(each, model, rho, effort).in_state().above for each in (plan, mended))
+    if instead < 0.5 * own:
+        return f"with interpolation: {other} it would be {instead:.3g}"
+    return "give more knots, or integrate the dynamics between them"
 
 
 def _planned(
