@@ -13,6 +13,8 @@ import pytest
 
 import tubecert
 from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.certificate.sections import assumptions
+from tubecert.model import build
 from tubecert.pipeline import Options, certify
 from tubecert.spec import load_text
 
@@ -141,3 +143,14 @@ def test_theorem_b_can_be_checked_from_the_file_alone():
     assert D.max() < dbar
     below = result["distance"]["least_adaptation"]["margin"][0]
     assert 1 - D.max() / dbar == pytest.approx(below, abs=1e-6)
+
+
+def test_the_uncertainties_that_are_covered_are_those_the_initial_value_covers():
+    """H0 is that of the expression unless |h| is declared: then and only then other uncertainties are covered."""
+    text = (ROOT / "configs" / "three_state.yaml").read_text(encoding="utf-8")
+    start = '  h: ["0.1*sin(2*t)"]'
+    assert start in text
+    for bounds, covered in (("{h: 0.1, h_t: 0.2}", True), ("{h_t: 0.2}", False)):
+        spec = load_text(text.replace(start, f"{start}\n  bounds: {bounds}"), "spec.yaml")
+        stated = " ".join(assumptions(spec, build(spec)))
+        assert ("or any other within" in stated) is covered

@@ -148,7 +148,8 @@ def assumptions(spec: Spec, model: ControlAffineModel, geodesics: GeodesicTest |
     smooth = spec.adaptation.smooth
     horizon = spec.trajectory.horizon
     return [
-        "the controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
+        "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
+        "controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
         "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
         "minimising geodesics are straight lines, which the constant metric makes unique"
         if flat
@@ -165,8 +166,14 @@ def assumptions(spec: Spec, model: ControlAffineModel, geodesics: GeodesicTest |
         "the uncertainty obeys its declared bounds on the tube"
         if spec.uncertainty.h is None
         else "the uncertainty is the expression of the specification"
-        + (", or any other within the declared bounds" if spec.uncertainty.bounds else ""),
+        + (", or any other within the bounds h, h_x, h_t of this certificate" if _any_start(spec) else ""),
     ]
+
+
+def _any_start(spec: Spec) -> bool:
+    """Whether H0 covers every h within the bounds: only if |h| itself is declared, else it is the expression's own."""
+    bounds = spec.uncertainty.bounds
+    return bounds is not None and bounds.h is not None
 
 
 def _geodesic_assumption(test: GeodesicTest | None) -> str:

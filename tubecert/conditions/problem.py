@@ -154,6 +154,8 @@ class TubeProblem:
             raise ValueError("rate, epsilon and rho_a must be positive")
         if Fraction(float(_interval(self.rho_r).lo)) + self.rho_a > Fraction(self.rho) * _ROUNDING:
             raise ValueError("rho must be at least rho_r + rho_a")
+        if self.filter_factor < 2 and not self.as_printed:
+            raise ValueError("|sC| is 2 omega: less proves nothing")
         if self.constants.lower.below <= 0:
             raise ValueError("the metric must be positive definite on the tube")
         if self.A_m is not None and not damping(self.A_m).lo > 0:

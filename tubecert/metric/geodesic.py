@@ -40,6 +40,7 @@ from tubecert.model import ControlAffineModel
 
 Ball = tuple[Array, Array]  # midpoints and radii
 
+_FINE: Final = 2e-3
 _BUDGET: Final = 20_000  # boxes: the test is sufficient only, it need not be sharp
 _ENTRIES: Final = 2_000_000  # of tensors held at once
 _SLACK: Final = 1e-14  # relative, covers sums of a few hundred terms in floats
@@ -67,13 +68,13 @@ def unique_geodesics(model: ControlAffineModel, tube: Domain, rho: float, effort
     if not _moving(model):
         nothing = Constant.exactly(0.0)
         return GeodesicTest(value=nothing, symbols=nothing, slope=nothing)
-    # what matters is the sum against 1, so a thousandth of that is fine enough
-    G = _bounded(SymbolNorm(model, order=0), tube, 1e-3 / rho, effort)
+    # what matters is the sum against 1: a five-hundredth of that for either part is fine enough
+    G = _bounded(SymbolNorm(model, order=0), tube, _FINE / rho, effort)
     if G.below * rho * (1 - _SLACK) >= 1:
         return GeodesicTest(
             value=Constant(below=G.below * rho * (1 - _SLACK), above=np.inf), symbols=G, slope=None
         )
-    L = _bounded(SymbolNorm(model, order=1), tube, 8e-3 / rho**2, effort)
+    L = _bounded(SymbolNorm(model, order=1), tube, 8 * _FINE / rho**2, effort)
     radius = Interval(rho)
     value = Interval(G.below, G.above) * radius + Interval(L.below, L.above) * radius**2 / 8.0
     return GeodesicTest(
