@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tubecert.certificate import exit_code
-from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.errors import SpecError
 from tubecert.expression import constant, cos, sin, symbol
 from tubecert.model import ControlAffineModel
@@ -22,7 +23,7 @@ from tubecert.spec import Knots, load, load_text
 from tubecert.spec.table import MAX_ROWS
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import piecewise_plan
-from tubecert.tube import containment
+from tubecert.tube import Tube, containment
 
 x, y = symbol("x"), symbol("y")
 EYE = ((constant(1), constant(0)), (constant(0), constant(1)))
@@ -283,6 +284,40 @@ def test_the_norm_in_a_metric_is_proven_from_both_sides():
         below = norm.lower(point, point)
         assert (below <= exact * (1 + 1e-12)).all()
         assert (below >= exact * (1 - 1e-9)).all()
+
+
+# -- the tube --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+def test_inputs_that_jump_together_are_not_mixed(interpolation):
+    """sup |f + B u*| over the tube of a plan whose two inputs jump at the same times, against samples."""
+    model = replace(
+        POLYNOMIAL,
+        inputs=("u", "v"),
+        f=(sin(y), -x),
+        B=((constant(1), constant(0)), (constant(0), constant(1))),
+    )
+    rough = replace(
+        knots(interpolation), u=tuple(map(two, ("1", "-2", "1.5", "-0.5", "3"), ("-2", "1", "-1", "2", "0")))
+    )
+    plan = piecewise_plan(model, rough)
+    tube = Tube(plan, 0.3, states=("x", "y"), inputs=("u", "v"), time=(Fraction(0), Fraction(13, 10)))
+    found = supremum(SumOfNorms([model.drift_on_plan()]), tube, Effort())
+    assert found.above <= 1.01 * found.below
+    angles = np.linspace(0, 2 * np.pi, 241)
+    ball = 0.3 * np.stack([np.cos(angles), np.sin(angles)])
+    seen = 0.0
+    at, _, u = floats(rough, lambda p, q: np.array([np.sin(p[1]) + q[0], -p[0] + q[1]]), 201)
+    for centre, held in zip(at, u, strict=True):
+        p = centre[:, None] + ball
+        seen = max(seen, float(np.hypot(np.sin(p[1]) + held[0], held[1] - p[0]).max()))
+    assert seen <= found.above
+    assert found.below <= seen * (1 + 1e-3)
+
+
+def two(*values: str) -> tuple[Fraction, ...]:
+    return tuple(map(Fraction, values))
 
 
 # -- the safe set ----------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from tubecert.enclosure.objective import Estimate, scalar
 from tubecert.model import TIME
 from tubecert.spec import Knots
 from tubecert.trajectory import Plan
+from tubecert.trajectory.plan import PIECE
 
 _WINDOWS = 64
 
@@ -45,25 +46,66 @@ class Tube:
         self._free = BoxDomain({**({} if time is None else {TIME: time}), **(extra or {})})
 
     def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
-        """The needed variables, and time if the plan moves."""
-        return needed if self._plan.is_constant or TIME in needed else (*needed, TIME)
+        """The needed variables, time if the plan moves, and the piece of the plan if several inputs jump.
+
+        (One input at a jump may be searched as the range between its two sides: no convex objective is larger there.)
+        """
+        if self._plan.is_constant:
+            return needed
+        jumping = self._plan.spans is not None and sum(v in self._inputs for v in needed) > 1
+        return (*needed, *([] if TIME in needed else [TIME]), *([PIECE] if jumping else []))
 
     def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
         """Boxes around the plan, window by window of time."""
-        others = tuple(v for v in variables if v not in self._states and v not in self._inputs)
+        others = self._others(variables)
         free_lo, free_hi = self._free.boxes(others)
+        if PIECE in variables:
+            lo, hi = self._piecewise(variables, others, free_lo, free_hi)
+            lo, hi, _ = self.contract(variables, lo, hi)
+            return lo, hi
         if TIME in others:
             column = others.index(TIME)
             edges = np.linspace(free_lo[0, column], free_hi[0, column], _WINDOWS + 1)
             free_lo, free_hi = np.repeat(free_lo, _WINDOWS, axis=0), np.repeat(free_hi, _WINDOWS, axis=0)
             free_lo[:, column], free_hi[:, column] = edges[:-1], edges[1:]
-        lo, hi = np.full((len(free_lo), len(variables)), -np.inf), np.full((len(free_lo), len(variables)), np.inf)
+        lo, hi = (
+            np.full((len(free_lo), len(variables)), -np.inf),
+            np.full((len(free_lo), len(variables)), np.inf),
+        )
         for source, name in enumerate(others):
-            lo[:, variables.index(name)], hi[:, variables.index(name)] = free_lo[:, source], free_hi[:, source]
+            lo[:, variables.index(name)], hi[:, variables.index(name)] = (
+                free_lo[:, source],
+                free_hi[:, source],
+            )
         lo, hi, _ = self.contract(variables, lo, hi)
         return lo, hi
 
-    def contract(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _others(self, variables: tuple[str, ...]) -> tuple[str, ...]:
+        """Time and what is independent of the plan."""
+        return tuple(v for v in variables if v not in (*self._states, *self._inputs, PIECE))
+
+    def _piecewise(
+        self, variables: tuple[str, ...], others: tuple[str, ...], free_lo: Array, free_hi: Array
+    ) -> tuple[Array, Array]:
+        """One box for every piece of the plan, unbounded in states and inputs."""
+        spans = self._plan.spans
+        assert spans is not None
+        count = len(spans.lo)
+        lo, hi = np.full((count, len(variables)), -np.inf), np.full((count, len(variables)), np.inf)
+        for source, name in enumerate(others):
+            column = variables.index(name)
+            lo[:, column], hi[:, column] = free_lo[0, source], free_hi[0, source]
+        column = variables.index(TIME)
+        lo[:, column], hi[:, column] = (
+            np.maximum(lo[:, column], spans.lo),
+            np.minimum(hi[:, column], spans.hi),
+        )
+        lo[:, variables.index(PIECE)] = hi[:, variables.index(PIECE)] = np.arange(count)
+        return lo, hi
+
+    def contract(
+        self, variables: tuple[str, ...], lo: Array, hi: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Cut boxes to what the tube can reach, and tell which may still meet it."""
         x, u = self._window(variables, lo, hi)
         state, tied, state_column, tied_column = self._columns(variables)
@@ -85,13 +127,15 @@ class Tube:
 
     def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
         """The points, moved into the ball around the plan at their time where that can be proven."""
-        others = tuple(v for v in variables if v not in self._states and v not in self._inputs)
+        others = self._others(variables)
         other = [variables.index(v) for v in others]
         moved, _ = self._free.inside(others, points[:, other])
         if len(moved) < len(points):
             return points[:0], points[:0]
         points = points.copy()
         points[:, other] = moved
+        if PIECE in variables:
+            points = self._in_its_piece(variables, points)
         x, u = self._window(variables, points, points)
         state, tied, state_column, tied_column = self._columns(variables)
         centre = x[:, state_column]
@@ -108,6 +152,16 @@ class Tube:
         lo[:, tied], hi[:, tied] = u.lo[:, tied_column], u.hi[:, tied_column]
         return lo[ok], hi[ok]
 
+    def _in_its_piece(self, variables: tuple[str, ...], points: Array) -> Array:
+        """The points whose time lies in their piece for certain."""
+        spans = self._plan.spans
+        assert spans is not None
+        piece = np.rint(points[:, variables.index(PIECE)]).astype(np.intp)
+        t = points[:, variables.index(TIME)]
+        # the ends of a piece are known to a rounding: stay two floats away from them
+        low, high = up(up(spans.lo[piece])), down(down(spans.hi[piece]))
+        return points[(low <= t) & (t <= high)]
+
     def priorities(self, variables: tuple[str, ...], lo: Array, hi: Array, estimate: Estimate) -> Array:
         """Split what causes the overestimate: curvature inside, the cut of the ball at its boundary, motion in time."""
         x, _ = self._window(variables, lo, hi)
@@ -122,7 +176,9 @@ class Tube:
             # a state box narrower than the plan's motion gains nothing from being split further
             share = np.minimum(1e9, (centre.hi - centre.lo) / width)
             moved = (boundary * estimate.spread[:, state] * share).sum(axis=1)
-            priority[:, variables.index(TIME)] += moved + (estimate.spread + estimate.caused)[:, tied].sum(axis=1)
+            priority[:, variables.index(TIME)] += moved + (estimate.spread + estimate.caused)[:, tied].sum(
+                axis=1
+            )
         priority[:, tied] = 0.0
         return np.where(hi > lo, priority, 0.0)
 
@@ -130,7 +186,8 @@ class Tube:
         """x* and u* over the time windows of the boxes."""
         if TIME in variables and not self._plan.is_constant:
             column = variables.index(TIME)
-            return self._plan.enclose(lo[:, column], hi[:, column])
+            span = lo[:, variables.index(PIECE)] if PIECE in variables else None
+            return self._plan.enclose(lo[:, column], hi[:, column], span)
         zero = np.zeros(len(lo))
         return self._plan.enclose(zero, zero)
 

@@ -46,8 +46,13 @@ class Pieces:
         finite = np.isfinite(self.x.lo) & np.isfinite(self.x.hi)
         return np.asarray(finite.all(axis=(1, 2)))
 
-    def over(self, lo: Array, hi: Array) -> Interval:
-        """x* and u* over windows of time (N,): (N, n + m). At a jump of u*, both sides belong to it."""
+    def over(self, lo: Array, hi: Array, piece: Index | None = None) -> Interval:
+        """x* and u* over windows of time (N,): (N, n + m). At a jump of u*, both sides belong to it.
+
+        With numbers of pieces (N,), only what lies in that piece.
+        """
+        if piece is not None:
+            return self._within(piece, lo, hi)
         first = np.clip(np.searchsorted(self.end.hi, lo, side="left"), 0, len(self) - 1)
         last = np.clip(np.searchsorted(self.start.lo, hi, side="right") - 1, 0, len(self) - 1)
         last = np.maximum(first, last)

@@ -19,13 +19,12 @@ from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.objective import Estimate
 from tubecert.expression import Expression, constant, symbol
 from tubecert.expression.matrix import Matrix
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Knots
 from tubecert.trajectory.hermite import Pieces, pieces
-from tubecert.trajectory.plan import Plan, missing
+from tubecert.trajectory.plan import PIECE, Plan, missing
 
-TAU = "tau#"  # no state can have these names
-PIECE = "piece#"
+TAU = "tau#"  # no state can have this name
 
 
 @dataclass(frozen=True)
@@ -74,15 +73,22 @@ class PiecewisePlan(Plan):
 
     def moment(self, at: Mapping[str, float]) -> float | None:
         """The time at a point of the domain."""
-        if PIECE not in at:
+        if TIME in at or PIECE not in at:
             return super().moment(at)
         piece = round(at[PIECE])
         t = float(self.pieces.start.mid[piece]) + at.get(TAU, 0.0)
         return min(t, float(self.pieces.end.mid[piece]))
 
-    def enclose(self, lo: Array, hi: Array) -> tuple[Interval, Interval]:
+    @property
+    def spans(self) -> Interval | None:
+        """The pieces, if u* is held on each of them."""
+        return (
+            Interval(self.pieces.start.lo, self.pieces.end.hi) if self.data.interpolation == "hold" else None
+        )
+
+    def enclose(self, lo: Array, hi: Array, span: Array | None = None) -> tuple[Interval, Interval]:
         """x* (N, n) and u* (N, m) over windows [lo, hi] of time, each of shape (N,)."""
-        both = self.pieces.over(lo, hi)
+        both = self.pieces.over(lo, hi, None if span is None else np.rint(span).astype(np.intp))
         n = len(self.x)
         return both[:, :n], both[:, n:]
 

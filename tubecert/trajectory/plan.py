@@ -31,6 +31,8 @@ from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Knots
 
+PIECE = "piece#"  # no state can have this name
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -87,6 +89,11 @@ class Plan:
         """The exact knots that the curve is given by, if it is."""
         return None
 
+    @property
+    def spans(self) -> Interval | None:
+        """Windows of time, (K,), between which u* jumps; None if it does not."""
+        return None
+
     def moment(self, at: Mapping[str, float]) -> float | None:
         """The time at a point of the domain; None if time does not matter there."""
         return at.get(TIME)
@@ -96,8 +103,12 @@ class Plan:
         both = [*self.x, *self.u]
         return Tape(both, (TIME,)), Tape(derivatives(both, TIME), (TIME,))
 
-    def enclose(self, lo: Array, hi: Array) -> tuple[Interval, Interval]:
-        """x* (N, n) and u* (N, m) over windows [lo, hi] of time, each of shape (N,)."""
+    def enclose(self, lo: Array, hi: Array, span: Array | None = None) -> tuple[Interval, Interval]:
+        """x* (N, n) and u* (N, m) over windows [lo, hi] of time, each of shape (N,).
+
+        With numbers of spans (N,), only what lies in that span: at a jump of u*, one side of it.
+        """
+        assert span is None
         values, slopes = self._tapes
         window = Interval(lo, hi)
         natural = values.run([window], lo.shape)
