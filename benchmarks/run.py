@@ -99,7 +99,6 @@ def once(work: Callable[[], object]) -> tuple[float, object]:
 
 def suprema() -> None:
     """Suprema over the safe set of the three-state system to a relative gap of 1e-3, three ways."""
-
     from tubecert.enclosure.branch_and_bound import Effort, supremum
     from tubecert.enclosure.domain import BoxDomain
     from tubecert.enclosure.objective import Pencil, SumOfNorms
