@@ -291,7 +291,7 @@ def test_an_unwritable_cache_is_noted_and_does_no_harm(tmp_path, monkeypatch):
     blocked.write_text("", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     seen = []
-    plan_of(edited(SMALL), MODEL, ROOM, lambda name, count, value: seen.append(name))
+    plan_of(edited(SMALL), MODEL, ROOM, lambda name, count, unit: seen.append(name))
     assert any("not kept" in name for name in seen)
 
 

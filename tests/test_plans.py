@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tubecert.certificate import exit_code
+from tubecert.certificate import exit_code, seal
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import SumOfNorms
@@ -473,6 +473,22 @@ def test_a_plan_that_goes_where_the_dynamics_are_undefined_is_refuted_at_a_knot(
     (reason,) = result["reasons"]
     assert reason["at"]["t"] == 1
     assert reason["at"]["x"][0] == pytest.approx(-5.6)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "0,0,0,0\n1e-300,0.1,0,0\n1,0,0,0\n",
+        "0,0,0,0\n1,1e300,0,-1e300\n2,0,0,0\n",
+        "0,0,0,0\n1e-299,0,0,1e300\n1e300,0,0,0\n",
+        "0,1e-300,0,1e-300\n1,0,0,0\n2,0,1e-299,0\n",
+    ],
+)
+def test_extreme_plans_are_judged_without_an_exception(tmp_path, rows):
+    result = certify(load(str(written(tmp_path, "t,p,q,u\n" + rows))), Options(budget=100_000))
+    assert result["verdict"] in {"refuted", "undecided", "certified"}
+    assert result["reasons"]
+    seal(result, {})
 
 
 def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):

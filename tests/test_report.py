@@ -246,13 +246,13 @@ def test_progress_is_silent_in_a_pipe():
 def test_progress_goes_away_when_it_is_done():
     screen = Screen()
     with progress.shown(Terminal.of(screen, "never", {}), wanted=True) as report:
-        report(SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75))
+        report(SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75, unit="boxes"))
     with progress.shown(Terminal.of(screen, None, {}), wanted=False) as report:
         assert report is None
 
 
 def test_progress_in_words():
-    step = SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75)
+    step = SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75, unit="boxes")
     assert progress.describe(step) == "feedback gain: 12,000 boxes, between 0.5 and 0.75"
-    step = SimpleNamespace(name="metric", boxes=3, below=float("-inf"), above=0.75)
+    step = SimpleNamespace(name="metric", boxes=3, below=float("-inf"), above=0.75, unit="boxes")
     assert progress.describe(step) == "metric: 3 boxes"

@@ -79,12 +79,16 @@ class Options:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """Progress: what is being bounded, boxes so far, and the bounds so far."""
+    """Progress: what is being bounded, boxes so far, and the bounds so far.
+
+    Where something is counted that is not boxes and has no bounds, `unit` says what.
+    """
 
     name: str
     boxes: int
-    below: float
-    above: float
+    below: float = -math.inf
+    above: float = math.inf
+    unit: str = "boxes"
 
 
 Progress = Callable[[Step], None]
@@ -195,8 +199,8 @@ class _Certification:
         if self.progress is not None:
             show = self.progress
 
-            def report(name: str, count: int, value: float) -> None:
-                show(Step(name=name, boxes=count, below=value, above=value))
+            def report(name: str, count: int, unit: str) -> None:
+                show(Step(name=name, boxes=count, unit=unit))
 
         self.plan = plan_of(self.spec, self.model, self._room(), report)
         self.result["plan"] = plan_data(self.spec, self.plan)
@@ -271,7 +275,9 @@ class _Certification:
             "assumption 1: the tube lies in the safe set",
             contained.verdict,
             f"the tube of radius {float(radius.rho):.6g} {lies} the safe set through the {contained.side} bound of "
-            f"{contained.state}, at t = {contained.t:.6g}, by {contained.excess:.3g}",
+            f"{contained.state}, at t = {contained.t:.6g}, by {contained.excess:.3g}"
+            if contained.state
+            else "the curve between the plan's knots could not be bounded: two of its times may nearly coincide",
             Witness(t=contained.t, x=contained.x),
             "reduce epsilon, rho_a or the initial error, or enlarge the safe set",
         )

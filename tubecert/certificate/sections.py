@@ -65,10 +65,7 @@ def metric_data(spec: Spec, proof: MetricProof) -> Result:
 
 
 def plan_data(spec: Spec, plan: Plan) -> Result:
-    """The plan as it was certified: `exact` expressions, or every knot with the rule that fills the gaps.
-
-    Between knots x* is the cubic with the slopes f(x*) + B(x*) u* at its ends.
-    """
+    """The plan as it was certified: `exact` expressions, or every knot with the rule that fills the gaps."""
     trajectory = spec.trajectory
     knots = plan.knots
     if knots is None:
@@ -76,6 +73,7 @@ def plan_data(spec: Spec, plan: Plan) -> Result:
     data: Result = {
         "kind": trajectory.kind,
         "interpolation": knots.interpolation,
+        "curve": "between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*",
         "knots": {
             "t": [number_text(t) for t in knots.t],
             **{

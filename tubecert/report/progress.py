@@ -30,7 +30,7 @@ def shown(terminal: Terminal, *, wanted: bool) -> Iterator[Callable[[Step], None
 
 def describe(step: Step) -> str:
     """A step in words: what, how many boxes, and how far its bounds are apart."""
-    words = f"{step.name.replace('_', ' ')}: {step.boxes:,} boxes"
+    words = f"{step.name.replace('_', ' ')}: {step.boxes:,} {step.unit}"
     if math.isfinite(step.below) and math.isfinite(step.above):
         words += f", between {short(step.below)} and {short(step.above)}"
     return words

@@ -26,7 +26,7 @@ from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.trajectory.plan import Plan
 from tubecert.trajectory.rollout import Dynamics
 
-Report = Callable[[str, int, float], None]
+Report = Callable[[str, int, str], None]  # what is done, how many, of what
 
 _DIGITS = 12
 _SHARE = 1e-3  # of the tube that a planned curve's defect may cost
@@ -117,14 +117,16 @@ def _inputs(
         except (ValueError, ZeroDivisionError):
             pass  # not what was written: plan again
     proposal = ilqr.plan(
-        dynamics, _problem(task, dynamics, t), report and (lambda i, c: report("plan", i, c))
+        dynamics,
+        _problem(task, dynamics, t),
+        report and (lambda i, cost: report(f"plan, cost {cost:.4g}", i, "steps")),
     )
     if proposal.outcome is not ilqr.Outcome.FOUND:
         raise SpecError([_failure(spec, proposal)])
     found = tuple(tuple(map(rounded, map(float, row))) for row in proposal.u)
     trouble = cache.write(name, tuple(tuple(map(number_text, row)) for row in found))
     if trouble and report is not None:
-        report(f"plan not kept ({trouble})", 0, np.nan)
+        report(f"plan not kept ({trouble})", len(found), "knots")
     return found
 
 
@@ -198,7 +200,7 @@ def _refined(
         if 2 * parts > most or not plan.defined:
             return plan
         if report is not None:
-            report("plan: sub-knots", len(plan.pieces), np.nan)
+            report("plan, defect", len(plan.pieces), "pieces")
         defect = Defect.of(plan, model, fraction_bounds(room.rho)[1], room.effort)
         if defect.in_metric().above < allowed:
             return plan

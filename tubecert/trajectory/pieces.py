@@ -88,7 +88,8 @@ class PiecewisePlan(Plan):
 
     def enclose(self, lo: Array, hi: Array, span: Array | None = None) -> tuple[Interval, Interval]:
         """x* (N, n) and u* (N, m) over windows [lo, hi] of time, each of shape (N,)."""
-        both = self.pieces.over(lo, hi, None if span is None else np.rint(span).astype(np.intp))
+        with np.errstate(all="ignore"):  # what is not finite is unbounded
+            both = self.pieces.over(lo, hi, None if span is None else np.rint(span).astype(np.intp))
         n = len(self.x)
         return both[:, :n], both[:, n:]
 
@@ -108,7 +109,8 @@ def piecewise_plan(model: ControlAffineModel, knots: Knots, horizon: Fraction | 
     if knots.interpolation == "linear":
         u = [e + tau * _coefficient("u", j, 1) for j, e in enumerate(u)]
     end = knots.t[-1] if horizon is None else horizon
-    return PiecewisePlan(tuple(x), tuple(u), end, knots, pieces(model, knots, end))
+    with np.errstate(all="ignore"):
+        return PiecewisePlan(tuple(x), tuple(u), end, knots, pieces(model, knots, end))
 
 
 def _coefficient(kind: str, index: int, power: int) -> Expression:
