@@ -11,7 +11,14 @@ from typing import Any
 
 from tubecert.bounds.constants import TABLE, Constant
 from tubecert.conditions.verdict import Shortfall, Verdict
-from tubecert.search.results import Conditions26, DistanceResult, SampledResult
+from tubecert.search.results import (
+    Conditions26,
+    DistancePair,
+    DistanceResult,
+    RatePair,
+    SampledPair,
+    SampledResult,
+)
 
 Reason = dict[str, Any]
 
@@ -19,7 +26,7 @@ _EXPLAINED = {
     "26a": "(26a): the initial error and the filter's share must fit into rho_r",
     "26b": "(26b): the metric's lower bound must exceed zeta_2 + zeta_3",
     "26c": "(26c): the adaptation rate must make up for the estimation error",
-    "dbar <= d0": "the initial distance d0 must be below dbar = sqrt(a) rho",
+    "dbar <= d0": "d0, the length of the segment to the start, must be below dbar = sqrt(a) rho",
     "dbar <= delta/lambda": "the plan's defect alone must keep the distance below dbar",
     "distance": "the distance bound sup D(t) must stay below dbar",
     "sampled": "the distance bound with sampled adaptation must stay below dbar",
@@ -39,7 +46,7 @@ def defect_advice(defect: Constant, share: float, remedy: str) -> str:
 def reasons_26(result: Conditions26, halved: Mapping[str, float]) -> list[Reason]:
     """Reasons of certificate A."""
     if result.verdict is not Verdict.CERTIFIED or result.pair is None:
-        return _short("conditions_26", result.verdict, result.shortfalls)
+        return _short("conditions_26", result.verdict, result.shortfalls, _gain_of(result.pair))
     margins = ", ".join(f"{claim} {float(margin.lo):.2g}" for claim, margin in result.pair.margins.items())
     binds = {"26a": "(26a)", "26b": "(26b)"}.get(result.binds or "", result.binds)
     message = f"{binds} sets the bandwidth; proven margins: {margins}"
@@ -54,15 +61,24 @@ def reasons_distance(result: DistanceResult, halved: Mapping[str, float]) -> lis
     """Reasons of certificate B."""
     pair = result.decisive
     if result.verdict is not Verdict.CERTIFIED or pair is None:
-        return _short("distance", result.verdict, result.shortfalls)
+        return _short("distance", result.verdict, result.shortfalls, _gain_of(pair))
     return [_certified("distance", f"proven margin {float(pair.margin.lo):.2g} of dbar", halved)]
 
 
 def reasons_sampled(result: SampledResult) -> list[Reason]:
     """Reasons of certificate C."""
     if result.verdict is not Verdict.CERTIFIED or result.pair is None:
-        return _short("sampled", result.verdict, result.shortfalls)
-    return [_certified("sampled", f"proven margin {float(result.pair.margin.lo):.2g} of dbar", {})]
+        return _short("sampled", result.verdict, result.shortfalls, _gain_of(result.pair))
+    gain = float(result.pair.recipe.predictor_gain)
+    message = f"proven margin {float(result.pair.margin.lo):.2g} of dbar, with A_m = -{gain:g} I"
+    return [_certified("sampled", message, {})]
+
+
+def _gain_of(pair: RatePair | DistancePair | SampledPair | None) -> str:
+    """The predictor that a claim about gains is made with, where it is -g I."""
+    if pair is None or pair.recipe.predictor_gain is None:
+        return ""
+    return f" (with A_m = -{float(pair.recipe.predictor_gain):g} I)"
 
 
 def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
@@ -77,7 +93,8 @@ def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
     return reason
 
 
-def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...]) -> list[Reason]:
+def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...], gain: str) -> list[Reason]:
+    """Claims that are not proven; those that depend on the predictor name it, since another one may serve."""
     reasons = []
     for item in shortfalls:
         message = _EXPLAINED.get(item.claim, item.claim)
@@ -86,6 +103,7 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...]) -> l
         elif item.claim != "as-printed":
             low, high = float(item.margin.lo), float(item.margin.hi)
             message += f": its margin lies in [{low:.3g}, {high:.3g}]"
+            message += gain if item.claim in {"26c", "distance", "sampled"} else ""
         reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})
     return reasons or [
         {
