@@ -23,12 +23,11 @@ def random_texts(rng, *, moving_input):
     def c():
         return f"({round(float(rng.uniform(-1, 1)), 2)})"
 
-    f = [
-        f"-3*{v} + {c()}*x1*x2 + {c()}*sin({w}) + {c()}*{w}"
-        for v, w in zip(NAMES, ("x2", "x3", "x1"), strict=True)
-    ]
+    # the actuated directions are unstable, the other contracts
+    terms = zip((1, 1, -5), NAMES, ("x2", "x3", "x1"), strict=True)
+    f = [f"{k}*{v} + {c()}*x1*x2 + {c()}*sin({w}) + {c()}*{w}" for k, v, w in terms]
     lift = f"{c()}*x1" if moving_input else c()
-    B = [["1", lift], [c(), f"2 + {c()}*cos(x2)" if moving_input else "2"], [c(), c()]]
+    B = [["1", lift], [c(), f"2 + {c()}*cos(x2)" if moving_input else "2"], [f"0.3*{c()}", f"0.3*{c()}"]]
     W = [["2", "0", "0"], ["0", "3", "0"], ["0", "0", "1.5"]]
     for i in range(3):
         for j in range(i, 3):
@@ -99,7 +98,7 @@ def values_at(at, x, rng):
     }
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("moving_input", [False, True], ids=["constant B", "moving B"])
 def test_constants_of_random_systems_are_above_sampled_ones(seed, moving_input):
     rng = np.random.default_rng(seed)
@@ -139,15 +138,12 @@ def test_constants_of_random_systems_are_above_sampled_ones(seed, moving_input):
     for name, constant in found.items():
         slack = 1e-9 * abs(sampled[name]) + (1e-7 if name == "B_pinv_x" else 1e-12)
         assert constant.above >= sampled[name] - slack, name
-        # 20 000 points come within a few per cent of a smooth supremum, and within some of one over directions
+        # 20 000 points come within a few per cent of a supremum, also of one over directions
         near = 0.1 if name == "feedback_gain" else 0.03
-        assert constant.above <= max(sampled[name], 0.0) * (1 + near) + 1e-9 or name == "feedback_gain", name
-        assert constant.below <= constant.above
-        assert constant.below <= max(sampled[name], 0.0) * (1 + near) + 1e-6 or name == "feedback_gain", name
+        assert constant.above <= sampled[name] * (1 + near) + 1e-9, name
     assert lower.below <= 1 / sampled["largest_w"] <= lower.above * 1.03
     least = s.input_gain_least()
     assert least.below <= -sampled["input_gain"] + 1e-12
     assert least.below >= -sampled["input_gain"] * 0.95
     if not moving_input:
-        assert s.feedback_gain_closed_form() >= sampled["feedback_gain"] - 1e-12
-    assert math.isfinite(found["feedback_gain"].above) or moving_input
+        assert found["feedback_gain"].below <= s.feedback_gain_closed_form() < math.inf

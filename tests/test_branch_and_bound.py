@@ -293,7 +293,7 @@ def test_weights_below_the_exact_ones_never_lower_the_bound():
 
     for n, truth in ((6, 6 / (2 * math.sqrt(2 * 5))), (-6, 0.0)):
         objective = Pencil(
-            ((constant(n),),), [((constant(2),),), ((constant(5),),)], extra=("mu",), weights=weights
+            ((constant(n),),), [((constant(2),),), ((constant(5),),)], extra={"mu": 4.0}, weights=weights
         )
         found = supremum(objective, BoxDomain({"mu": (0.0, 4.0)}), Effort(gap=1e-3))
         assert found.below <= truth * (1 + 1e-12)

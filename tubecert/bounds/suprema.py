@@ -133,16 +133,17 @@ class Suprema:
         """
         top = self._over_tube("feedback_gain", Pencil(self.model.BBt, [self.model.W]))
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
-        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra=(MU,), weights=_mu_weights)
+        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra={MU: largest}, weights=_mu_weights)
         found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
-            above = min(above, self.feedback_gain_closed_form())
+            cheap = replace(self.effort, budget=min(self.effort.budget, self.effort.cheap))
+            above = min(above, self.feedback_gain_closed_form(cheap if found.reached else None))
         return Constant(below=max(0.0, found.below), above=max(0.0, above), at=self._witness(found))
 
-    def feedback_gain_closed_form(self) -> float:
+    def feedback_gain_closed_form(self, effort: Effort | None = None) -> float:
         """A bound of du in closed form: looser, but it needs no search over mu."""
-        return self._over_tube("feedback_gain", ClosedFormGain(self.model)).above
+        return self._over_tube("feedback_gain", ClosedFormGain(self.model), effort).above
 
     def contraction_excess(self) -> Constant:
         """sup lmax of the pencil (F, W), as in the printed (bounds:delta_u)."""

@@ -5,7 +5,7 @@ Everything here is rigorous except `Estimate.corner`, `caused` and `spread`, whi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -154,9 +154,10 @@ Weights = Callable[[Array, Array], Sequence[Array]]
 class Pencil:
     """The largest eigenvalue of the pencil (N(x), D(x)), D > 0: the least tau with N <= tau D.
 
-    D may be a combination sum_k w_k D_k with weights w_k >= 0 that depend on further variables of the box (`extra`);
-    `weights(lo, hi)` must return weights that give, for the whole box, a *lower* bound of D in the Loewner order. That
-    bounds N <= tau D for tau >= 0 only, so with weights the value is the largest eigenvalue or 0, whichever is larger.
+    D may be a combination sum_k w_k D_k with weights w_k >= 0 that depend on further variables of the box (`extra`:
+    from 0 to the number given). `weights(lo, hi)` must return weights that give, for the whole box, a *lower* bound of
+    D in the Loewner order. That bounds N <= tau D for tau >= 0 only, so with weights the value is the largest
+    eigenvalue or 0, whichever is larger.
     A target tau is tested directly: N - tau D <= 0 after a congruence that makes D nearly the identity.
     """
 
@@ -165,13 +166,14 @@ class Pencil:
         numerator: Matrix,
         denominators: Sequence[Matrix],
         *,
-        extra: tuple[str, ...] = (),
+        extra: Mapping[str, float] | None = None,
         weights: Weights | None = None,
         fixed: frozenset[str] = frozenset(),
     ) -> None:
         self._function = MatrixFunction([numerator, *denominators], fixed=fixed)
         self._own = self._function.variables
-        self.variables = (*self._own, *extra)
+        self.variables = (*self._own, *(extra or {}))
+        self._largest = np.array(list((extra or {}).values()))
         self._weights = weights
         self._count = len(denominators)
 
@@ -205,7 +207,7 @@ class Pencil:
         points = np.where(e.signs[corner] > 0, hi[:, :own], lo[:, :own])
         points = np.where(e.signs[corner] == 0, 0.5 * (lo + hi)[:, :own], points)
         middle = 0.5 * (lo + hi)[:, own:]
-        extent = scale * _ratio(lo[:, own:], hi[:, own:])
+        extent = scale * _ratio(lo[:, own:], hi[:, own:], self._largest)
         return Estimate(
             np.where(np.isnan(value), np.inf, value),
             np.concatenate([points, middle], axis=1),
@@ -345,8 +347,9 @@ def _estimate(value: Array, caused: Array, e: Expansion, lo: Array, hi: Array) -
     return Estimate(value.max(axis=1), corner, cause, spread + cause)
 
 
-def _ratio(lo: Array, hi: Array) -> Array:
-    """Relative width of positive ranges; 1 where they reach 0."""
-    return np.where(lo > 0, (hi - lo) / np.where(lo > 0, lo, 1.0), 1.0)
+def _ratio(lo: Array, hi: Array, largest: Array) -> Array:
+    """Relative width of positive ranges; of those that reach 0 the part of the whole range [0, largest].
 
-
+    A part that shrinks: a range at 0 would otherwise be halved for ever where only other variables can help.
+    """
+    return np.where(lo > 0, (hi - lo) / np.where(lo > 0, lo, 1.0), hi / largest)
