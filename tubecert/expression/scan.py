@@ -304,12 +304,12 @@ class _Walk:
         raise token.error(f"unknown symbol {name[:40]}", suggestion(name, known), "symbol")
 
     def _uncalled(self) -> ExpressionError:
-        assert self.last is not None  # noqa: S101 - callers have seen the function's name
+        assert self.last is not None
         name = self.last.text
         return self.last.error(f"{name} needs an argument in parentheses", f"write {name}(...)")
 
     def _juxtaposed(self, token: _Token) -> ExpressionError:
-        assert self.last is not None  # noqa: S101 - no operand can be unexpected at the start
+        assert self.last is not None
         left = self.last.text if self.last.text != ")" else "(...)"
         right = token.text if token.text != "(" else "(...)"
         if self.last.kind == "name" and token.text == "(":

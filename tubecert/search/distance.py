@@ -224,7 +224,7 @@ def _asked(problem: TubeProblem, bandwidth: Fraction | None, rate: Fraction | No
 
         at = smallest(serves, low, best, 60)
         bandwidth = round_up((at if np.isfinite(at) else best) * (1 + _SLACK), DIGITS)
-    assert bandwidth is not None  # noqa: S101 - one of the two is asked for
+    assert bandwidth is not None
     if rate is None:
         return proven_at(problem, bandwidth)
     e = least_rate(problem, n, np.array([float(bandwidth)]))[1]

@@ -171,7 +171,7 @@ def _asked_recipe(
     """The recipe for gains asked for; what is not asked for is chosen as small as possible."""
     if bandwidth is not None:
         return recipe_at(s, bandwidth, Gamma)
-    assert Gamma is not None  # noqa: S101 - one of the two is asked for
+    assert Gamma is not None
     best: tuple[float, float] = (np.inf, np.inf)
     for part in found:
         low, high = part.low, min(part.high, 1e6 * part.low)

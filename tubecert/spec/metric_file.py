@@ -42,7 +42,7 @@ def _read(root: Field, spec: Spec) -> Metric | None:
     entries = root.mapping(required=("format", "rate", "dual_metric"), optional=_REPORTED)
     if entries is None or "format" not in entries or entries["format"].word((FORMAT,)) is None:
         return None
-    assert isinstance(root.node, MappingNode)  # noqa: S101 - it has just been read as one
+    assert isinstance(root.node, MappingNode)
     used = tuple((key, node) for key, node in root.node.pairs if key.text in ("rate", "dual_metric"))
     if len(used) < 2:
         return None

@@ -257,7 +257,7 @@ class Field:
 
     def inside(self, offset: int, width: int) -> Location:
         """The place of a part of a scalar's text."""
-        assert isinstance(self.node, Scalar)  # noqa: S101
+        assert isinstance(self.node, Scalar)
         return self.reader.source.location(place_in(self.reader.source, self.node, offset), width)
 
     # findings
