@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from tubecert import pipeline
 from tubecert.certificate import exit_code, seal
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.errors import SpecError
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Options, certify, gains
 from tubecert.search.distance import search_distance
 from tubecert.search.rates import search_26
 from tubecert.search.sampled import search_sampled
@@ -54,7 +53,7 @@ def captured_problem(text, monkeypatch, **options):
         seen.append(problem)
         return search_26(problem, **asked)
 
-    monkeypatch.setattr(pipeline, "search_26", keep)
+    monkeypatch.setattr(gains, "search_26", keep)
     run(text, **options)
     return seen[0]
 

@@ -10,14 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tubecert import pipeline
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import ExitCode, SpecError
 from tubecert.model import build
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Options, certify, gains
 from tubecert.search.distance import search_distance
 from tubecert.search.rates import search_26
 from tubecert.search.sampled import search_sampled
@@ -312,7 +311,7 @@ def first_problem(spec, options, monkeypatch):
         seen.append(given)
         return search_26(given, **asked)
 
-    monkeypatch.setattr(pipeline, "search_26", keep)
+    monkeypatch.setattr(gains, "search_26", keep)
     return certify(spec, options), seen[0]
 
 

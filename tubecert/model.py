@@ -162,17 +162,16 @@ def divide(a: Matrix, e: Expression) -> Matrix:
 
 
 def build(spec: Spec) -> ControlAffineModel:
-    """The model of a specification that has a metric."""
-    if spec.metric is None:
-        raise ValueError("the specification has no metric")
+    """The model of a specification; without a metric, W is empty."""
+    metric = spec.metric
     h = spec.uncertainty.h
     return ControlAffineModel(
         states=spec.states,
         inputs=spec.inputs,
         f=tuple(term.expression for term in spec.f),
         B=tuple(tuple(term.expression for term in row) for row in spec.B),
-        W=tuple(tuple(term.expression for term in row) for row in spec.metric.dual_metric),
-        rate=spec.metric.rate,
+        W=tuple(tuple(term.expression for term in row) for row in metric.dual_metric) if metric else (),
+        rate=metric.rate if metric else Fraction(0),
         h=None if h is None else tuple(term.expression for term in h),
     )
 
@@ -233,9 +232,10 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
     findings = []
     for duty, location in term.owed():
         used = {v: ranges[v] for v in sorted(free_symbols([duty.argument])) if v in ranges}
-        decision = _nonzero(duty.argument, used, effort)
         if duty.kind == "positive":
             decision = decide(scalar(-duty.argument), BoxDomain(used), 0.0, effort)
+        else:
+            decision = _nonzero(duty.argument, used, effort)
         if decision.verdict == "proven":
             continue
         wrong = "is zero" if duty.kind == "nonzero" else "is not positive"

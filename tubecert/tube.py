@@ -219,6 +219,7 @@ def containment(
     effort: Effort,
 ) -> Containment:
     """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
+    radius = Fraction(radius)
     if not plan.defined:
         return _knots_outside(plan.knots, radius, states, safe_set)
     undecided: Containment | None = None
@@ -232,7 +233,8 @@ def containment(
             else:
                 fine = Effort(gap=0.0, absolute=1e-7 * float(highest - lowest), budget=effort.budget)
                 found = supremum(scalar(sign * exact, plan.fixed), plan.domain, fine)
-                low, high, t = Fraction(found.below), Fraction(found.above), plan.moment(found.at) or 0.0
+                low, t = Fraction(found.below), plan.moment(found.at) or 0.0
+                high = Fraction(found.above) if np.isfinite(found.above) else limit + 1  # not bounded: undecided
             if high + radius <= limit:
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))

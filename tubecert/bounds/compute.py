@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -24,13 +25,15 @@ _INFLATION = 1 + Fraction(1, 10**6)
 class Radius:
     """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, an exact decimal.
 
-    `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused.
+    `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused. `obstacle`
+    says why the fixed point was not found, if it was not.
     """
 
     rho: Fraction
     lower: Constant | None
     upper: Constant | None
     contained: Containment
+    obstacle: str = ""
 
 
 def least_radius(
@@ -55,16 +58,21 @@ def least_radius(
         rho = needed(*declared)
         return Radius(rho=rho, lower=declared[0], upper=declared[1], contained=check(rho))
     rho = decimal_above(Fraction(float(offset.hi)) + width)
+    contained = check(rho)
     for _ in range(_ROUNDS):
         contained = check(rho)
         if contained.verdict != "certified":
             return Radius(rho=rho, lower=None, upper=None, contained=contained)
         a, A = suprema.with_radius(rho).metric_bounds()
+        if not (a.below > 0 and math.isfinite(A.above)):
+            obstacle = "the metric could not be bounded over the tube"
+            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=obstacle)
         right = needed(a, A)
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
         rho = decimal_above(right * _INFLATION) if right < rho * _CLOSE else right
-    raise ValueError("the radius did not settle")
+    obstacle = f"rho = sqrt(A/a)|x0* - x0| + eps + rho_a did not settle: it grows with the tube beyond {float(rho):.6g}"
+    return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=obstacle)
 
 
 def bound_constants(

@@ -39,7 +39,7 @@ class Constant:
     @property
     def gap(self) -> float:
         """Relative width (above - below)/|above|; 0 for an exact value."""
-        return 0.0 if self.above == self.below else (self.above - self.below) / abs(self.above)
+        return 0.0 if self.above == self.below else (self.above - self.below) / abs(self.above or self.below)
 
     def printable(self) -> Constant:
         """The same, widened to bounds of `DIGITS` digits: what is printed is what is used (see `printable_above`)."""

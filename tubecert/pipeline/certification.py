@@ -1,25 +1,20 @@
-"""Certification from a specification to a result: the rooms in their order.
-
-In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every verdict.
-A claim that fails ends the work: what rests on it is not computed.
-"""
+"""One certification: its claims in their order. A claim that fails ends it: what rests on it is not computed."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
-from tubecert.bounds.compute import Radius, bound_constants, least_radius, time_range
-from tubecert.bounds.constants import DERIVED, BoundConstants, Constant, Witness
+from tubecert.bounds.compute import Radius, bound_constants, least_radius
+from tubecert.bounds.constants import BoundConstants, Constant, Witness
 from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
-from tubecert.certificate.reasons import defect_advice, reasons_26, reasons_distance, reasons_sampled
+from tubecert.certificate.reasons import defect_advice
 from tubecert.certificate.sections import (
     assumptions,
     ceiling_text,
@@ -36,99 +31,25 @@ from tubecert.certificate.sections import (
 )
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
-from tubecert.conditions.rates import derived_constants
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
-from tubecert.errors import SpecError
-from tubecert.findings import Finding, Severity
 from tubecert.metric.geodesic import unique_geodesics
 from tubecert.metric.verify import MetricProof, verify_metric
-from tubecert.model import TIME, ControlAffineModel, build, domain_findings, place, rank_decision, time_period
-from tubecert.search.distance import search_distance
-from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
-from tubecert.search.rates import search_26
-from tubecert.search.results import recipe_json
-from tubecert.search.sampled import search_sampled
+from tubecert.model import TIME, ControlAffineModel, build, rank_decision
+from tubecert.pipeline.gains import gains
+from tubecert.pipeline.options import Options, Progress, Step, overrides_data
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import Room, plan_of, remedy
 from tubecert.tube import Tube
 
 Result = dict[str, Any]
-_ORDER = ("refuted", "undecided", "certified")
 _NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
-CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """What the command line asks for beside the specification."""
-
-    rho_a: Fraction | None = None
-    epsilon: Fraction | None = None
-    metric: Path | None = None
-    conditions: str = "26"
-    formulas: str = "corrected"
-    bandwidth: Fraction | None = None
-    adaptation_rate: Fraction | None = None
-    gap: Fraction = Fraction(1, 100)
-    budget: int = 2_000_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """Progress: what is being bounded, boxes so far, and the bounds so far.
-
-    Where something is counted that is not boxes and has no bounds, `unit` says what.
-    """
-
-    name: str
-    boxes: int
-    below: float = -math.inf
-    above: float = math.inf
-    unit: str = "boxes"
-
-
-Progress = Callable[[Step], None]
-
-
-def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
-    """What is wrong with the mathematics of a specification, without certifying it."""
-    findings, time = _time(spec)
-    if findings:
-        return findings
-    effort = Effort(budget=budget)
-    findings = domain_findings(spec, time, effort)
-    if findings:
-        return findings
-    decision = rank_decision(build(spec), spec.safe_set, effort)
-    if decision.verdict == "refuted":
-        findings.append(
-            Finding(
-                code="TC203",
-                message=f"B loses rank in the safe set, at {place(decision.at)}",
-                location=spec.location("system.B"),
-                help="shrink the safe set, or remove an input that does nothing there",
-            )
-        )
-    return findings
-
-
-def certify(spec: Spec, options: Options, progress: Progress | None = None) -> Result:
-    """The result for a specification; raises `SpecError` for what makes the question meaningless."""
-    spec = _overridden(spec, options)
-    findings, time = _time(spec)
-    findings += _complete(spec)
-    if not findings:
-        findings = domain_findings(spec, time, Effort(budget=options.budget))
-    if any(item.severity is Severity.ERROR for item in findings):
-        raise SpecError(findings)
-    return _Certification(spec, options, time, progress).run()
-
-
-class _Certification:
+class Certification:
     """One run; `result` grows as the rooms answer."""
 
     def __init__(self, spec: Spec, options: Options, time: Range | None, progress: Progress | None) -> None:
@@ -147,7 +68,8 @@ class _Certification:
                 "effective_hash": digest(text),
                 "file_hash": "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
             },
-            "overrides": _overrides(options),
+            "overrides": overrides_data(options),
+            "effort": {"gap": decimal_data(options.gap), "budget": options.budget},
             "plan": {"kind": spec.trajectory.kind},
             "safe_set": {
                 name: [decimal_data(low), decimal_data(high)]
@@ -266,6 +188,10 @@ class _Certification:
         width = tube.epsilon + tube.rho_a
         radius = least_radius(suprema, self.spec.safe_set, self.start.offset(suprema), width, declared)
         contained = radius.contained
+        if radius.obstacle:
+            remedy_text = "reduce the initial error, declare metric.bounds, or raise --budget"
+            self._stop("radius of the tube", "undecided", radius.obstacle, relax=remedy_text)
+            return None
         if contained.verdict == "certified":
             return radius
         radii = {"epsilon": tube.epsilon, "rho_a": tube.rho_a, "rho": radius.rho}
@@ -389,46 +315,11 @@ class _Certification:
         self.result["assumptions"] = assumptions(self.spec, self.model, test)
 
     def _search(self, problem: TubeProblem) -> None:
-        """Gains of A, B and C; those conditions that were chosen decide the verdict."""
-        asked = {"bandwidth": self.options.bandwidth, "adaptation_rate": self.options.adaptation_rate}
-        rates = search_26(problem, **asked)
-        distance = search_distance(problem, **asked)
-        sampled = search_sampled(problem, bandwidth=self.options.bandwidth)
-        if rates.pair is not None:
-            for name, value in derived_constants(problem, rates.pair.recipe).items():
-                self.result["constants"][name] = constant_data(value.printable(), DERIVED[name])
-        slopes = {
-            "conditions_26": elasticities_26(problem, rates),
-            "distance": elasticities_distance(problem, distance),
-        }
-        explained = {
-            "conditions_26": reasons_26(rates, halving(problem, slopes["conditions_26"], _least_26)),
-            "distance": reasons_distance(distance, halving(problem, slopes["distance"], _least_distance)),
-            "sampled": reasons_sampled(sampled),
-        }
-        self.result |= {
-            "conditions_26": rates.to_dict(),
-            "distance": distance.to_dict(),
-            "sampled": sampled.to_dict(),
-            "elasticities": slopes,
-        }
-        pairs = {"conditions_26": rates.pair, "distance": distance.decisive, "sampled": sampled.pair}
-        self.result["proof"] = {
-            name: recipe_json(pair.recipe)
-            for name, pair in pairs.items()
-            if pair is not None and self.result[name]["verdict"] == "certified"
-        }
-        every = self.options.conditions == "all"
-        chosen = list(CONDITIONS.values()) if every else [CONDITIONS[self.options.conditions]]
-        self.result["decided_by"] = chosen
-        self.result["reasons"] += [reason for name in chosen for reason in explained[name]]
-        verdicts = {self.result[name]["verdict"] for name in chosen}
-        if self.options.formulas == Formulas.AS_PRINTED:
-            verdicts.add("undecided")
-            verdicts.discard("certified")
-            if "conditions_26" not in chosen:
-                self.result["reasons"] += explained["conditions_26"]
-        self.result["verdict"] = next(word for word in _ORDER if word in verdicts)
+        """Gains of A, B and C, and the verdict."""
+        found = gains(problem, self.options)
+        self.result["constants"] |= found.pop("constants")
+        self.result["reasons"] += found.pop("reasons")
+        self.result |= found
         self._advise(problem)
 
     def _advise(self, problem: TubeProblem) -> None:
@@ -464,66 +355,3 @@ class _Certification:
             self.effort,
             progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
         )
-
-
-def _least_26(problem: TubeProblem) -> Fraction | None:
-    pair = search_26(problem).least_adaptation
-    return None if pair is None else pair.recipe.adaptation_rate
-
-
-def _least_distance(problem: TubeProblem) -> Fraction | None:
-    pair = search_distance(problem).least_adaptation
-    return None if pair is None else pair.recipe.adaptation_rate
-
-
-def _overridden(spec: Spec, options: Options) -> Spec:
-    tube = replace(
-        spec.tube,
-        epsilon=spec.tube.epsilon if options.epsilon is None else options.epsilon,
-        rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
-    )
-    return replace(spec, tube=tube)
-
-
-def _complete(spec: Spec) -> list[Finding]:
-    """What a certification needs and a specification may lack."""
-    missing = []
-    if spec.metric is None:
-        missing.append(("metric", "give metric.dual_metric and metric.rate, or --metric FILE"))
-    if spec.tube.epsilon is None:
-        missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
-    if spec.tube.rho_a is None:
-        missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
-    return [
-        Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
-        for key, remedy in missing
-    ]
-
-
-def _time(spec: Spec) -> tuple[list[Finding], Range | None]:
-    """The range of time that matters for h, or why there is none."""
-    h = spec.uncertainty.h
-    period = time_period(term.expression for term in h or ())
-    try:
-        return [], time_range(spec.trajectory.horizon, period)
-    except ValueError as error:
-        finding = Finding(
-            code="TC204",
-            message=str(error),
-            location=spec.location("uncertainty.h"),
-            help="add trajectory.horizon, in seconds",
-        )
-        return [finding], None
-
-
-def _overrides(options: Options) -> Result:
-    given = {
-        "rho_a": options.rho_a,
-        "epsilon": options.epsilon,
-        "bandwidth": options.bandwidth,
-        "adaptation_rate": options.adaptation_rate,
-    }
-    result: Result = {name: decimal_data(value) for name, value in given.items() if value is not None}
-    if options.metric is not None:
-        result["metric"] = options.metric.name
-    return result

@@ -1,0 +1,63 @@
+"""What makes a question meaningless, as located findings: missing parts, undefined expressions, rank, time."""
+
+from __future__ import annotations
+
+from tubecert.bounds.compute import time_range
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.domain import Range
+from tubecert.findings import Finding
+from tubecert.model import build, domain_findings, place, rank_decision, time_period
+from tubecert.spec import Spec
+
+
+def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
+    """What is wrong with the mathematics of a specification, without certifying it."""
+    findings, time = time_of(spec)
+    if findings:
+        return findings
+    effort = Effort(budget=budget)
+    findings = domain_findings(spec, time, effort)
+    if findings:
+        return findings
+    decision = rank_decision(build(spec), spec.safe_set, effort)
+    if decision.verdict == "refuted":
+        findings.append(
+            Finding(
+                code="TC203",
+                message=f"B loses rank in the safe set, at {place(decision.at)}",
+                location=spec.location("system.B"),
+                help="shrink the safe set, or remove an input that does nothing there",
+            )
+        )
+    return findings
+
+
+def missing_parts(spec: Spec) -> list[Finding]:
+    """What a certification needs and a specification may lack."""
+    missing = []
+    if spec.metric is None:
+        missing.append(("metric", "give metric.dual_metric and metric.rate, or --metric FILE"))
+    if spec.tube.epsilon is None:
+        missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
+    if spec.tube.rho_a is None:
+        missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
+    return [
+        Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
+        for key, remedy in missing
+    ]
+
+
+def time_of(spec: Spec) -> tuple[list[Finding], Range | None]:
+    """The range of time that matters for h, or why there is none."""
+    h = spec.uncertainty.h
+    period = time_period(term.expression for term in h or ())
+    try:
+        return [], time_range(spec.trajectory.horizon, period)
+    except ValueError as error:
+        finding = Finding(
+            code="TC204",
+            message=str(error),
+            location=spec.location("uncertainty.h"),
+            help="add trajectory.horizon, in seconds",
+        )
+        return [finding], None

@@ -1,0 +1,71 @@
+"""What a command asks for beside the specification, and how progress is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from tubecert.certificate.sections import decimal_data
+from tubecert.spec import Spec
+
+CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the command line asks for beside the specification."""
+
+    rho_a: Fraction | None = None
+    epsilon: Fraction | None = None
+    metric: Path | None = None
+    conditions: str = "26"
+    formulas: str = "corrected"
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    gap: Fraction = Fraction(1, 100)
+    budget: int = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """Progress: what is being bounded, boxes so far, and the bounds so far.
+
+    Where something is counted that is not boxes and has no bounds, `unit` says what.
+    """
+
+    name: str
+    boxes: int
+    below: float = -math.inf
+    above: float = math.inf
+    unit: str = "boxes"
+
+
+Progress = Callable[[Step], None]
+
+
+def overridden(spec: Spec, options: Options) -> Spec:
+    """The specification with the radii of the command line."""
+    tube = replace(
+        spec.tube,
+        epsilon=spec.tube.epsilon if options.epsilon is None else options.epsilon,
+        rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
+    )
+    return replace(spec, tube=tube)
+
+
+def overrides_data(options: Options) -> dict[str, Any]:
+    """`result.overrides`: what the command line changed."""
+    given = {
+        "rho_a": options.rho_a,
+        "epsilon": options.epsilon,
+        "bandwidth": options.bandwidth,
+        "adaptation_rate": options.adaptation_rate,
+    }
+    result: dict[str, Any] = {name: decimal_data(value) for name, value in given.items() if value is not None}
+    if options.metric is not None:
+        result["metric"] = options.metric.name
+    return result
