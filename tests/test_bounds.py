@@ -571,3 +571,14 @@ def test_periods():
     assert period(sin(t * t)) is None
     assert period(graph.exp(-t)) is None
     assert period(sin((t + 1) - t)) == (1, 1)  # any period will do
+
+
+def test_waves_that_cancel_where_they_agree_are_no_period():
+    """t (sin t - cos t) grows for ever, although sin and cos agree at some t."""
+    t = symbol("t")
+    wave = graph.sin(t) - graph.cos(t)
+    assert time_period([t * wave]) is None
+    assert time_period([graph.exp(t * wave)]) is None
+    found = time_period([1 / (graph.sin(t) ** 2 + graph.cos(t) ** 2 - 2)])  # the divisor is -1
+    assert found is not None
+    assert found.lo <= 2 * math.pi <= found.hi

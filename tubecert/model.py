@@ -199,7 +199,8 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
                 of_pi.append(slope.args[0].fraction)
             else:
                 return None
-            replaced[node] = constant(1)
+            # a name of its own: t times a difference of waves must not lose its t
+            replaced[node] = symbol(f"wave#{len(replaced)}")
     if TIME in free_symbols(replaced[root] for root in roots) or (rational and of_pi):
         return None
     if not rational and not of_pi:
