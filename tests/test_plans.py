@@ -17,12 +17,13 @@ from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.errors import SpecError
 from tubecert.expression import constant, cos, sin, symbol
+from tubecert.expression.matrix import column
 from tubecert.model import ControlAffineModel
 from tubecert.pipeline import Options, certify
 from tubecert.spec import Knots, load, load_text
 from tubecert.spec.table import MAX_ROWS
 from tubecert.trajectory.defect import Defect
-from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.trajectory.pieces import TAU, piecewise_plan
 from tubecert.tube import Tube, containment
 
 x, y = symbol("x"), symbol("y")
@@ -104,6 +105,32 @@ def test_windows_contain_every_point_and_both_sides_of_a_jump(interpolation, end
         for i in range(2):
             assert Fraction(float(states.lo[0, i])) <= value[i] <= Fraction(float(states.hi[0, i]))
         assert Fraction(float(inputs.lo[0, 0])) <= u <= Fraction(float(inputs.hi[0, 0]))
+
+
+def test_a_window_that_begins_or_ends_at_a_jump_holds_both_sides():
+    data = replace(knots(), t=tuple(Fraction(n, 4) for n in range(5)))  # times that are floats
+    plan = piecewise_plan(POLYNOMIAL, data)
+    for k in (1, 2, 3):
+        t = float(data.t[k])
+        for low, high in ((t, t), (t, t + 0.1), (t - 0.1, t)):
+            _, inputs = plan.enclose(np.array([low]), np.array([high]))
+            assert inputs.lo[0, 0] <= min(data.u[k - 1][0], data.u[k][0])
+            assert inputs.hi[0, 0] >= max(data.u[k - 1][0], data.u[k][0])
+
+
+def test_a_supremum_along_the_plan_reaches_the_ends_of_its_pieces():
+    data = knots("linear")
+    data = replace(data, u=(*data.u[:-1], (Fraction(-7),)))
+    plan = piecewise_plan(POLYNOMIAL, data)
+    found = supremum(SumOfNorms([column(plan.u)], plan.fixed), plan.domain, Effort())
+    assert found.below == pytest.approx(7, rel=1e-9)
+    assert found.above >= 7
+    assert plan.moment(found.at) == pytest.approx(1.3)
+    names = plan.domain.variables((TAU, "x0#0"))
+    lo, hi = plan.domain.inside(names, np.array([[9.0, 0.0, 2.0], [-1.0, 0.0, 0.0]]))
+    assert lo[:, 0] == pytest.approx([0.7, 0])  # the points are moved into their pieces
+    assert hi[0, 0] <= Fraction(7, 10)
+    assert lo[0, 1] <= data.x[2][0] <= hi[0, 1]
 
 
 def test_windows_are_tight():
@@ -270,9 +297,9 @@ def test_the_norm_in_a_metric_is_proven_from_both_sides():
     norm = MetricNorm(v, W)
     rng = np.random.default_rng(1)
     lo = rng.uniform(-1, 1, (50, 2))
-    hi = lo + rng.uniform(0, 0.2, (50, 2))
+    hi = lo + rng.uniform(0, 1.5, (50, 2))
     upper = norm.upper(lo, hi, np.inf).upper
-    for _ in range(50):
+    for _ in range(500):
         point = lo + rng.uniform(0, 1, lo.shape) * (hi - lo)
         a, b = point.T
         value = np.stack([a - b, a * b + 1], axis=-1)
