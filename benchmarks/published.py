@@ -31,7 +31,9 @@ def sampled(section: dict[str, Any]) -> str:
 def main() -> None:
     """Print the table."""
     spec = load(str(CONFIG))
-    print("| eps, rho_a | published | required by the printed conditions | A, corrected | B, least Gamma | C |")
+    print(
+        "| eps, rho_a | published | required by the printed conditions | A, corrected | B, least Gamma | C |"
+    )
     print("|---|---|---|---|---|---|")
     for (epsilon, rho_a), (omega, Gamma) in PUBLISHED.items():
         radii = {"epsilon": Fraction(epsilon), "rho_a": Fraction(rho_a)}

@@ -23,7 +23,9 @@ def wall(command: list[str], runs: int = RUNS) -> tuple[float, float]:
     times, memory = [], 0.0
     for run in range(runs + 1):
         start = time.perf_counter()
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
+        with subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
+        ) as process:
             process.wait()
         if run:
             times.append(time.perf_counter() - start)
@@ -81,7 +83,9 @@ def growth() -> None:
         planning, _ = once(lambda spec=spec: certify(spec, Options()))
         seconds, _ = timed(lambda spec=spec: certify(spec, Options()))
         reference = reference or seconds
-        print(f"{knots} knots: {seconds:.2f} s ({seconds / reference:.2f} x), first run with planning {planning:.2f} s")
+        print(
+            f"{knots} knots: {seconds:.2f} s ({seconds / reference:.2f} x), first run with planning {planning:.2f} s"
+        )
     spec = load_text(text, str(TRACKING))
     reference = None
     for rho in ("0.1", "0.3", "0.6"):
@@ -118,7 +122,9 @@ def suprema() -> None:
         "sup lmax(W)": (Pencil, (model.W, [eye]), [model.W]),
     }
     for name, (kind, arguments, matrices) in cases.items():
-        seconds, found = timed(lambda kind=kind, arguments=arguments: supremum(kind(*arguments), domain, effort))
+        seconds, found = timed(
+            lambda kind=kind, arguments=arguments: supremum(kind(*arguments), domain, effort)
+        )
         mean = kind(*arguments)
         mean._function = MatrixFunction(matrices if kind is SumOfNorms else [matrices[0], eye], order=1)
         mean_seconds, mean_found = timed(lambda mean=mean: supremum(mean, domain, effort))
@@ -130,7 +136,9 @@ def suprema() -> None:
         )
 
 
-def grid(function: object, safe_set: tuple[tuple[Fraction, Fraction], ...], value: float) -> tuple[float, float]:
+def grid(
+    function: object, safe_set: tuple[tuple[Fraction, Fraction], ...], value: float
+) -> tuple[float, float]:
     """Time and number of points of a grid whose spacing bounds the error by 1e-3 through the Lipschitz constant."""
     import numpy as np
 

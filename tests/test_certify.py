@@ -122,7 +122,10 @@ def test_as_printed_reproduces_the_papers_own_formulas():
     [
         (edited(with_metric(THREE, PRINTED_THREE), ("rate: 0.9999", "rate: 1")), "0.99653"),
         (edited(THREE, ("rate: 0.9999", "rate: 1")), "0.99999"),
-        (edited(ORBIT, ('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")), "1.73933"),
+        (
+            edited(ORBIT, ('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")),
+            "1.73933",
+        ),
     ],
     ids=["three-state as printed", "three-state at rate 1", "two-state as printed"],
 )
@@ -141,7 +144,8 @@ def test_false_metrics_are_refuted_with_a_point_and_the_largest_rate(text, large
 def test_scaling_the_metric_changes_no_gain(three, scale):
     spec = load_text(THREE, "spec.yaml")
     rows = "\n".join(
-        "    - [" + ", ".join(f'"{scale}*({term.text})"' for term in row) + "]" for row in spec.metric.dual_metric
+        "    - [" + ", ".join(f'"{scale}*({term.text})"' for term in row) + "]"
+        for row in spec.metric.dual_metric
     )
     assert_same_gains(three, run(with_metric(THREE, f"  dual_metric:\n{rows}\n")))
 
@@ -158,7 +162,8 @@ def test_permuting_the_states_changes_no_gain(three):
 
     f = "\n".join(f"    - {renamed(spec.f[i].text)}" for i in order)
     w = "\n".join(
-        "    - [" + ", ".join(f'"{renamed(spec.metric.dual_metric[i][j].text)}"' for j in order) + "]" for i in order
+        "    - [" + ", ".join(f'"{renamed(spec.metric.dual_metric[i][j].text)}"' for j in order) + "]"
+        for i in order
     )
     text = f"""tubecert: 1
 name: permuted
@@ -310,12 +315,22 @@ def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_
     assert around["spec"]["effective"]["initial_state"] == {"within": "0.01732050808"}
     assert around["tube"]["rho"] == pytest.approx(three["tube"]["rho"], rel=1e-6)
     d0, point = around["constants"]["initial_distance"], three["constants"]["initial_distance"]
-    assert point["above"] <= d0["above"] == pytest.approx(0.01732050808 * around["metric"]["upper"][1] ** 0.5, rel=1e-6)
+    assert (
+        point["above"]
+        <= d0["above"]
+        == pytest.approx(0.01732050808 * around["metric"]["upper"][1] ** 0.5, rel=1e-6)
+    )
     assert around["conditions_26"]["bandwidth"] > three["conditions_26"]["bandwidth"]  # E0 is larger
 
 
 def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
-    text = edited(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}"))
+    text = edited(
+        THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}")
+    )
     result = run(text, conditions="distance")
-    assert result["constants"]["h_initial"]["below"] <= 0.01 <= result["constants"]["h_initial"]["above"] * (1 + 1e-9)
+    assert (
+        result["constants"]["h_initial"]["below"]
+        <= 0.01
+        <= result["constants"]["h_initial"]["above"] * (1 + 1e-9)
+    )
     assert result["constants"]["h_initial"]["above"] <= 0.0101

@@ -306,6 +306,9 @@ def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: 
     for digits in (1, 3, 6):
         at = {name: round(value, digits) for name, value in decision.at.items()}
         exact = {name: constant(Fraction(repr(value))) for name, value in at.items()}
-        if all(box[v][0] <= exact[v].fraction <= box[v][1] for v in exact) and substitute([gram], exact)[0] is ZERO:
+        if (
+            all(box[v][0] <= exact[v].fraction <= box[v][1] for v in exact)
+            and substitute([gram], exact)[0] is ZERO
+        ):
             return replace(decision, verdict="refuted", at=at)
     return decision

@@ -234,7 +234,9 @@ def containment(
                 fine = Effort(gap=0.0, absolute=1e-7 * float(highest - lowest), budget=effort.budget)
                 found = supremum(scalar(sign * exact, plan.fixed), plan.domain, fine)
                 low, t = Fraction(found.below), plan.moment(found.at) or 0.0
-                high = Fraction(found.above) if np.isfinite(found.above) else limit + 1  # not bounded: undecided
+                high = (
+                    Fraction(found.above) if np.isfinite(found.above) else limit + 1
+                )  # not bounded: undecided
             if high + radius <= limit:
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))

@@ -37,7 +37,11 @@ class Radius:
 
 
 def least_radius(
-    suprema: Suprema, safe_set: Box, offset: Interval, width: Fraction, declared: tuple[Constant, Constant] | None
+    suprema: Suprema,
+    safe_set: Box,
+    offset: Interval,
+    width: Fraction,
+    declared: tuple[Constant, Constant] | None,
 ) -> Radius:
     """The least rho with rho >= sqrt(A/a)|x0* - x0| + width, where a and A are those of O(rho) itself.
 
@@ -119,7 +123,9 @@ def bound_constants(
     return replace(constants.printable(), **declared)
 
 
-def time_range(horizon: Fraction | None, period: Interval | None) -> tuple[Fraction | float, Fraction | float] | None:
+def time_range(
+    horizon: Fraction | None, period: Interval | None
+) -> tuple[Fraction | float, Fraction | float] | None:
     """The range of t over which h must be bounded: the horizon, or one period where there is no horizon.
 
     None if h does not depend on t or is not given; raises `ValueError` if neither is known.

@@ -41,7 +41,9 @@ class BoundConstants:
     B_x: Constant = field(metadata=_of("DBx", "assumption 3", "1/(u s)", "sup of the sum of |dB/dx_i|"))
     b_x: Constant = field(metadata=_of("Dbx", "assumption 3", "1/(u s)", "sup of the sum of |db_j/dx|"))
     B_pinv: Constant = field(metadata=_of("DBp", "assumption 5", "u s/x", "sup |B^+|"))
-    B_pinv_x: Constant = field(metadata=_of("DBpx", "assumption 5", "u s/x^2", "sup of the sum of |dB^+/dx_i|"))
+    B_pinv_x: Constant = field(
+        metadata=_of("DBpx", "assumption 5", "u s/x^2", "sup of the sum of |dB^+/dx_i|")
+    )
     M_x: Constant = field(metadata=_of("DMx", "bounds:M_x", "1/x", "sup of the sum of |dM/dx_i|"))
     u_star: Constant = field(metadata=_of("Dus", "assumption 2", "u", "sup |u*|"))
     h: Constant = field(metadata=_of("Dh", "assumption 4", "u", "sup |h|"))
@@ -63,10 +65,14 @@ class BoundConstants:
         metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
     )
     input_gain_least: Constant = field(
-        metadata=_of("smin(Theta B)", "bounds:delta_u", "d/(u s)", "inf of the smallest singular value of Theta B")
+        metadata=_of(
+            "smin(Theta B)", "bounds:delta_u", "d/(u s)", "inf of the smallest singular value of Theta B"
+        )
     )
     contraction_excess: Constant = field(
-        metadata=_of("lmax(F~)", "bounds:delta_u", "1/s", "sup of the largest eigenvalue of the pencil (F, W)")
+        metadata=_of(
+            "lmax(F~)", "bounds:delta_u", "1/s", "sup of the largest eigenvalue of the pencil (F, W)"
+        )
     )
 
     def printable(self) -> BoundConstants:
@@ -86,7 +92,13 @@ DERIVED: dict[str, Meaning] = {
         ("speed", "Y", "bounds:dx", "x/s", "bound of |xdot|"),
         ("uncertainty_rate", "s1", "theory 2", "u/s", "bound of |dh(t, x(t))/dt|"),
         ("prediction_error", "Dxt", "bounds:tx", "x/s^0.5", "bound of |xtilde| times the root of Gamma"),
-        ("filter_error", "Deta", "bounds:teta", "u/s^0.5", "bound of the filtered error times the root of Gamma"),
+        (
+            "filter_error",
+            "Deta",
+            "bounds:teta",
+            "u/s^0.5",
+            "bound of the filtered error times the root of Gamma",
+        ),
         ("theta", "Dtheta", "bounds:theta", "d^2/x", "effect of the estimation error in (26c)"),
         ("Psi_x", "DPsix", "bounds:psi_x", "1/x", "slope of the input direction along a geodesic"),
         ("geodesic_rate", "Dgs", "bounds:dgamma_s", "1/s", "rate of the geodesic's initial velocity"),

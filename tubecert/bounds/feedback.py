@@ -53,9 +53,13 @@ class ClosedFormGain:
             kn = whitening(H[0])
             Kn: Ball = (kn, np.zeros_like(kn))
             # N'(T'T)^-1 N >= H/lmax(T W T')
-            least_h = eigenvalues_midrad(*product(Kn, product(H, _transposed(Kn)))).lo[:, 0] / scaled.hi[:, -1]
+            least_h = (
+                eigenvalues_midrad(*product(Kn, product(H, _transposed(Kn)))).lo[:, 0] / scaled.hi[:, -1]
+            )
             mixed = product(Kn, product(_transposed(N), right))
-            cross = spectral_norm_midrad(*mixed).hi / np.sqrt(np.where(least_h > 0, least_h * least_g, np.nan))
+            cross = spectral_norm_midrad(*mixed).hi / np.sqrt(
+                np.where(least_h > 0, least_h * least_g, np.nan)
+            )
         smallest = eigenvalues_midrad(*G).lo[:, 0] * scaled.lo[:, 0]
         valid = (least_g > 0) & (smallest > 0) & (scaled.lo[:, 0] > 0)
         value = np.sqrt((cross**2 + push**2 / 4) / np.where(valid, smallest, np.nan)) * (1 + 1e-13)
@@ -74,5 +78,3 @@ class ClosedFormGain:
 
 def _transposed(ball: Ball) -> Ball:
     return np.swapaxes(ball[0], -1, -2), np.swapaxes(ball[1], -1, -2)
-
-

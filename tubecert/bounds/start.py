@@ -70,7 +70,9 @@ class KnownStart:
         if all(d is ZERO for d in delta):
             return Constant.exactly(0.0)
         s = symbol("s")
-        along = dict(zip(suprema.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True))
+        along = dict(
+            zip(suprema.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True)
+        )
         edges = np.linspace(0.0, 1.0, _PIECES + 1)
         function = MatrixFunction([substituted(suprema.model.W, along), column(delta), ((s,),)])
         with np.errstate(all="ignore"):

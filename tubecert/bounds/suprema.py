@@ -133,7 +133,9 @@ class Suprema:
         """
         top = self._over_tube("feedback_gain", Pencil(self.model.BBt, [self.model.W]))
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
-        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], extra={MU: largest}, weights=_mu_weights)
+        objective = Pencil(
+            self.model.F, [self.model.BBt, self.model.W], extra={MU: largest}, weights=_mu_weights
+        )
         found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:

@@ -32,7 +32,9 @@ class Domain(Protocol):
         """Boxes (N, d) that cover the domain's projection to `variables`."""
         ...
 
-    def contract(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def contract(
+        self, variables: tuple[str, ...], lo: Array, hi: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Smaller boxes with the same points of the domain, and which of them may contain any."""
         ...
 
@@ -145,7 +147,9 @@ class _Search:
                 for old, new in zip((lo, hi, bound), zip(*children, strict=True), strict=True)
             )
             if self.effort.progress:
-                self.effort.progress(self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf))))
+                self.effort.progress(
+                    self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf)))
+                )
         if not np.isfinite(self.below) and not len(lo) and not np.isfinite(self.settled):
             raise ValueError("the domain is empty, or the objective could be evaluated nowhere")
         above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
@@ -171,7 +175,9 @@ class _Search:
         if not len(lo):
             return lo, hi, bound
         self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
-        estimate = self._widened(self.objective.upper(lo[:, : self.own], hi[:, : self.own], self.target), lo, hi)
+        estimate = self._widened(
+            self.objective.upper(lo[:, : self.own], hi[:, : self.own], self.target), lo, hi
+        )
         bound = np.minimum(bound, estimate.upper)
         self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
         priority = self.domain.priorities(self.variables, lo, hi, estimate)

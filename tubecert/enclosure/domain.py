@@ -30,7 +30,9 @@ class BoxDomain:
         ends = np.array([self._outer[v] for v in variables]).reshape(-1, 2)
         return ends[None, :, 0].copy(), ends[None, :, 1].copy()
 
-    def contract(self, variables: tuple[str, ...], lo: Array, hi: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def contract(
+        self, variables: tuple[str, ...], lo: Array, hi: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Boxes never leave the domain: nothing to do."""
         return lo, hi, np.ones(len(lo), dtype=bool)
 

@@ -188,7 +188,9 @@ def _widened(lo: Array, hi: Array) -> Interval:
 def sqrt(a: Interval) -> Interval:
     """Square root; NaN where the operand reaches below 0."""
     lo, hi = np.sqrt(a.lo), np.sqrt(a.hi)
-    return Interval(np.where(a.lo == 0, 0.0, np.maximum(down(lo), 0.0)), np.where(np.isnan(lo), np.nan, up(hi)))
+    return Interval(
+        np.where(a.lo == 0, 0.0, np.maximum(down(lo), 0.0)), np.where(np.isnan(lo), np.nan, up(hi))
+    )
 
 
 def exp(a: Interval) -> Interval:

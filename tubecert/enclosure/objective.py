@@ -190,11 +190,19 @@ class Pencil:
         e = self._function.expand(lo[:, :own], hi[:, :own])
         weights = self._combine(lo, hi)
         numerator = e.mid[0], e.rad[0] + e.rest[0].sum(axis=0)
-        denominator = _weighted(weights, e.mid[1:], [r + s.sum(axis=0) for r, s in zip(e.rad, e.rest, strict=True)][1:])
+        denominator = _weighted(
+            weights, e.mid[1:], [r + s.sum(axis=0) for r, s in zip(e.rad, e.rest, strict=True)][1:]
+        )
         t = self._frame(hi, e.mid[1:])
         above = _pencil_bound(t, numerator, denominator)
-        excess = _excess(t, numerator, denominator, target) if np.isfinite(target) else np.full(above.shape, np.inf)
-        corner = np.argmax(np.where(np.isnan(excess), -np.inf, excess) if np.isfinite(target) else above, axis=1)
+        excess = (
+            _excess(t, numerator, denominator, target)
+            if np.isfinite(target)
+            else np.full(above.shape, np.inf)
+        )
+        corner = np.argmax(
+            np.where(np.isnan(excess), -np.inf, excess) if np.isfinite(target) else above, axis=1
+        )
         value = np.where(np.max(excess, axis=1) <= 0, np.fmin(target, above.max(axis=1)), above.max(axis=1))
         value = value if self._weights is None else np.maximum(value, 0.0)
         caused = np.zeros((lo.shape[1], *above.shape))
@@ -300,7 +308,9 @@ def _weighted(weights: Sequence[Array], mids: Sequence[Array], rads: Sequence[Ar
     return np.asarray(mid), np.asarray(rad * (1 + 1e-14) + 1e-15 * size)
 
 
-def _excess(t: Array, numerator: tuple[Array, Array], denominator: tuple[Array, Array], tau: float | Array) -> Array:
+def _excess(
+    t: Array, numerator: tuple[Array, Array], denominator: tuple[Array, Array], tau: float | Array
+) -> Array:
     """Upper bound of lmax(T (N - tau D) T'): where it is <= 0, N <= tau D is proven; (N, V)."""
     tau = np.asarray(tau)[..., None, None] if np.ndim(tau) else np.asarray(tau)
     mid = numerator[0] - tau * denominator[0]

@@ -96,6 +96,8 @@ def _multiplier(centre: list[Array], target: float) -> Array:
         mixed = form[row][np.ix_(~in_range, in_range)]
         own = form[row][np.ix_(in_range, in_range)]
         room = max(-np.linalg.eigvalsh(null)[-1], 1e-12) if null.size else 1.0
-        needed = 2 * np.linalg.norm(mixed) ** 2 / room + max(0.0, np.linalg.eigvalsh(own)[-1]) if own.size else 0.0
+        needed = (
+            2 * np.linalg.norm(mixed) ** 2 / room + max(0.0, np.linalg.eigvalsh(own)[-1]) if own.size else 0.0
+        )
         result[row] = 1.1 * needed / max(d[row][in_range].min(initial=1.0), 1e-300)
     return result

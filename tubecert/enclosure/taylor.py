@@ -83,9 +83,7 @@ class MatrixFunction:
         """Variables in which every entry is affine, and the others."""
         if self._order < 2:
             return (), free
-        affine = tuple(
-            v for v in free if all(e is ZERO for e in derivatives(first[v], v))
-        )[:_MOST_VERTICES]
+        affine = tuple(v for v in free if all(e is ZERO for e in derivatives(first[v], v)))[:_MOST_VERTICES]
         return affine, tuple(v for v in free if v not in affine)
 
     @property
@@ -148,7 +146,9 @@ class MatrixFunction:
             )
             slack = 4e-16 * (len(steps) + 2) * (np.abs(mid) + sum(map(np.abs, steps), start=np.zeros(())))
             mids.append(_fold(lifted, len(choices), count))
-            rads.append(_fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count))
+            rads.append(
+                _fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count)
+            )
             full = np.broadcast_to((rest * (1 + 1e-14))[:, None], (dim, *lifted.shape))
             folded = [_fold(part, len(choices), count) for part in full]
             rests.append(np.stack(folded) if folded else np.zeros((0, *mids[-1].shape)))
@@ -228,6 +228,6 @@ def _fold(values: Array, choices: int, count: int) -> Array:
     """(F, A N, p, q) -> (N, F A, p, q)."""
     flips = values.shape[0]
     p, q = values.shape[-2:]
-    return np.ascontiguousarray(
-        np.moveaxis(values.reshape(flips, choices, count, p, q), 2, 0)
-    ).reshape(count, flips * choices, p, q)
+    return np.ascontiguousarray(np.moveaxis(values.reshape(flips, choices, count, p, q), 2, 0)).reshape(
+        count, flips * choices, p, q
+    )
