@@ -5,7 +5,7 @@ from __future__ import annotations
 from tubecert.bounds.compute import time_range
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
-from tubecert.findings import Finding
+from tubecert.findings import Finding, Location
 from tubecert.model import build, domain_findings, place, rank_decision, time_period
 from tubecert.spec import Spec
 
@@ -41,8 +41,14 @@ def missing_parts(spec: Spec) -> list[Finding]:
         missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
     if spec.tube.rho_a is None:
         missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
+    top = Location(file=spec.path, line=1, column=1)
     return [
-        Finding(code="TC105", message=f"{key} is needed to certify", location=spec.location(key), help=remedy)
+        Finding(
+            code="TC105",
+            message=f"{key} is needed to certify",
+            location=spec.location(key) or top,
+            help=remedy,
+        )
         for key, remedy in missing
     ]
 
