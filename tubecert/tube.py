@@ -21,7 +21,6 @@ from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, down, up
 from tubecert.enclosure.objective import Estimate, scalar
 from tubecert.model import TIME
-from tubecert.spec import Knots
 from tubecert.trajectory import Plan
 from tubecert.trajectory.plan import PIECE
 
@@ -221,7 +220,7 @@ def containment(
     """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
     radius = Fraction(radius)
     if not plan.defined:
-        return _knots_outside(plan.knots, radius, states, safe_set)
+        return _knots_outside(plan, radius, states, safe_set)
     undecided: Containment | None = None
     worst: Containment | None = None
     for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
@@ -231,12 +230,16 @@ def containment(
                 low = high = sign * exact.fraction
                 t = 0.0
             else:
-                fine = Effort(gap=0.0, absolute=1e-7 * float(highest - lowest), budget=effort.budget)
+                width = 1e-7 * float(highest - lowest)
+                # relative to the limit that is the same; to a curve far beyond it, it is all that matters
+                fine = Effort(
+                    gap=width / float(max(abs(highest), abs(lowest))), absolute=width, budget=effort.budget
+                )
                 found = supremum(scalar(sign * exact, plan.fixed), plan.domain, fine)
-                low, t = Fraction(found.below), plan.moment(found.at) or 0.0
-                high = (
-                    Fraction(found.above) if np.isfinite(found.above) else limit + 1
-                )  # not bounded: undecided
+                t = plan.moment(found.at) or 0.0
+                # what is not bounded is undecided
+                low = Fraction(found.below) if np.isfinite(found.below) else limit - radius - 1
+                high = Fraction(found.above) if np.isfinite(found.above) else limit + 1
             if high + radius <= limit:
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))
@@ -258,17 +261,22 @@ def containment(
 
 
 def _knots_outside(
-    knots: Knots | None,
+    plan: Plan,
     radius: Fraction,
     states: tuple[str, ...],
     safe_set: tuple[tuple[Fraction, Fraction], ...],
 ) -> Containment:
     """The knot that is farthest from being allowed, for a curve whose slopes are not defined everywhere.
 
-    Inside the safe set they are, so that a knot outside is to be expected.
+    Inside the safe set they are, so that a knot outside is to be expected. Knots beyond the horizon shape the last
+    piece only: the curve need not reach them.
     """
     worst = Containment(verdict="undecided", excess=0.0)
-    for t, x in zip(knots.t, knots.x, strict=True) if knots else ():
+    knots = plan.knots
+    reached = zip(knots.t, knots.x, strict=True) if knots else ()
+    for t, x in reached:
+        if plan.horizon is not None and t > plan.horizon:
+            break
         for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
             for side, sign, excess in (("upper", 1, x[i] - highest), ("lower", -1, lowest - x[i])):
                 if excess + radius > worst.excess:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
@@ -49,18 +51,28 @@ def least_radius(
     With declared a and A (proven on the safe set) there is nothing to iterate.
     """
 
-    def needed(a: Constant, A: Constant) -> Fraction:
+    def needed(a: Constant, A: Constant) -> Fraction | None:
+        """The right-hand side, None if it is beyond all floats."""
+        if not a.below > 0:
+            return None
         if not offset.hi > 0:
             return width
-        overshoot = sqrt(Interval(A.above) / Interval(a.below))
-        return decimal_above(Fraction(float((overshoot * offset).hi)) + width)
+        with np.errstate(all="ignore"):
+            overshoot = float((sqrt(Interval(A.above) / Interval(a.below)) * offset).hi)
+        return decimal_above(Fraction(overshoot) + width) if math.isfinite(overshoot) else None
 
     def check(rho: Fraction) -> Containment:
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
+    beyond = "rho = sqrt(A/a)|x0* - x0| + eps + rho_a is beyond the range of numbers"
+    nowhere = Containment(verdict="undecided")
     if declared is not None:
-        rho = needed(*declared)
-        return Radius(rho=rho, lower=declared[0], upper=declared[1], contained=check(rho))
+        given = needed(*declared)
+        if given is None:
+            return Radius(rho=width, lower=None, upper=None, contained=nowhere, obstacle=beyond)
+        return Radius(rho=given, lower=declared[0], upper=declared[1], contained=check(given))
+    if not math.isfinite(offset.hi):
+        return Radius(rho=width, lower=None, upper=None, contained=nowhere, obstacle=beyond)
     rho = decimal_above(Fraction(float(offset.hi)) + width)
     contained = check(rho)
     for _ in range(_ROUNDS):
@@ -72,6 +84,8 @@ def least_radius(
             obstacle = "the metric could not be bounded over the tube"
             return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=obstacle)
         right = needed(a, A)
+        if right is None:
+            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=beyond)
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
         rho = decimal_above(right * _INFLATION) if right < rho * _CLOSE else right

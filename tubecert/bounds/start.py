@@ -21,6 +21,7 @@ from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, whitening
 from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.tape import Tape
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, substitute, symbol
 from tubecert.expression.matrix import column
@@ -58,7 +59,10 @@ class KnownStart:
         if all(d is ZERO for d in delta):
             return Interval(0.0)
         found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), suprema.effort)
-        return Interval(found.below, found.above)
+        if np.isfinite(found.above):
+            return Interval(found.below, found.above)
+        parts = Tape(delta, ()).run([], ())  # squares overflow: the sum of magnitudes is larger than the norm
+        return Interval(0.0, np.nextafter(parts.magnitude.sum() * (1 + 1e-13), np.inf))
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
         """The length of the straight segment from x*(0) to x0.

@@ -150,8 +150,10 @@ class _Search:
                 self.effort.progress(
                     self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf)))
                 )
-        if not np.isfinite(self.below) and not len(lo) and not np.isfinite(self.settled):
-            raise ValueError("the domain is empty, or the objective could be evaluated nowhere")
+        if self.below == self.settled == -np.inf and not len(
+            lo
+        ):  # an objective that is not bounded settles at inf
+            raise ValueError("the domain is empty")
         above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
         tolerance = max(self.effort.gap * abs(self.below), self.effort.absolute)
         return Supremum(
