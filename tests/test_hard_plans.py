@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import permutations
+from math import prod
 
+import numpy as np
 import pytest
 
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.expression import constant, symbol
-from tubecert.model import ControlAffineModel
+from tubecert.expression.matrix import determinant
+from tubecert.expression.parse import parse
+from tubecert.model import ControlAffineModel, rank_decision
 from tubecert.pipeline import Options, certify
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -124,3 +129,40 @@ def test_a_knot_beyond_the_horizon_refutes_nothing():
 
 def test_a_curve_far_outside_is_refuted_within_few_boxes():
     assert far_beyond(knots("0 0 0 0", "1 1e300 0 0"), None, LINEAR.f) == "refuted"
+
+
+def test_determinants_of_numbers_are_eliminated():
+    rng = np.random.default_rng(0)
+    for n in range(1, 6):
+        rows = [[constant(int(v)) for v in row] for row in rng.integers(-3, 4, (n, n))]
+        rows[0][0] = ZERO
+        exact = sum(
+            (-1) ** sum(p[i] > p[j] for i in range(n) for j in range(i + 1, n))
+            * prod(int(rows[i][p[i]].fraction) for i in range(n))
+            for p in permutations(range(n))
+        )
+        assert determinant(rows) is constant(exact)
+
+
+@pytest.mark.parametrize("entry", ["1", "2 + sin(x25)"])
+def test_many_inputs_are_no_hang(entry):
+    """Of 32 states and 16 inputs there are 6e8 minors; B = (0, D) has one that matters."""
+    names = tuple(f"x{i}" for i in range(32))
+    value = parse(entry, symbols={name: symbol(name) for name in names}).expression
+    B = tuple(tuple(value if i == 16 + j else ZERO for j in range(16)) for i in range(32))
+    model = replace(LINEAR, states=names, inputs=tuple(f"u{j}" for j in range(16)), f=(ZERO,) * 32, B=B)
+    decision = rank_decision(model, [(Fraction(-1), Fraction(1))] * 32, Effort())
+    assert decision.verdict == "proven"
+    assert len(model.pivots[0]) == 1
+
+
+def test_a_minor_that_is_not_the_only_one_refutes_nothing():
+    """Each of x and y vanishes somewhere, both together never: B = (x, y) on a set without the origin."""
+    model = replace(LINEAR, B=((x,), (y,)))
+    box = [(Fraction(-1), Fraction(1)), (Fraction(1, 2), Fraction(1))]
+    assert rank_decision(model, box, Effort()).verdict == "proven"
+    both = replace(LINEAR, B=((x,), (y - x**2,)))
+    assert (
+        rank_decision(both, [box[0], (Fraction(-1, 8), Fraction(1))], Effort(budget=2_000)).verdict
+        == "refuted"
+    )

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, reduce
-from itertools import combinations
+from itertools import combinations, islice
 from math import gcd, lcm
 from typing import TYPE_CHECKING
 
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
 TIME = "t"
 _RANK_BUDGET = 20_000
+_MINORS = 1_000  # of B that are looked at: there may be billions
 
 
 @dataclass(frozen=True)
@@ -149,6 +150,13 @@ class ControlAffineModel:
         product = multiply(self.b_x[j], self.W)
         moved = along(self.W, self.columns[j], self.states)
         return combine(1, moved, -1, combine(1, product, 1, transpose(product)))
+
+    @cached_property
+    def pivots(self) -> tuple[list[tuple[int, ...]], bool]:
+        """Choices of m rows of B that may be independent, and whether these are all there are."""
+        rows = [i for i, row in enumerate(self.B) if any(e is not ZERO for e in row)]
+        chosen = list(islice(combinations(rows, len(self.inputs)), _MINORS + 1))
+        return chosen[:_MINORS], len(chosen) <= _MINORS
 
     def drift_on_plan(self) -> Matrix:
         """f(x) + B(x) u* as a column, with the input names standing for u*, (n, 1)."""
@@ -292,12 +300,13 @@ def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: 
     an exact evaluation of det(B'B) at a rational point.
     """
     box = dict(zip(model.states, safe_set, strict=True))
-    rows = combinations(range(len(model.states)), len(model.inputs))
-    minors = [d for d in (determinant([model.B[i] for i in chosen]) for chosen in rows) if d is not ZERO]
+    chosen, complete = model.pivots
+    minors = [d for d in (determinant([model.B[i] for i in rows]) for rows in chosen) if d is not ZERO]
     short = replace(effort, budget=min(effort.budget, _RANK_BUDGET))
-    decisions = [_nonzero(d, {v: box[v] for v in sorted(free_symbols([d]))}, short) for d in minors]
-    for decision in decisions:
-        if decision.verdict == "proven" or (decision.verdict == "refuted" and len(minors) == 1):
+    for d in minors:
+        decision = _nonzero(d, {v: box[v] for v in sorted(free_symbols([d]))}, short)
+        only = complete and len(minors) == 1
+        if decision.verdict == "proven" or (decision.verdict == "refuted" and only):
             return decision
     gram = determinant(model.gram)
     decision = decide(scalar(-gram), BoxDomain(box), 0.0, short)

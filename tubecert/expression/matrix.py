@@ -72,11 +72,30 @@ def determinant(a: Rows) -> Expression:
     """The determinant by expansion along the first row (meant for as many rows as a system has inputs)."""
     if not a:
         return ONE
+    if len(a) > 2 and all(e.is_constant for row in a for e in row):
+        return constant(_rational_determinant([[e.fraction for e in row] for row in a]))
     total = ZERO
     for j, entry in enumerate(a[0]):
         if entry is not ZERO:
             minor = [[*row[:j], *row[j + 1 :]] for row in a[1:]]
             total = total + (-1) ** j * entry * determinant(minor)
+    return total
+
+
+def _rational_determinant(rows: list[list[Fraction]]) -> Fraction:
+    """The determinant by elimination."""
+    total = Fraction(1)
+    for j in range(len(rows)):
+        chosen = next((i for i in range(j, len(rows)) if rows[i][j] != 0), None)
+        if chosen is None:
+            return Fraction(0)
+        if chosen != j:
+            rows[j], rows[chosen] = rows[chosen], rows[j]
+            total = -total
+        total *= rows[j][j]
+        for row in rows[j + 1 :]:
+            factor = row[j] / rows[j][j]
+            row[j:] = [x - factor * y for x, y in zip(row[j:], rows[j][j:], strict=True)]
     return total
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations
 from math import isfinite
 
 import numpy as np
@@ -128,8 +127,8 @@ def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Ef
 
     With B_1 the pivot rows and B_2 the others, v = (v_1, v_2) has B'v = 0 iff v_1 = -(B_2 B_1^-1)' v_2.
     """
-    n, m = len(model.states), len(model.inputs)
-    for rows in combinations(range(n), m):
+    n = len(model.states)
+    for rows in model.pivots[0]:
         pivot = determinant([model.B[i] for i in rows])
         if not any(
             decide(scalar(sign * pivot), domain, 0.0, replace(effort, budget=2_000)).verdict == "proven"
