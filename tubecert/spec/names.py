@@ -119,7 +119,7 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
     items = field.items(None, f"{what} names") if field else None
     if items is None:
         return None
-    names = [_name(item.text(f"the name of a {what}"), item, what, taken) for item in items]
+    names = [_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None
 
 
@@ -146,8 +146,12 @@ def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
     if name in _RESERVED:
         return f"{name} is a reserved word", f"choose another name, e.g. {name}_"
     if name in taken:
-        return f"{name} is already the name of a {taken[name]}", "names are unique"
+        return f"{name} is already the name of {_with_article(taken[name])}", "names are unique"
     return None
+
+
+def _with_article(what: str) -> str:
+    return f"an {what}" if what[0] in "aeiou" else f"a {what}"
 
 
 def _read_parameters(field: Field | None, taken: dict[str, str]) -> tuple[tuple[str, Fraction], ...]:
