@@ -26,6 +26,7 @@ ROOMS = [
     "conditions",
     "search",
     "certificate",
+    "simulate",
     "pipeline",
     "report",
     "cli",

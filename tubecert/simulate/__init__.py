@@ -1,0 +1,16 @@
+"""Simulation: the closed loops of the paper, integrated fast, to attack a certificate.
+
+In: a model, a plan, gains and a disturbance. Out: `Runs` with their own error estimate. Trusted: no. A simulation may falsify
+a certificate and never supports one; no trusted room imports this one. Implements: theory 2 to 4b, the loops.
+
+| module | what it does |
+|---|---|
+| `problem`, `runs` | what is simulated, and what comes out |
+| `integrator` | steps are halved until the error estimate is small enough; lanes on all cores |
+| `grid` | the times of the steps, the plan at them, and the fast part's exact steps |
+| `program`, `compiled` | expressions as arrays for one compiled interpreter; compilation kept between runs |
+| `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
+| `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
+| `computer` | the controller as a computer: everything held between samples |
+| `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
+"""

@@ -1,0 +1,184 @@
+"""What is simulated: a loop with its gains, and the disturbance that acts on every lane (one lane is one run)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.expression import Expression, free_symbols
+from tubecert.model import TIME, ControlAffineModel
+from tubecert.trajectory import Plan
+
+Controller = Literal["nominal", "ccm", "reference", "l1", "sampled"]
+CONTROLLERS: tuple[Controller, ...] = ("nominal", "ccm", "reference", "l1", "sampled")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gains:
+    """The gains of the adaptive part; P = I.
+
+    `bandwidth` in rad/s; `adaptation_rate` is Gamma, needed by "l1"; `predictor_gain` is A_m (n, n), or a number g in
+    1/s for A_m = -g I ("sampled" needs the number); `projection_radius` is R_H; `smooth` the layer nu of the smooth
+    projection, None for the hard one; `sample_time` in s, needed by "sampled". ValueError if a gain is not positive.
+    """
+
+    bandwidth: float
+    projection_radius: float
+    predictor_gain: float | Array = 1.0
+    adaptation_rate: float | None = None
+    smooth: float | None = None
+    sample_time: float | None = None
+
+    def __post_init__(self) -> None:
+        positive = {
+            "bandwidth": self.bandwidth,
+            "projection_radius": self.projection_radius,
+            "adaptation_rate": self.adaptation_rate,
+            "smooth": self.smooth,
+            "sample_time": self.sample_time,
+        }
+        if isinstance(self.predictor_gain, float | int):
+            positive["predictor_gain"] = self.predictor_gain
+        for name, value in positive.items():
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be a positive number, not {value}")
+
+    def A_m(self, n: int) -> Array:
+        """The predictor's matrix, (n, n)."""
+        if isinstance(self.predictor_gain, float | int):
+            return -float(self.predictor_gain) * np.eye(n)
+        matrix = np.asarray(self.predictor_gain, dtype=float)
+        if matrix.shape != (n, n):
+            raise ValueError(f"A_m must have shape {(n, n)}, not {matrix.shape}")
+        return matrix
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoopProblem:
+    """One closed loop over [0, horizon] in s.
+
+    `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference system
+    (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in Hz the
+    whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing in
+    [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant).
+    """
+
+    model: ControlAffineModel
+    plan: Plan
+    controller: Controller
+    horizon: float
+    times: Array
+    gains: Gains | None = None
+    control_rate: float | None = None
+    degree: int = 5
+
+    def __post_init__(self) -> None:
+        if self.controller not in CONTROLLERS:
+            raise ValueError(f"controller must be one of {', '.join(CONTROLLERS)}, not {self.controller}")
+        if not (np.isfinite(self.horizon) and self.horizon > 0):
+            raise ValueError(f"horizon must be a positive time, not {self.horizon}")
+        if self.plan.horizon is not None and self.horizon > float(self.plan.horizon) * (1 + 1e-12):
+            raise ValueError(f"the plan ends at {float(self.plan.horizon):g} s, before {self.horizon:g} s")
+        if not len(self.times) or np.any(np.diff(self.times) <= 0):
+            raise ValueError("times must increase")
+        if self.times[0] < 0 or self.times[-1] > self.horizon * (1 + 1e-12):
+            raise ValueError("times must lie in [0, horizon]")
+        if self.control_rate is not None and not (np.isfinite(self.control_rate) and self.control_rate > 0):
+            raise ValueError(f"control_rate must be a positive frequency, not {self.control_rate}")
+        if self.degree < 2:
+            raise ValueError("degree must be at least 2")
+        needed = {"l1": "adaptation_rate", "sampled": "sample_time"}.get(self.controller)
+        if self.adaptive and self.gains is None:
+            raise ValueError(f"the controller {self.controller} needs gains")
+        if needed and getattr(self.gains, needed) is None:
+            raise ValueError(f"the controller {self.controller} needs the gain {needed}")
+        if self.controller == "sampled" and np.ndim(getattr(self.gains, "predictor_gain", 0.0)):
+            raise ValueError("the controller sampled needs a number as predictor_gain")
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether there is a filter."""
+        return self.controller in ("reference", "l1", "sampled")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Disturbance:
+    """h(t, x) of N lanes, evaluated inside the compiled loop; every array has the lanes first.
+
+    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c), where clip is the
+    projection to the ball of `radius` (inf: none), and c = B'M gamma_s / sqrt(|B'M gamma_s|^2 + layer^2) at x, the direction
+    that pushes away from the plan. At fixed x the rate of a wave is at most |amplitude| frequency, its slope |amplitude| |wave|.
+
+    Shapes: base (m,) expressions of t and the states, or None for 0; amplitude (N, W, m), frequency (N, W) in rad/s,
+    wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,).
+    """
+
+    base: tuple[Expression, ...] | None
+    amplitude: Array
+    frequency: Array
+    wave: Array
+    phase: Array
+    push: Array
+    radius: Array
+    centre: Array
+    layer: float = 1e-3
+
+    def __post_init__(self) -> None:
+        N, W, m = self.amplitude.shape
+        n = len(self.centre)
+        shapes = {"frequency": (N, W), "wave": (N, W, n), "phase": (N, W), "push": (N,), "radius": (N,)}
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, not {getattr(self, name).shape}")
+        if self.base is not None and len(self.base) != m:
+            raise ValueError(f"base must have {m} entries")
+        if not self.layer > 0:
+            raise ValueError("layer must be positive")
+
+    @property
+    def lanes(self) -> int:
+        """N."""
+        return len(self.push)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether h vanishes for every lane."""
+        return self.base is None and not np.any(self.amplitude) and not np.any(self.push)
+
+    def of(self, lanes: Array) -> Disturbance:
+        """The disturbance of some lanes, given by their numbers."""
+        return Disturbance(
+            base=self.base,
+            amplitude=self.amplitude[lanes],
+            frequency=self.frequency[lanes],
+            wave=self.wave[lanes],
+            phase=self.phase[lanes],
+            push=self.push[lanes],
+            radius=self.radius[lanes],
+            centre=self.centre,
+            layer=self.layer,
+        )
+
+    @classmethod
+    def from_expressions(
+        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int
+    ) -> Disturbance:
+        """The same h, given by expressions of t and the states, on every lane."""
+        if base is not None:
+            unknown = free_symbols(base) - {TIME, *model.states}
+            if unknown:
+                raise ValueError(f"h depends on {', '.join(sorted(unknown))}")
+        n, m = len(model.states), len(model.inputs)
+        return cls(
+            base=base,
+            amplitude=np.zeros((lanes, 0, m)),
+            frequency=np.zeros((lanes, 0)),
+            wave=np.zeros((lanes, 0, n)),
+            phase=np.zeros((lanes, 0)),
+            push=np.zeros(lanes),
+            radius=np.full(lanes, np.inf),
+            centre=np.zeros(n),
+        )
