@@ -7,7 +7,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `source` | reads the text within limits; lines and columns |
 | `document` | YAML events -> a tree that knows where each node stands |
 | `reader` | a cursor that answers with values or findings |
-| `names`, `system`, `plan`, `settings` | the sections of the file |
+| `names`, `system`, `plan`, `settings`, `obstacles`, `simulation` | the sections of the file |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `load` | puts the sections together |
@@ -26,6 +26,8 @@ from tubecert.spec.types import (
     Knots,
     Matrix,
     Metric,
+    Obstacle,
+    Simulation,
     Spec,
     Table,
     Task,
@@ -46,6 +48,8 @@ __all__ = [
     "Knots",
     "Matrix",
     "Metric",
+    "Obstacle",
+    "Simulation",
     "Spec",
     "Table",
     "Task",

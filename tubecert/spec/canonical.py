@@ -12,7 +12,7 @@ from typing import Any
 
 from tubecert.expression import number_text, to_text
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Matrix, Spec, Task, Term
+from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Task, Term
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -38,6 +38,10 @@ def canonical(spec: Spec) -> dict[str, Any]:
         data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
         if spec.expect.verdict is not None:
             data["expect"]["verdict"] = spec.expect.verdict
+    if spec.obstacles:
+        data["obstacles"] = [_obstacle(obstacle) for obstacle in spec.obstacles]
+    if spec.simulation is not None:
+        data["simulation"] = _simulation(spec.simulation)
     return data
 
 
@@ -97,6 +101,26 @@ def _metric(spec: Spec) -> dict[str, Any]:
     if spec.metric.lower is not None:
         data["bounds"] = _given(lower=spec.metric.lower, upper=spec.metric.upper)
     return data
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    shown: dict[str, Any] = {"states": list(obstacle.states)}
+    if obstacle.radius is None:
+        return shown | {"polygon": _matrix(obstacle.polygon)}
+    return shown | {"disc": {"center": _numbers(obstacle.center), **_given(radius=obstacle.radius)}}
+
+
+def _simulation(wanted: Simulation) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "controllers": list(wanted.controllers),
+        "gains": wanted.gains,
+        "plane": list(wanted.plane or ()),
+        "h": _texts(wanted.h or ()),
+        "runs": None if wanted.runs is None else str(wanted.runs),
+        "seed": None if wanted.seed is None else str(wanted.seed),
+        **_given(duration=wanted.duration, control_rate=wanted.control_rate),
+    }
+    return {key: value for key, value in data.items() if value}
 
 
 def _texts(terms: Iterable[Term]) -> list[str]:

@@ -13,9 +13,11 @@ from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
+from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import MAX_FINDINGS, Field, Reader, root_field
 from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
+from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty
 from tubecert.spec.types import Spec, Tube
@@ -23,8 +25,16 @@ from tubecert.spec.types import Spec, Tube
 VERSION: Final = 1
 
 _REQUIRED = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory")
-_OPTIONAL = ("initial_state", "metric", "tube", "adaptation", "conditions", "expect")
-_RESERVED = ("obstacles", "simulation")
+_OPTIONAL = (
+    "initial_state",
+    "metric",
+    "tube",
+    "adaptation",
+    "conditions",
+    "expect",
+    "obstacles",
+    "simulation",
+)
 
 
 def load(path: str) -> Spec:
@@ -71,7 +81,7 @@ def _read(root: Field) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
-    entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL, reserved=_RESERVED)
+    entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL)
     if entries is None:
         return None
     _check_version(entries.get("tubecert"))
@@ -103,9 +113,11 @@ def _read_named(
     adaptation = read_adaptation(entries.get("adaptation"), names)
     kernel, _ = read_kernel(entries.get("conditions"))
     expect = read_expectation(entries.get("expect"), names)
+    obstacles = read_obstacles(entries.get("obstacles"), names)
+    simulation = read_simulation(entries.get("simulation"), plan, names)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
-    if plan is None or x0 is None or tube is None or adaptation is None:
+    if plan is None or x0 is None or tube is None or adaptation is None or obstacles is None:
         return None
     return Spec(
         name=name,
@@ -127,6 +139,8 @@ def _read_named(
         adaptation=adaptation,
         kernel=kernel,
         expect=expect,
+        obstacles=obstacles,
+        simulation=simulation,
         locations=MappingProxyType(dict(reader.places)),
     )
 

@@ -155,6 +155,36 @@ class Expectation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacle:
+    """A simple polygon with corners (K, 2), or a disc, in the plane of two states."""
+
+    states: tuple[str, str]
+    polygon: Matrix = ()
+    center: Vector = ()
+    radius: Fraction | None = None
+
+    def __post_init__(self) -> None:
+        assert (len(self.polygon) >= 3) == (self.radius is None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """What `simulate` does by default: duration in s, control rate in Hz; no part of any claim.
+
+    h (m) is the uncertainty that acts in place of `uncertainty.h`.
+    """
+
+    controllers: tuple[str, ...] = ()
+    gains: str | None = None
+    duration: Fraction | None = None
+    runs: int | None = None
+    seed: int | None = None
+    control_rate: Fraction | None = None
+    plane: tuple[str, str] | None = None
+    h: tuple[Term, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
     """A system, its safe set, uncertainty, plan, metric and options; everything exact.
 
@@ -182,6 +212,8 @@ class Spec:
     adaptation: Adaptation
     kernel: Literal["tight", "paper"] | None
     expect: Expectation | None
+    obstacles: tuple[Obstacle, ...] = ()
+    simulation: Simulation | None = None
     locations: Mapping[str, Location] = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
