@@ -9,6 +9,8 @@ import math
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from tubecert.bounds.constants import Constant, Meaning, Witness
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.expression import number_text
@@ -19,6 +21,7 @@ from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
 
 Result = dict[str, Any]
+_SAMPLES = 201
 
 
 def declared_metric(spec: Spec) -> tuple[Constant, Constant] | None:
@@ -69,9 +72,10 @@ def plan_data(spec: Spec, plan: Plan) -> Result:
     trajectory = spec.trajectory
     knots = plan.knots
     if knots is None:
-        return {"kind": trajectory.kind, "interpolation": "exact"}
+        return {"kind": trajectory.kind, "interpolation": "exact", **_samples(plan)}
     data: Result = {
         "kind": trajectory.kind,
+        **_samples(plan),
         "interpolation": knots.interpolation,
         "curve": "between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*",
         "knots": {
@@ -85,6 +89,20 @@ def plan_data(spec: Spec, plan: Plan) -> Result:
     if trajectory.table is not None:
         data |= {"file": trajectory.table.file, "file_hash": f"sha256:{trajectory.table.sha256}"}
     return data
+
+
+def _samples(plan: Plan) -> Result:
+    """Points of a plan that moves, to draw it: 7 digits, no part of any proof."""
+    if plan.is_constant or plan.horizon is None:
+        return {}
+    t = np.linspace(0.0, float(plan.horizon), _SAMPLES)
+    t[-1] = np.nextafter(t[-1], 0.0)  # not beyond an exact horizon that lies below its float
+    x = plan.enclose(t, t)[0]
+    middle = 0.5 * x.lo + 0.5 * x.hi
+    if not np.all(np.isfinite(middle)):
+        return {}
+    rows = [[float(f"{value:.7g}") for value in row] for row in middle]
+    return {"samples": {"t": [float(f"{value:.7g}") for value in t], "x": rows}}
 
 
 def constant_data(value: Constant, meaning: Meaning) -> Result:

@@ -13,6 +13,7 @@ from tubecert.conditions.rates import derived_constants
 from tubecert.pipeline.options import CONDITIONS, Options
 from tubecert.search.distance import search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
+from tubecert.search.margins import margins_26_around, margins_distance_around
 from tubecert.search.rates import search_26
 from tubecert.search.results import recipe_json
 from tubecert.search.sampled import search_sampled
@@ -45,6 +46,10 @@ def gains(problem: TubeProblem, options: Options) -> dict[str, Any]:
         "sampled": sampled.to_dict(),
     }
     pairs = {"conditions_26": rates.pair, "distance": distance.decisive, "sampled": sampled.pair}
+    if rates.pair is not None:
+        sections["conditions_26"]["margins_around"] = margins_26_around(problem, rates.pair)
+    if distance.decisive is not None:
+        sections["distance"]["margins_around"] = margins_distance_around(problem, distance.decisive)
     chosen = list(CONDITIONS.values()) if options.conditions == "all" else [CONDITIONS[options.conditions]]
     verdicts = {sections[name]["verdict"] for name in chosen}
     deciding = chosen
