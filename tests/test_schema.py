@@ -1,0 +1,279 @@
+"""The JSON Schemas: they say what the readers and the writer say, and an editor that has only them agrees."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import certificates
+import jsonschema
+import pytest
+import yaml
+
+import tubecert
+from tubecert import certificate, pipeline, spec
+from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.errors import TubecertError
+from tubecert.spec.load import load, load_text
+from tubecert.spec.metric_file import with_metric
+from tubecert.spec.reader import Field
+
+PACKAGE = Path(tubecert.__file__).parent
+ROOT = PACKAGE.parent
+SCHEMAS = {path.name.split(".")[0]: json.loads(path.read_text("utf-8")) for path in (PACKAGE / "schemas").glob("*.json")}
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+GOOD = [*CONFIGS, *sorted((ROOT / "tests/specs/ok").glob("*.yaml")), *sorted((PACKAGE / "templates").glob("*.yaml"))]
+BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))
+STRUCTURAL = {"TC103", "TC106"}
+
+
+def errors(name: str, data: Any) -> list[str]:
+    validator = jsonschema.Draft202012Validator(SCHEMAS[name])
+    return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(data)]
+
+
+def as_text(path: Path) -> Any:
+    """The file with every scalar as the text that was written, which is how the reader sees it."""
+    return yaml.load(path.read_text("utf-8-sig"), Loader=yaml.BaseLoader)
+
+
+def as_editor(path: Path) -> Any:
+    return yaml.safe_load(path.read_text("utf-8-sig"))
+
+
+@pytest.mark.parametrize("name", sorted(SCHEMAS))
+def test_schemas_are_schemas(name):
+    jsonschema.Draft202012Validator.check_schema(SCHEMAS[name])
+    assert set(SCHEMAS) == {"spec", "metric", "certificate"}
+
+
+def described(schema: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every property that a schema introduces (conditions only mention them again)."""
+    if isinstance(schema, dict):
+        yield from ((f"{path}/{key}", value) for key, value in schema.get("properties", {}).items())
+        for key, value in schema.items():
+            if key not in ("if", "anyOf", "oneOf") or path.endswith(("A_m", "projection")):
+                yield from described(value, f"{path}/{key}")
+    elif isinstance(schema, list):
+        for item in schema:
+            yield from described(item, path)
+
+
+@pytest.mark.parametrize("name", sorted(SCHEMAS))
+def test_every_key_is_described(name):
+    for path, value in described(SCHEMAS[name]):
+        assert value.get("description") or "$ref" in value, path
+
+
+# specification
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+def test_good_files_fit(path):
+    assert not errors("spec", as_text(path))
+    if path.stem != "odd_style":  # its numbers are texts to YAML 1.1
+        assert not errors("spec", as_editor(path))
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+def test_the_effective_specification_fits(path):
+    assert not errors("spec", spec.canonical(load(str(path))))
+
+
+@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
+def test_what_the_reader_says_of_keys_and_kinds_the_schema_says_too(path):
+    codes = set(re.findall(r"# expect: (TC\d+)", path.read_text("utf-8", "replace")))
+    exempt = {"units_unknown", "yaml_complex_key"}  # keys that are names; YAML that a schema never sees
+    if codes and codes <= STRUCTURAL | {"TC113"} and path.stem not in exempt:
+        assert errors("spec", as_text(path))
+
+
+class Asked:
+    """Every question that the readers ask of a mapping: where, in which line, and for which keys."""
+
+    def __init__(self) -> None:
+        self.questions: dict[tuple[str, str], tuple[set[str], set[str]]] = {}
+        self.lines: set[tuple[str, int]] = set()
+
+    def record(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        real = Field.mapping
+
+        def mapping(field: Field, *, required=(), optional=(), reserved=()):
+            caller = sys._getframe(1)
+            self.lines.add((Path(caller.f_code.co_filename).name, caller.f_lineno))
+            kind = ""
+            if field.path == "trajectory":
+                kind = next(node.text for key, node in field.node.pairs if key.text == "kind")
+            if Path(caller.f_code.co_filename).name != "metric_file.py":
+                self.questions[(field.path, kind)] = (set(required), {*required, *optional})
+            return real(field, required=required, optional=optional, reserved=reserved)
+
+        monkeypatch.setattr(Field, "mapping", mapping)
+
+
+def subschema(path: str, kind: str) -> dict[str, Any]:
+    """The schema of the mapping at a dotted path."""
+    schema = SCHEMAS["spec"]
+    if path == "trajectory":
+        return schema["$defs"][f"trajectory_{kind}"]
+    for key in filter(None, re.split(r"\.|\[\d+\]", path)):
+        schema = schema.get("items", schema)
+        while "$ref" in schema:
+            schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
+        schema = schema.get("items", schema)
+        schema = schema["properties"][key]
+        choices = [item for item in schema.get("anyOf", ()) if "properties" in item]
+        schema = choices[0] if choices and "properties" not in schema else schema
+    while "$ref" in schema:
+        schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
+    return schema.get("items", schema) if "properties" not in schema else schema
+
+
+def sites() -> set[tuple[str, int, int]]:
+    """Where the readers of the specification call `.mapping(`."""
+    found = set()
+    for path in sorted((PACKAGE / "spec").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and node.func.attr == "mapping"
+            ):
+                found.add((path.name, node.lineno, node.end_lineno or node.lineno))
+    return found
+
+
+EVERYTHING = """
+tubecert: 1
+name: everything
+system: {states: [x], inputs: [u], parameters: {a: 1}, units: {x: m}, f: [-x], B: [[1]]}
+safe_set: {x: [-1, 1]}
+uncertainty: {h: ["0"], bounds: {h: 1}}
+trajectory: {kind: equilibrium, at: [0]}
+initial_state: {within: 0.1}
+metric: {rate: 1, dual_metric: [[1]], bounds: {lower: 1, upper: 1}}
+tube: {epsilon: 1, rho_a: 1}
+adaptation: {A_m: -1, projection: {smooth: 0.1}}
+conditions: {kernel: tight}
+expect: {verdict: certified}
+"""
+
+
+def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path):
+    """Every call of `.mapping(` is met, and what it asks for is what the schema says at that place."""
+    asked = Asked()
+    asked.record(monkeypatch)
+    for path in [*GOOD, *BAD]:
+        try:
+            load(str(path))
+        except (TubecertError, StopIteration):
+            continue
+    full = load_text(EVERYTHING)
+    metric = tmp_path / "metric.json"
+    metric.write_text(json.dumps({"format": "tubecert-metric/1", "rate": 1, "dual_metric": [[1]]}))
+    with_metric(full, str(metric))
+    unmet = {site for site in sites() if not any(n == site[0] and site[1] <= line <= site[2] for n, line in asked.lines)}
+    assert not unmet, "a section that no example file of tests/specs/ok has"
+    box = {"safe_set"}  # its keys are the states
+    for (path, kind), (required, known) in asked.questions.items():
+        if path in box:
+            continue
+        schema = subschema(path, kind)
+        assert set(schema["properties"]) == known, (path, kind)
+        if path != "uncertainty.bounds":  # depends on whether there is an h
+            assert set(schema.get("required", ())) == required, (path, kind)
+        assert schema["additionalProperties"] is False
+
+
+def test_the_choices_are_those_of_the_readers():
+    from tubecert.spec.plan import KINDS
+    from tubecert.spec.settings import RANGES, VERDICTS
+
+    properties = SCHEMAS["spec"]["properties"]
+    assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
+    assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
+    assert set(properties["expect"]["properties"]) == {"verdict", *RANGES}
+
+
+@pytest.mark.parametrize("path", [*CONFIGS], ids=lambda path: path.stem)
+def test_every_config_names_the_schema(path):
+    lines = path.read_text("utf-8").splitlines()
+    [named] = [line for line in lines if line.startswith("# yaml-language-server:")]
+    target = named.split("$schema=")[1]
+    assert (path.parent / target).resolve() == (PACKAGE / "schemas/spec.schema.json").resolve()
+
+
+# metric file
+
+
+def test_the_metric_file_has_the_keys_of_its_reader():
+    from tubecert.spec import metric_file
+
+    known = {"format", "rate", "dual_metric", *metric_file._REPORTED}
+    assert set(SCHEMAS["metric"]["properties"]) == known
+    assert SCHEMAS["metric"]["properties"]["format"]["const"] == metric_file.FORMAT
+
+
+# certificate
+
+
+def closed(schema: Any) -> Any:
+    """The same schema, refusing every key that it does not describe."""
+    if isinstance(schema, dict):
+        tight = {key: closed(value) for key, value in schema.items()}
+        if "properties" in schema and schema.get("type") == "object":
+            tight.setdefault("additionalProperties", False)
+        return tight
+    return [closed(item) for item in schema] if isinstance(schema, list) else schema
+
+
+CLOSED = jsonschema.Draft202012Validator(closed(SCHEMAS["certificate"]))
+VARIANTS = {
+    "certified": (ROOT / "configs/three_state.yaml", "", "", {}),
+    "everything decides": (ROOT / "configs/three_state.yaml", "", "", {"conditions": "all"}),
+    "as printed": (ROOT / "configs/three_state.yaml", "", "", {"formulas": "as-printed"}),
+    "budget": (ROOT / "configs/three_state.yaml", "", "", {"budget": 10}),
+    "metric refuted": (ROOT / "configs/three_state.yaml", "rate: 0.9999", "rate: 1", {}),
+    "leaves": (ROOT / "configs/three_state.yaml", "epsilon: 0.01", "epsilon: 0.1", {}),
+    "too much": (ROOT / "configs/three_state.yaml", "0.1*sin(2*t)", "10*sin(2*t)", {}),
+    "state-dependent": (ROOT / "configs/state_dependent_input.yaml", "", "", {}),
+}
+
+
+@pytest.mark.parametrize("name", list(VARIANTS))
+def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
+    path, old, new, options = VARIANTS[name]
+    text = path.read_text("utf-8")
+    assert old in text
+    result = pipeline.certify(load_text(text.replace(old, new) if old else text), pipeline.Options(**options))
+    sealed = json.loads(certificate.dump(certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})))
+    assert not [f"{error.json_path}: {error.message}" for error in CLOSED.iter_errors(sealed)]
+    assert not errors("spec", sealed["result"]["spec"]["effective"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"verdict": "fine"},
+        {"metric": {"margin": [1]}},
+        {"constants": {"h": {"above": 1}}},
+        {"reasons": [{"claim": "x"}]},
+        {"plan": {"kind": "magic"}},
+    ],
+)
+def test_what_is_no_certificate_does_not_fit(change):
+    result = certificates.certified()
+    sealed = certificate.seal(copy.deepcopy(result), {})
+    assert not [e for e in errors("certificate", sealed) if "hash" not in e]
+    sealed["result"].update(change)
+    assert [e for e in errors("certificate", sealed) if "hash" not in e]
+
+
+def test_constants_are_explained_elsewhere():
+    assert not set(TABLE) & set(DERIVED)
