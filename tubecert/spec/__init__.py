@@ -7,7 +7,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `source` | reads the text within limits; lines and columns |
 | `document` | YAML events -> a tree that knows where each node stands |
 | `reader` | a cursor that answers with values or findings |
-| `names`, `system`, `plan`, `settings`, `obstacles`, `simulation` | the sections of the file |
+| `names`, `system`, `plan`, `settings`, `obstacles`, `simulation`, `synthesis` | the sections of the file |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `load` | puts the sections together |
@@ -29,6 +29,7 @@ from tubecert.spec.types import (
     Obstacle,
     Simulation,
     Spec,
+    Synthesis,
     Table,
     Task,
     Term,
@@ -51,6 +52,7 @@ __all__ = [
     "Obstacle",
     "Simulation",
     "Spec",
+    "Synthesis",
     "Table",
     "Task",
     "Term",

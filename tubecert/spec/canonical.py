@@ -12,7 +12,7 @@ from typing import Any
 
 from tubecert.expression import number_text, to_text
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Task, Term
+from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -34,6 +34,8 @@ def canonical(spec: Spec) -> dict[str, Any]:
     }
     if spec.metric is not None:
         data["metric"] = _metric(spec)
+    elif spec.synthesis is not None:
+        data["metric"] = {"synthesise": _synthesis(spec.synthesis)}
     if spec.expect is not None:
         data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
         if spec.expect.verdict is not None:
@@ -101,6 +103,17 @@ def _metric(spec: Spec) -> dict[str, Any]:
     if spec.metric.lower is not None:
         data["bounds"] = _given(lower=spec.metric.lower, upper=spec.metric.upper)
     return data
+
+
+def _synthesis(wanted: Synthesis) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "objective": wanted.objective,
+        "degree": "auto" if wanted.degree is None else str(wanted.degree),
+        "variables": "auto" if wanted.variables is None else list(wanted.variables),
+        "route": wanted.route,
+        "solver": wanted.solver,
+    }
+    return data | _given(rate=wanted.rate, condition_number=wanted.condition_number)
 
 
 def _obstacle(obstacle: Obstacle) -> dict[str, Any]:

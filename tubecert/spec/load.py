@@ -19,8 +19,8 @@ from tubecert.spec.reader import MAX_FINDINGS, Field, Reader, root_field
 from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
-from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty
-from tubecert.spec.types import Spec, Tube
+from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty, wanted_metric
+from tubecert.spec.types import Metric, Spec, Synthesis, Tube
 
 VERSION: Final = 1
 
@@ -108,7 +108,7 @@ def _read_named(
     plan = read_trajectory(trajectory, names) if trajectory else None
     x0, within = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     plan = completed(plan, x0) if plan else None
-    metric = read_metric(entries["metric"], names) if "metric" in entries else None
+    metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)
     adaptation = read_adaptation(entries.get("adaptation"), names)
     kernel, _ = read_kernel(entries.get("conditions"))
@@ -135,6 +135,7 @@ def _read_named(
         x0=x0,
         within=within,
         metric=metric,
+        synthesis=synthesis,
         tube=tube,
         adaptation=adaptation,
         kernel=kernel,
@@ -143,6 +144,17 @@ def _read_named(
         simulation=simulation,
         locations=MappingProxyType(dict(reader.places)),
     )
+
+
+def _metric(field: Field | None, names: Names) -> tuple[Metric | None, Synthesis | None]:
+    """A metric, or what is asked for in its place."""
+    if field is None:
+        return None, None
+    before = len(field.reader.findings)
+    wanted = wanted_metric(field, names)
+    if wanted is not None or len(field.reader.findings) > before:
+        return None, wanted
+    return read_metric(field, names), None
 
 
 def _check_version(field: Field | None) -> None:

@@ -35,7 +35,7 @@ def with_metric(spec: Spec, path: str) -> Spec:
     metric = None if findings else _read(root_field(reader, node), spec)
     if reader.findings or metric is None:
         raise SpecError(reader.findings)
-    return replace(spec, metric=metric)
+    return replace(spec, metric=metric, synthesis=None)
 
 
 def _read(root: Field, spec: Spec) -> Metric | None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Final
 
 from tubecert.expression import to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
+from tubecert.spec.document import MappingNode
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Bounds, Metric, Term, TermMatrix, Uncertainty
+from tubecert.spec.synthesis import read_synthesis
+from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
 
@@ -69,9 +72,28 @@ def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None
     return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))
 
 
+METRIC_KEYS: Final = ("dual_metric", "rate", "bounds")
+
+
+def wanted_metric(field: Field, names: Names) -> Synthesis | None:
+    """What is to be synthesised, if the section asks for that; then nothing else may stand in it."""
+    pairs = field.pairs() if isinstance(field.node, MappingNode) else None
+    if not pairs or all(key.text != "synthesise" for key, _ in pairs):
+        return None
+    entries = field.mapping(required=("synthesise",), optional=METRIC_KEYS)
+    if entries is None or "synthesise" not in entries:
+        return None
+    for key in METRIC_KEYS:
+        if key in entries:
+            entries[key].fail(
+                codes.RANGE, f"{entries[key].path} beside metric.synthesise", "give a metric, or ask for one"
+            )
+    return read_synthesis(entries["synthesise"], names)
+
+
 def read_metric(field: Field, names: Names) -> Metric | None:
     """The dual metric with its rate, and declared bounds of the metric."""
-    entries = field.mapping(required=("dual_metric", "rate"), optional=("bounds",), reserved=("synthesise",))
+    entries = field.mapping(required=METRIC_KEYS[:2], optional=METRIC_KEYS[2:])
     if entries is None:
         return None
     n = len(names.states)

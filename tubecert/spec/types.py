@@ -131,6 +131,24 @@ class Metric:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Synthesis:
+    """What metric is asked for in place of a given one.
+
+    `rate` in 1/s, None if it is searched for; `objective`: least condition number, greatest margin (in C2), greatest
+    rate, least adaptation rate of the distance form, smallest tube; `degree` and `variables` of W, None: chosen
+    automatically; `condition_number`: not to be exceeded.
+    """
+
+    rate: Fraction | None = None
+    objective: str = "adaptation"
+    degree: int | None = None
+    variables: tuple[str, ...] | None = None
+    condition_number: Fraction | None = None
+    route: str = "auto"
+    solver: str = "clarabel"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
     """The tube's two radii; either may come from the command line instead."""
 
@@ -208,6 +226,7 @@ class Spec:
     x0: Vector
     within: Fraction | None  # instead of x0: any start this near to the plan's
     metric: Metric | None
+    synthesis: Synthesis | None = None  # only where there is no metric
     tube: Tube
     adaptation: Adaptation
     kernel: Literal["tight", "paper"] | None

@@ -1,0 +1,86 @@
+"""The section `metric.synthesise`: what kind of metric is asked for. It proves nothing."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tubecert.spec import codes
+from tubecert.spec.document import Scalar
+from tubecert.spec.names import Names
+from tubecert.spec.reader import Field
+from tubecert.spec.types import Synthesis
+
+KEYS: Final = ("rate", "objective", "degree", "variables", "condition_number", "route", "solver")
+OBJECTIVES: Final = ("condition", "margin", "rate", "adaptation", "tube")
+ROUTES: Final = ("auto", "sos", "cegis")
+SOLVERS: Final = ("clarabel", "scs")
+MAX_DEGREE: Final = 8
+_SEARCHED = "auto"
+
+
+def read_synthesis(field: Field, names: Names) -> Synthesis | None:
+    """What to synthesise; None if something in it is unsound."""
+    before = len(field.reader.findings)
+    entries = field.mapping(optional=KEYS)
+    if entries is None:
+        return None
+    rate = _unless_auto(entries.get("rate"))
+    objective = entries["objective"].word(OBJECTIVES) if "objective" in entries else None
+    limit = entries.get("condition_number")
+    found = Synthesis(
+        rate=rate.number(names.values, above=0) if rate else None,
+        objective=objective or ("condition" if rate else "adaptation"),
+        degree=_degree(_unless_auto(entries.get("degree")), names),
+        variables=_variables(_unless_auto(entries.get("variables")), names),
+        condition_number=limit.number(names.values, least=1) if limit else None,
+        route=entries["route"].word(ROUTES) or "auto" if "route" in entries else "auto",
+        solver=entries["solver"].word(SOLVERS) or "clarabel" if "solver" in entries else "clarabel",
+    )
+    _consistent(field, found)
+    return found if len(field.reader.findings) == before else None
+
+
+def _unless_auto(field: Field | None) -> Field | None:
+    automatic = field is not None and isinstance(field.node, Scalar) and field.node.text == _SEARCHED
+    return None if automatic else field
+
+
+def _degree(field: Field | None, names: Names) -> int | None:
+    value = field.number(names.values, least=0, most=MAX_DEGREE) if field else None
+    if field and value is not None and value.denominator != 1:
+        field.fail(
+            codes.RANGE, f"{field.path} must be a whole number", "write auto, or 0 for a constant metric"
+        )
+        return None
+    return None if value is None else int(value)
+
+
+def _variables(field: Field | None, names: Names) -> tuple[str, ...] | None:
+    items = field.items(None, "states") if field else None
+    if field is None or items is None:
+        return None
+    chosen: list[str] = []
+    for item in items:
+        word = item.word(names.states)
+        if word in chosen:
+            item.fail(codes.RANGE, f"{item.path}: {word} occurs twice", "name each state once")
+        elif word:
+            chosen.append(word)
+    return tuple(chosen)
+
+
+def _consistent(field: Field, found: Synthesis) -> None:
+    """A rate belongs to some objectives, and must be searched for by the others."""
+    needs_rate = found.objective in ("condition", "margin")
+    if needs_rate and found.rate is None:
+        field.fail(
+            codes.MISSING_KEY,
+            f"{field.path}: the objective {found.objective} needs a rate",
+            "add rate: ..., in 1/s, or choose the objective rate, adaptation or tube",
+        )
+    if found.objective == "rate" and found.rate is not None:
+        field.fail(
+            codes.RANGE,
+            f"{field.path}: the objective rate searches for the rate; it cannot be given",
+            "remove rate, or choose the objective condition or margin",
+        )
