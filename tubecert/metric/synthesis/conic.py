@@ -1,0 +1,248 @@
+"""Semidefinite programs, straight to a conic solver.
+
+Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block, g_0 + G y >= 0 and e_0 + E y = 0. All slopes are
+sparse and nothing is canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed
+settings; SCS is the second solver, for cross-checks.
+Untrusted: what comes back is a proposal with an opinion, never a verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Solver = Literal["clarabel", "scs"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Affine:
+    """y -> constant + slopes y: `constant` (r,), `slopes` (r, N) sparse or dense."""
+
+    constant: Array
+    slopes: Any
+
+    def at(self, y: Array) -> Array:
+        """The value at y, (r,)."""
+        return np.asarray(self.constant + self.slopes @ y)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Semidefinite:
+    """A symmetric matrix that is affine in y and has to be positive semidefinite.
+
+    `entries` holds the upper triangle column by column, unscaled: row j(j+1)/2 + i is entry (i, j), i <= j.
+    """
+
+    order: int
+    entries: Affine
+
+    def at(self, y: Array) -> Array:
+        """The matrix at y, (order, order)."""
+        i, j = triangle(self.order)
+        full = np.zeros((self.order, self.order))
+        full[i, j] = full[j, i] = self.entries.at(y)
+        return full
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConicProgram:
+    """Minimise cost'y (N,) subject to `semidefinite` blocks, `inequalities` >= 0 and `equalities` = 0."""
+
+    cost: Array
+    semidefinite: Sequence[Semidefinite] = ()
+    inequalities: Affine | None = None
+    equalities: Affine | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConicSolution:
+    """`values` y (N,), also of an unfinished run, None if there are none; `bound` is the dual's value of the objective.
+
+    `feasible`: the solver's opinion, None if it came to none; `finished`: it met its tolerances; `status`: its words.
+    """
+
+    values: Array | None
+    objective: float
+    bound: float
+    feasible: bool | None
+    finished: bool
+    status: str
+    iterations: int
+    seconds: float
+
+
+def triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns (i <= j) of the upper triangle, column by column."""
+    j, i = np.tril_indices(order)
+    return i, j
+
+
+def semidefinite(constant: ArrayLike, slopes: ArrayLike) -> Semidefinite:
+    """A block from dense symmetric matrices: S_0 (n, n) and S_k as (N, n, n)."""
+    s0, s = np.asarray(constant, dtype=float), np.asarray(slopes, dtype=float)
+    i, j = triangle(len(s0))
+    return Semidefinite(
+        order=len(s0), entries=Affine(constant=s0[i, j], slopes=sparse.csr_array(s[:, i, j].T))
+    )
+
+
+def solve(
+    program: ConicProgram,
+    solver: Solver = "clarabel",
+    *,
+    tolerance: float = 1e-8,
+    iterations: int | None = None,
+) -> ConicSolution:
+    """The solver's answer, deterministic on one machine.
+
+    `tolerance` is on gap and residuals; `iterations` bounds the work (default 200, of SCS 20 000). Data that are not
+    finite end without calling a solver.
+    """
+    lifted = _stacked(program)
+    if not (np.isfinite(lifted.slopes.data).all() and np.isfinite(lifted.constant).all()):
+        return _failed("the program has coefficients that are not finite")
+    if solver == "scs":
+        return _scs(program, lifted, tolerance, iterations or 20_000)
+    return _clarabel(program, lifted, tolerance, iterations or 200)
+
+
+def _stacked(program: ConicProgram) -> Affine:
+    """All rows as one: equalities, inequalities, blocks with off-diagonal entries times sqrt 2."""
+    width = len(program.cost)
+    parts = [part for part in (program.equalities, program.inequalities) if part is not None]
+    parts += [_scaled(block) for block in program.semidefinite]
+    slopes = sparse.vstack([sparse.csr_array(part.slopes) for part in parts], format="csc")
+    assert slopes.shape[1] == width, "all slopes have one column for every variable"
+    return Affine(constant=np.concatenate([part.constant for part in parts]), slopes=slopes)
+
+
+def _scaled(block: Semidefinite) -> Affine:
+    i, j = triangle(block.order)
+    scale = np.where(i == j, 1.0, np.sqrt(2.0))
+    slopes = sparse.csr_array(block.entries.slopes)
+    slopes = sparse.csr_array(
+        (slopes.data * np.repeat(scale, np.diff(slopes.indptr)), slopes.indices, slopes.indptr), slopes.shape
+    )
+    return Affine(constant=scale * block.entries.constant, slopes=slopes)
+
+
+def _rows(part: Affine | None) -> int:
+    return 0 if part is None else len(part.constant)
+
+
+def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations: int) -> ConicSolution:
+    import clarabel
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    settings.direct_solve_method = "faer"
+    settings.chordal_decomposition_enable = False
+    settings.max_iter = iterations
+    settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = tolerance
+    cones: list[Any] = []
+    if _rows(program.equalities):
+        cones.append(clarabel.ZeroConeT(_rows(program.equalities)))
+    if _rows(program.inequalities):
+        cones.append(clarabel.NonnegativeConeT(_rows(program.inequalities)))
+    cones += [clarabel.PSDTriangleConeT(block.order) for block in program.semidefinite]
+    width = len(program.cost)
+    quadratic = sparse.csc_matrix((width, width))
+    try:
+        run = clarabel.DefaultSolver(
+            quadratic, program.cost, sparse.csc_matrix(-rows.slopes), rows.constant, cones, settings
+        )
+        found = run.solve()
+    except BaseException as error:  # a panic of the Rust side is no Exception
+        if isinstance(error, (KeyboardInterrupt, SystemExit)):
+            raise
+        return _failed(f"Clarabel failed: {error}")
+    name = str(found.status)
+    opinions = {
+        "Solved": True,
+        "AlmostSolved": True,
+        "PrimalInfeasible": False,
+        "AlmostPrimalInfeasible": False,
+    }
+    return _judged(
+        np.array(found.x),
+        objective=float(found.obj_val),
+        bound=float(found.obj_val_dual),
+        feasible=opinions.get(name),
+        finished=name in ("Solved", "PrimalInfeasible"),
+        status=f"Clarabel: {_words(name)}",
+        iterations=int(found.iterations),
+        seconds=float(found.solve_time),
+    )
+
+
+def _scs(program: ConicProgram, rows: Affine, tolerance: float, iterations: int) -> ConicSolution:
+    import scs
+
+    order = np.concatenate(
+        [np.arange(_rows(program.equalities) + _rows(program.inequalities)), *_lower(program)]
+    )
+    order = order.astype(np.intp)
+    data = {
+        "A": sparse.csc_matrix(-rows.slopes[order]),
+        "b": rows.constant[order],
+        "c": np.asarray(program.cost, dtype=float),
+    }
+    cone = {
+        "z": _rows(program.equalities),
+        "l": _rows(program.inequalities),
+        "s": [block.order for block in program.semidefinite],
+    }
+    run = scs.SCS(data, cone, verbose=False, eps_abs=tolerance, eps_rel=tolerance, max_iters=iterations)
+    found = run.solve()
+    info = found["info"]
+    code = int(info["status_val"])
+    return _judged(
+        np.array(found["x"]),
+        objective=float(info["pobj"]),
+        bound=float(info["dobj"]),
+        feasible={1: True, -2: False}.get(code),
+        finished=code in (1, -2),
+        status=f"SCS: {info['status']}",
+        iterations=int(info["iter"]),
+        seconds=float(info["setup_time"] + info["solve_time"]) / 1e3,
+    )
+
+
+def _lower(program: ConicProgram) -> list[NDArray[np.intp]]:
+    """For every block, where its lower triangle by columns stands in the upper triangle by columns."""
+    start = _rows(program.equalities) + _rows(program.inequalities)
+    places = []
+    for block in program.semidefinite:
+        column, row = np.triu_indices(block.order)  # lower triangle by columns: column <= row
+        places.append(start + row * (row + 1) // 2 + column)
+        start += block.order * (block.order + 1) // 2
+    return places
+
+
+def _judged(values: Array, **rest: Any) -> ConicSolution:
+    return ConicSolution(values=values if np.isfinite(values).all() else None, **rest)
+
+
+def _failed(status: str) -> ConicSolution:
+    return ConicSolution(
+        values=None,
+        objective=np.inf,
+        bound=-np.inf,
+        feasible=None,
+        finished=False,
+        status=status,
+        iterations=0,
+        seconds=0.0,
+    )
+
+
+def _words(name: str) -> str:
+    """AlmostSolved -> almost solved."""
+    return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in name).strip()
