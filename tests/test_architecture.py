@@ -25,6 +25,7 @@ ROOMS = [
     "bounds",
     "conditions",
     "search",
+    "lint",
     "certificate",
     "simulate",
     "pipeline",

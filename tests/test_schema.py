@@ -26,9 +26,16 @@ from tubecert.spec.reader import Field
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
-SCHEMAS = {path.name.split(".")[0]: json.loads(path.read_text("utf-8")) for path in (PACKAGE / "schemas").glob("*.json")}
+SCHEMAS = {
+    path.name.split(".")[0]: json.loads(path.read_text("utf-8"))
+    for path in (PACKAGE / "schemas").glob("*.json")
+}
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
-GOOD = [*CONFIGS, *sorted((ROOT / "tests/specs/ok").glob("*.yaml")), *sorted((PACKAGE / "templates").glob("*.yaml"))]
+GOOD = [
+    *CONFIGS,
+    *sorted((ROOT / "tests/specs/ok").glob("*.yaml")),
+    *sorted((PACKAGE / "templates").glob("*.yaml")),
+]
 BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))
 STRUCTURAL = {"TC103", "TC106"}
 
@@ -178,7 +185,11 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     metric = tmp_path / "metric.json"
     metric.write_text(json.dumps({"format": "tubecert-metric/1", "rate": 1, "dual_metric": [[1]]}))
     with_metric(full, str(metric))
-    unmet = {site for site in sites() if not any(n == site[0] and site[1] <= line <= site[2] for n, line in asked.lines)}
+    unmet = {
+        site
+        for site in sites()
+        if not any(n == site[0] and site[1] <= line <= site[2] for n, line in asked.lines)
+    }
     assert not unmet, "a section that no example file of tests/specs/ok has"
     box = {"safe_set"}  # its keys are the states
     for (path, kind), (required, known) in asked.questions.items():
@@ -252,7 +263,11 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     text = path.read_text("utf-8")
     assert old in text
     result = pipeline.certify(load_text(text.replace(old, new) if old else text), pipeline.Options(**options))
-    sealed = json.loads(certificate.dump(certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})))
+    sealed = json.loads(
+        certificate.dump(
+            certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})
+        )
+    )
     assert not [f"{error.json_path}: {error.message}" for error in CLOSED.iter_errors(sealed)]
     assert not errors("spec", sealed["result"]["spec"]["effective"])
 

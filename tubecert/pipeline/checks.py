@@ -6,19 +6,19 @@ from tubecert.bounds.compute import time_range
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Location
+from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision, time_period
 from tubecert.spec import Spec
 
 
 def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
-    """What is wrong with the mathematics of a specification, without certifying it."""
+    """What is wrong with, or odd about, the mathematics of a specification, without certifying it."""
     findings, time = time_of(spec)
-    if findings:
-        return findings
     effort = Effort(budget=budget)
-    findings = domain_findings(spec, time, effort)
+    if not findings:
+        findings = domain_findings(spec, time, effort)
     if findings:
-        return findings
+        return [*findings, *name_findings(spec)]
     decision = rank_decision(build(spec), spec.safe_set, effort)
     if decision.verdict == "refuted":
         findings.append(
@@ -29,7 +29,7 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
                 help="shrink the safe set, or remove an input that does nothing there",
             )
         )
-    return findings
+    return findings + lint(spec, time, effort)
 
 
 def missing_parts(spec: Spec) -> list[Finding]:

@@ -1,0 +1,42 @@
+"""What a control engineer would ask about a specification before certifying it.
+
+In: a `Spec` that loads and whose expressions are defined. Out: findings; an error is something that a certification
+would refute, a warning what is hardly meant, a note what is worth knowing. Trusted: no; nothing rests on it.
+
+| module | what it looks at |
+|---|---|
+| `codes` | finding codes with their meaning |
+| `names` | parameters, names, units, states that cannot change, empty expectations |
+| `plan` | plan and start in the safe set, room for the tube, equilibria, obstacles |
+| `uncertainty` | h that is zero, declared bounds that are broken or loose |
+| `metric` | C1-C3 and declared bounds at points; modes that no metric can contract |
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.domain import Range
+from tubecert.findings import Finding, Severity
+from tubecert.lint.codes import CODES
+from tubecert.lint.metric import metric_findings
+from tubecert.lint.names import name_findings
+from tubecert.lint.plan import plan_findings
+from tubecert.lint.uncertainty import uncertainty_findings
+from tubecert.spec import Spec
+
+__all__ = ["CODES", "lint", "name_findings"]
+
+
+def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
+    """Every finding; what a file is known to be refuted for (`expect: {verdict: refuted}`) is only a note."""
+    findings = [
+        *name_findings(spec),
+        *plan_findings(spec),
+        *uncertainty_findings(spec, time, effort),
+        *metric_findings(spec),
+    ]
+    if spec.expect is not None and spec.expect.verdict == "refuted":
+        return [replace(item, severity=Severity.NOTE) for item in findings]
+    return findings

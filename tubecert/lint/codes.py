@@ -1,0 +1,52 @@
+"""The finding codes of this room, each with its one-line meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+UNUSED: Final = "TC130"
+CONFUSABLE: Final = "TC131"
+UNITS: Final = "TC132"
+IDLE_STATE: Final = "TC133"
+EMPTY_EXPECTATION: Final = "TC134"
+NO_UNCERTAINTY: Final = "TC205"
+LOOSE_BOUND: Final = "TC206"
+BROKEN_BOUND: Final = "TC207"
+SLOW_MODE: Final = "TC208"
+INDEFINITE: Final = "TC301"
+NOT_CONTRACTING: Final = "TC302"
+NOT_KILLING: Final = "TC303"
+LOOSE_METRIC_BOUND: Final = "TC304"
+BROKEN_METRIC_BOUND: Final = "TC305"
+PLAN_OUTSIDE: Final = "TC403"
+NO_EQUILIBRIUM: Final = "TC404"
+START_OUTSIDE: Final = "TC405"
+NO_ROOM: Final = "TC406"
+PLAN_DEFECT: Final = "TC407"
+COLLISION: Final = "TC408"
+OBSTACLE_OUTSIDE: Final = "TC409"
+
+CODES: Final[Mapping[str, str]] = {
+    UNUSED: "a parameter is never used",
+    CONFUSABLE: "two names, or a name and a function, are easily confused",
+    UNITS: "some states or inputs have a unit and others have none",
+    IDLE_STATE: "a state cannot change",
+    EMPTY_EXPECTATION: "an expectation that expects nothing",
+    NO_UNCERTAINTY: "there is no uncertainty: h is zero",
+    LOOSE_BOUND: "a declared bound of h is larger than its expression needs",
+    BROKEN_BOUND: "the expression of h breaks a declared bound",
+    SLOW_MODE: "a mode that inputs cannot reach is slower than the rate",
+    INDEFINITE: "the dual metric is not positive definite at a point (C1)",
+    NOT_CONTRACTING: "the metric does not contract at its rate at a point (C2)",
+    NOT_KILLING: "the metric is not compatible with an input (C3)",
+    LOOSE_METRIC_BOUND: "a declared bound of the metric is larger than needed",
+    BROKEN_METRIC_BOUND: "the metric breaks a declared bound at a point",
+    PLAN_OUTSIDE: "the plan leaves the safe set",
+    NO_EQUILIBRIUM: "the point to be held is no equilibrium",
+    START_OUTSIDE: "the initial state is not in the safe set",
+    NO_ROOM: "the tube cannot lie in the safe set",
+    PLAN_DEFECT: "the plan misses the dynamics by a part of the tube that matters",
+    COLLISION: "the plan meets an obstacle",
+    OBSTACLE_OUTSIDE: "an obstacle lies outside the safe set",
+}

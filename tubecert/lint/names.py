@@ -1,0 +1,105 @@
+"""What the names of a specification give away; needs no numerics."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import combinations
+
+from tubecert.expression import FUNCTIONS, ZERO
+from tubecert.findings import Finding, Location, Severity
+from tubecert.lint import codes
+from tubecert.spec import Spec
+
+_WORDS = (*FUNCTIONS, "pi", "t")
+_ALIKE = str.maketrans({"O": "0", "o": "0", "l": "1", "I": "1", "i": "1"})
+
+
+def name_findings(spec: Spec) -> list[Finding]:
+    """Findings about names."""
+    return [*_unused(spec), *_confusable(spec), *_units(spec), *_idle(spec), *_expectation(spec)]
+
+
+def _unused(spec: Spec) -> Iterator[Finding]:
+    """Parameters are substituted when they are read, so their names are looked for in the text."""
+    text = "\n".join(re.sub(r"(^|\s)#.*", "", line) for line in spec.source.splitlines())
+    words = re.findall(r"\b[A-Za-z]\w*", text)
+    for name, _ in spec.parameters:
+        if words.count(name) < 2:
+            yield Finding(
+                code=codes.UNUSED,
+                severity=Severity.WARNING,
+                message=f"the parameter {name} is never used",
+                location=spec.location(f"system.parameters.{name}"),
+                help="remove it, or use it",
+            )
+
+
+def _confusable(spec: Spec) -> Iterator[Finding]:
+    names = [*spec.states, *spec.inputs, *(name for name, _ in spec.parameters)]
+    for name in names:
+        word = next((word for word in _WORDS if word == name.lower()), None)
+        if word is not None:
+            what = {"t": "the time", "pi": "the number"}.get(word, "the function")
+            yield _alike(spec, name, f"{name} is easily taken for {what} {word}")
+    for first, second in combinations(names, 2):
+        if _folded(first) == _folded(second):
+            yield _alike(spec, second, f"{second} is easily taken for {first}")
+
+
+def _folded(name: str) -> str:
+    return name.translate(_ALIKE).lower()
+
+
+def _alike(spec: Spec, name: str, message: str) -> Finding:
+    return Finding(
+        code=codes.CONFUSABLE,
+        severity=Severity.WARNING,
+        message=message,
+        location=_place(spec, name),
+        help="choose names that differ by more than case or shape",
+    )
+
+
+def _place(spec: Spec, name: str) -> Location | None:
+    for key, names in (("states", spec.states), ("inputs", spec.inputs)):
+        if name in names:
+            return spec.location(f"system.{key}[{names.index(name)}]")
+    return spec.location(f"system.parameters.{name}")
+
+
+def _units(spec: Spec) -> Iterator[Finding]:
+    given = dict(spec.units)
+    missing = [name for name in (*spec.states, *spec.inputs) if name not in given]
+    if given and missing:
+        yield Finding(
+            code=codes.UNITS,
+            severity=Severity.NOTE,
+            message=f"no unit is given for {', '.join(missing)}",
+            location=spec.location("system.units"),
+            help='write "1" for what has no dimension',
+        )
+
+
+def _idle(spec: Spec) -> Iterator[Finding]:
+    for i, (drift, row) in enumerate(zip(spec.f, spec.B, strict=True)):
+        if drift.expression is ZERO and all(term.expression is ZERO for term in row):
+            name = spec.states[i]
+            yield Finding(
+                code=codes.IDLE_STATE,
+                severity=Severity.WARNING,
+                message=f"{name} cannot change: its rows in f and B are zero, so no metric contracts it",
+                location=spec.location(f"system.f[{i}]"),
+                help=f"make {name} a parameter",
+            )
+
+
+def _expectation(spec: Spec) -> Iterator[Finding]:
+    if spec.expect is not None and spec.expect.verdict is None and not spec.expect.ranges:
+        yield Finding(
+            code=codes.EMPTY_EXPECTATION,
+            severity=Severity.WARNING,
+            message="expect names nothing that is expected",
+            location=spec.location("expect"),
+            help="write expect: {verdict: certified}, or remove it",
+        )

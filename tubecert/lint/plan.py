@@ -1,0 +1,247 @@
+"""Plan, start and obstacles: are they where they can be, and does the plan satisfy the dynamics?
+
+Knots, equilibria and starts are compared exactly; between knots, and along expressions of t, in floats at samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import number_text
+from tubecert.findings import Finding, Severity
+from tubecert.lint import codes
+from tubecert.model import TIME, ControlAffineModel, build
+from tubecert.spec import Obstacle, Spec, Vector
+
+_SAMPLES = 257
+_ROUNDING = 1e-9
+_NOTABLE = 0.02  # share of the tube that a plan's defect may take
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Curve:
+    """Points of a plan: `t` (K,) in s, `x` (K, n), `u` (K, m), and where the plan stands in the file."""
+
+    t: Array
+    x: Array
+    u: Array
+    path: str
+
+
+def plan_findings(spec: Spec) -> list[Finding]:
+    """Findings about the plan, the start and the obstacles."""
+    curve = _curve(spec)
+    findings = [*_start(spec)]
+    outside = list(_outside(spec, curve))
+    findings += outside or _room(spec, curve)
+    if not outside and spec.trajectory.kind in ("equilibrium", "expressions"):
+        findings += _defect(spec, curve, build(spec))
+    return [*findings, *_obstacles(spec, curve)]
+
+
+def _curve(spec: Spec) -> _Curve:
+    """Samples of the plan; of a plan that is still to be made, its two ends."""
+    plan = spec.trajectory
+    if plan.table is not None:
+        knots = plan.table.knots
+        kept = [k for k, t in enumerate(knots.t) if plan.horizon is None or t <= plan.horizon]
+        return _Curve(
+            t=_floats([knots.t[k] for k in kept]),
+            x=np.array([_floats(knots.x[k]) for k in kept]),
+            u=np.array([_floats(knots.u[k]) for k in kept]),
+            path="trajectory.file",
+        )
+    if plan.task is not None:
+        ends = np.array([_floats(plan.task.start), _floats(plan.task.target)])
+        last = math.inf if plan.horizon is None else _float(plan.horizon)
+        here = "trajectory.target" if plan.task.goal else "trajectory.start"
+        count = 2 if plan.task.goal else 1
+        u = np.zeros((count, len(spec.inputs)))
+        return _Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
+    count = 1 if plan.kind == "equilibrium" else _SAMPLES
+    t = np.linspace(0.0, _float(plan.horizon or Fraction(0)), count)
+    tape = Tape([term.expression for term in (*plan.x, *plan.u)], (TIME,))
+    both = tape.run_floats([t], t.shape).T
+    n = len(spec.states)
+    return _Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
+
+
+def _float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def _floats(values: Sequence[Fraction]) -> Array:
+    return np.array([_float(value) for value in values])
+
+
+def _sides(spec: Spec) -> tuple[Array, Array]:
+    return _floats([low for low, _ in spec.safe_set]), _floats([high for _, high in spec.safe_set])
+
+
+def _excess(spec: Spec, points: Array) -> tuple[int, int, float]:
+    """Where points leave the safe set by most: (point, state, by how much; negative inside)."""
+    low, high = _sides(spec)
+    beyond = np.nan_to_num(np.maximum(low - points, points - high), nan=np.inf)
+    k, i = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    return int(k), int(i), float(beyond[k, i])
+
+
+def _start(spec: Spec) -> Iterator[Finding]:
+    """The initial state, exactly."""
+    for i, (value, (low, high)) in enumerate(zip(spec.x0, spec.safe_set, strict=True)):
+        if spec.within is None and not low <= value <= high:
+            name = spec.states[i]
+            path = f"initial_state.at[{i}]"
+            yield Finding(
+                code=codes.START_OUTSIDE,
+                message=f"the initial state is not in the safe set: {name} = {number_text(value)[:40]}",
+                location=spec.location(path),
+                help=f"the safe set has {name} in [{number_text(low)[:40]}, {number_text(high)[:40]}]",
+            )
+
+
+def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+    k, i, beyond = _excess(spec, curve.x)
+    scale = float(np.max(np.abs(_sides(spec))))
+    if beyond > (0.0 if len(curve.t) == 1 else _ROUNDING * scale):
+        when = "" if len(curve.t) == 1 else f" at t = {curve.t[k]:.4g} s"
+        yield Finding(
+            code=codes.PLAN_OUTSIDE,
+            message=f"the plan leaves the safe set{when}: {spec.states[i]} = {curve.x[k, i]:.6g}",
+            location=spec.location(curve.path),
+            help=f"enlarge safe_set.{spec.states[i]}, or plan inside it",
+        )
+
+
+def _least_radius(spec: Spec) -> float:
+    """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown)."""
+    tube = spec.tube
+    radius = _float((tube.epsilon or Fraction(0)) + (tube.rho_a or Fraction(0)))
+    return radius + (0.0 if spec.within is None else _float(spec.within))
+
+
+def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+    offset = 0.0
+    if spec.within is None and spec.trajectory.task is None:
+        offset = float(np.linalg.norm(_floats(spec.x0) - curve.x[0]))
+    rho = _least_radius(spec) + offset
+    k, i, beyond = _excess(spec, curve.x)
+    if not math.isfinite(rho) or beyond + rho <= _ROUNDING * rho:
+        return
+    when = "" if len(curve.t) == 1 else f" at t = {curve.t[k]:.4g} s"
+    yield Finding(
+        code=codes.NO_ROOM,
+        message=f"the tube needs a radius of at least {rho:.4g} (epsilon + rho_a + initial offset), but{when} "
+        f"the plan is only {-beyond:.4g} from the {spec.states[i]} side of the safe set",
+        location=spec.location("tube") or spec.location("safe_set"),
+        help="reduce tube.epsilon, tube.rho_a or the initial offset, or enlarge the safe set",
+    )
+
+
+def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Finding]:
+    """How far the plan is from x*' = f(x*) + B(x*) u*, against what the least tube can bear."""
+    x, u = list(curve.x.T), list(curve.u.T)
+    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
+    rate = drift.run_floats([*x, *u], curve.t.shape)
+    if spec.trajectory.kind == "expressions":
+        from tubecert.expression import derivatives
+
+        slope = Tape(derivatives([term.expression for term in spec.trajectory.x], TIME), (TIME,))
+        rate = slope.run_floats([curve.t], curve.t.shape) - rate
+    size = np.linalg.norm(rate, axis=0)
+    k = int(np.argmax(np.nan_to_num(size, nan=0.0)))
+    worst, scale = (
+        float(size[k]),
+        1e-12 * float(np.max(np.abs(np.concatenate([curve.x[k], curve.u[k], [1.0]])))),
+    )
+    if not worst > scale:
+        return
+    bearable = float(model.rate) * _least_radius(spec)
+    notable = worst > _NOTABLE * bearable
+    if spec.trajectory.kind == "equilibrium":
+        states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
+        yield Finding(
+            code=codes.NO_EQUILIBRIUM,
+            severity=Severity.WARNING if notable else Severity.NOTE,
+            message=f"the point is no equilibrium: |f + B u| = {worst:.3g} there ({', '.join(states)} would move)",
+            location=spec.locations.get("trajectory.input") or spec.location("trajectory.at"),
+            help="choose at and input with f(at) + B(at) input = 0; what is missing is paid for in the gains",
+        )
+    elif notable:
+        yield Finding(
+            code=codes.PLAN_DEFECT,
+            severity=Severity.WARNING,
+            message=f"the plan misses x*' = f + B u* by {worst:.3g} at t = {curve.t[k]:.4g} s",
+            location=spec.location("trajectory.u"),
+            help="correct x or u there; what is missing is paid for in the gains",
+        )
+
+
+def _obstacles(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+    for j, obstacle in enumerate(spec.obstacles):
+        i, k = (spec.states.index(name) for name in obstacle.states)
+        path = f"obstacles[{j}]"
+        if _apart(obstacle, spec.safe_set[i], spec.safe_set[k]):
+            yield Finding(
+                code=codes.OBSTACLE_OUTSIDE,
+                severity=Severity.NOTE,
+                message="the obstacle lies outside the safe set",
+                location=spec.location(path),
+                help="a tube in the safe set cannot meet it",
+            )
+        hit = next((t for t, x in zip(curve.t, curve.x, strict=True) if _covers(obstacle, x[i], x[k])), None)
+        if hit is not None:
+            yield Finding(
+                code=codes.COLLISION,
+                severity=Severity.WARNING,
+                message=f"the plan meets the obstacle at t = {hit:.4g} s",
+                location=spec.location(path),
+                help="plan around it; a certificate says nothing about obstacles",
+            )
+
+
+def _apart(obstacle: Obstacle, first: tuple[Fraction, Fraction], second: tuple[Fraction, Fraction]) -> bool:
+    """Whether the obstacle's bounding box and the safe set have no point in common (exact)."""
+    for axis, (low, high) in enumerate((first, second)):
+        least, most = _extent(obstacle, axis)
+        if most < low or least > high:
+            return True
+    return False
+
+
+def _extent(obstacle: Obstacle, axis: int) -> tuple[Fraction, Fraction]:
+    if obstacle.radius is not None:
+        assert obstacle.center is not None
+        return obstacle.center[axis] - obstacle.radius, obstacle.center[axis] + obstacle.radius
+    values = [corner[axis] for corner in _corners(obstacle)]
+    return min(values), max(values)
+
+
+def _corners(obstacle: Obstacle) -> tuple[Vector, ...]:
+    assert obstacle.polygon is not None
+    return obstacle.polygon
+
+
+def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
+    """Whether a point lies in the obstacle (floats)."""
+    if obstacle.radius is not None:
+        assert obstacle.center is not None
+        return math.hypot(x - _float(obstacle.center[0]), y - _float(obstacle.center[1])) < _float(
+            obstacle.radius
+        )
+    corners = [(_float(a), _float(b)) for a, b in _corners(obstacle)]
+    inside = False
+    for (a, b), (c, d) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (b > y) != (d > y) and x < a + (y - b) * (c - a) / (d - b):
+            inside = not inside
+    return inside

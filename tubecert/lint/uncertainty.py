@@ -1,0 +1,107 @@
+"""The uncertainty: none at all, or declared bounds that its expression breaks or does not need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
+from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.objective import SumOfNorms
+from tubecert.expression import ZERO, derivatives, free_symbols
+from tubecert.expression.matrix import Matrix, column, jacobian
+from tubecert.findings import Finding, Severity
+from tubecert.lint import codes
+from tubecert.model import TIME, build, place
+from tubecert.spec import Spec
+
+_LOOSE = 1.25  # a declared bound may exceed the need by this factor before it is worth a word
+_BUDGET = 4_000
+
+
+def uncertainty_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
+    """Findings about h and its declared bounds."""
+    if spec.uncertainty.h is None:
+        return list(_declared_zero(spec))
+    if all(term.expression is ZERO for term in spec.uncertainty.h):
+        return [_nothing(spec, "uncertainty.h", "h is zero: there is no uncertainty to compensate")]
+    return list(_bounds(spec, time, replace(effort, gap=0.05, budget=min(effort.budget, _BUDGET))))
+
+
+def _declared_zero(spec: Spec) -> Iterator[Finding]:
+    bounds = spec.uncertainty.bounds
+    if bounds is not None and bounds.h == 0:
+        yield _nothing(
+            spec, "uncertainty.bounds.h", "|h| is bounded by 0: there is no uncertainty to compensate"
+        )
+    if bounds is not None and bounds.h and bounds.h_t == bounds.h_x == 0:
+        yield Finding(
+            code=codes.NO_UNCERTAINTY,
+            severity=Severity.NOTE,
+            message="h_x and h_t are 0: the uncertainty is an unknown constant",
+            location=spec.location("uncertainty.bounds"),
+        )
+
+
+def _nothing(spec: Spec, path: str, message: str) -> Finding:
+    return Finding(
+        code=codes.NO_UNCERTAINTY,
+        severity=Severity.NOTE,
+        message=message,
+        location=spec.location(path),
+        help="give the uncertainty that is expected, or control without adaptation",
+    )
+
+
+def _bounds(spec: Spec, time: Range | None, effort: Effort) -> Iterator[Finding]:
+    """Declared bounds against the expression on the whole safe set (the tube is a part of it)."""
+    bounds = spec.uncertainty.bounds
+    if bounds is None:
+        return
+    model = build(spec)
+    h = list(model.h or ())
+    box: dict[str, Range] = dict(zip(spec.states, spec.safe_set, strict=True))
+    if time is not None:
+        box[TIME] = time
+    elif TIME in free_symbols(h):
+        return
+    wanted: dict[str, tuple[Fraction | None, Matrix]] = {
+        "h": (bounds.h, column(h)),
+        "h_x": (bounds.h_x, jacobian(h, model.states)),
+        "h_t": (bounds.h_t, column(derivatives(h, TIME))),
+    }
+    for name, (declared, matrix) in wanted.items():
+        if declared is not None:
+            yield from _against(spec, name, declared, _needed(matrix, box, effort))
+
+
+def _needed(matrix: Matrix, box: dict[str, Range], effort: Effort) -> Supremum | None:
+    """The supremum of the norm over the safe set; None if it is zero."""
+    objective = SumOfNorms([matrix])
+    if objective.is_zero:
+        return None
+    return supremum(objective, BoxDomain({name: box[name] for name in objective.variables}), effort)
+
+
+def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None) -> Iterator[Finding]:
+    """A bound that holds on the tube may be broken elsewhere in the safe set: that is a warning, too."""
+    path = f"uncertainty.bounds.{name}"
+    above = needed.above if needed else 0.0
+    if float(declared) > _LOOSE * above:
+        yield Finding(
+            code=codes.LOOSE_BOUND,
+            severity=Severity.WARNING,
+            message=f"{name} is declared as {float(declared):g}, but on the safe set {above:.3g} suffices",
+            location=spec.location(path),
+            help="declare less, or remove it: it is derived from the expression; a loose bound costs gain",
+        )
+    elif needed and Fraction(needed.below) > declared:
+        yield Finding(
+            code=codes.BROKEN_BOUND,
+            severity=Severity.WARNING,
+            message=f"{name} is declared as {float(declared):g}, but its expression reaches {needed.below:.4g} "
+            f"in the safe set, at {place(needed.at)}",
+            location=spec.location(path),
+            help="declare more, unless the tube stays away from there",
+        )
