@@ -1,0 +1,187 @@
+"""All that one command simulates: every loop under the uncertainty that is drawn, then attacks on the loops that adapt.
+
+Interruption keeps what is finished; `interrupted` says that something is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.simulate.clearance import Clearance, of_curve, of_tube
+from tubecert.simulate.compare import Comparison, check_class, compare
+from tubecert.simulate.integrator import integrate
+from tubecert.simulate.monte_carlo import Case, Report, Sample, attack, case, disturbance_of, monte_carlo
+from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.runs import Runs
+from tubecert.simulate.setting import Loop, Setting
+
+SPECIFIED: Final = "of the specification"
+RANDOM: Final = "random, seed {seed}, run 0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawn:
+    """One run of a loop that is drawn: its comparison, and its clearance from every obstacle."""
+
+    loop: Loop
+    runs: Runs
+    comparison: Comparison
+    clearance: tuple[Clearance, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Attack:
+    """What random runs and the adversary found against a loop; the adversary's run is alone in `worst`."""
+
+    loop: Loop
+    sample: Sample | None
+    comparison: Comparison | None
+    worst: Runs | None
+    case: Case | None
+    worst_comparison: Comparison | None
+
+    @property
+    def use(self) -> float:
+        """The largest d/dbar that was met."""
+        found = [
+            c.uses["distance"].share or 0.0 for c in (self.comparison, self.worst_comparison) if c and c.uses
+        ]
+        return max(found, default=float("nan"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Campaign:
+    """Everything that was simulated; `uncertainty` says which h is drawn."""
+
+    setting: Setting
+    uncertainty: str
+    drawn: tuple[Drawn, ...]
+    attacks: tuple[Attack, ...]
+    plan_clearance: tuple[Clearance, ...]
+    tube_clearance: tuple[Clearance, ...]
+    count: int
+    seed: int
+    interrupted: bool
+
+    @property
+    def comparisons(self) -> tuple[tuple[Loop, Comparison], ...]:
+        """Every comparison with its loop."""
+        drawn = [(item.loop, item.comparison) for item in self.drawn]
+        attacked = [
+            (item.loop, found)
+            for item in self.attacks
+            for found in (item.comparison, item.worst_comparison)
+            if found is not None
+        ]
+        return (*drawn, *attacked)
+
+    @property
+    def falsified(self) -> bool:
+        """Whether a promise was broken."""
+        return any(found.violations for _, found in self.comparisons)
+
+    @property
+    def left(self) -> bool:
+        """Whether a loop that is meant to stay in the tube left it, promised or not."""
+        return any(loop.tested and found.outside for loop, found in self.comparisons)
+
+    @property
+    def unreliable(self) -> bool:
+        """Whether some run of a loop that is tested is no result: its own error estimate is too large, or it failed."""
+        return any(
+            loop.tested and (found.unreliable or len(found.failures) > _exits(found))
+            for loop, found in self.comparisons
+        )
+
+
+def _exits(found: Comparison) -> int:
+    """How many of the runs that were stopped had left the tube."""
+    return sum(lane in found.outside for lane, _, _ in found.failures)
+
+
+def simulate(
+    setting: Setting, loops: Sequence[Loop], *, count: int, seed: int, report: Report | None = None
+) -> Campaign:
+    """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
+
+    Raises `TubecertError` if the uncertainty leaves its class while the state is in the tube.
+    """
+    h, words = _uncertainty(setting, seed)
+    drawn = []
+    for loop in loops:
+        if report is not None:
+            report(f"{loop.controller}, {words}", 0, 1)
+        drawn.append(_drawn(setting, loop, h))
+    if setting.h is not None:
+        where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
+        for item in drawn:
+            check_class(setting, item.runs, setting.h, where)
+    attacks: list[Attack] = []
+    interrupted = False
+    for loop in loops:
+        if loop.tested and count and not interrupted:
+            attacks.append(_attack(setting, loop, count, seed, report))
+            sample = attacks[-1].sample
+            interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
+    first = drawn[0].runs
+    return Campaign(
+        setting=setting,
+        uncertainty=words,
+        drawn=tuple(drawn),
+        attacks=tuple(attacks),
+        plan_clearance=of_curve(setting.spec, first.t, first.x_plan),
+        tube_clearance=of_tube(setting.spec, first.t, first.x_plan, setting.rho, setting.half_widths),
+        count=count,
+        seed=seed,
+        interrupted=interrupted,
+    )
+
+
+def _uncertainty(setting: Setting, seed: int) -> tuple[Disturbance, str]:
+    """The h that is drawn: the specification's own, or where there is none a random member of the class."""
+    if setting.h is not None:
+        return Disturbance.from_expressions(setting.h, setting.model, 1), SPECIFIED
+    return disturbance_of(setting, [case(setting, seed, 0)]), RANDOM.format(seed=seed)
+
+
+def _drawn(setting: Setting, loop: Loop, h: Disturbance) -> Drawn:
+    start = setting.x0[None] if not setting.within else _surface(setting)[None]
+    runs = integrate(loop.problem, start, h, tolerance=setting.tolerance)
+    return Drawn(
+        loop=loop,
+        runs=runs,
+        comparison=compare(setting, runs, loop.promise),
+        clearance=of_curve(setting.spec, runs.t, runs.x[0]),
+    )
+
+
+def _surface(setting: Setting) -> Array:
+    """A start at the rim of the ball that is allowed."""
+    n = len(setting.centre)
+    return np.asarray(setting.centre + setting.within * np.ones(n) / np.sqrt(n))
+
+
+def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Report | None) -> Attack:
+    sample = monte_carlo(setting, loop, count, seed, report)
+    found, worst, measured = None, None, None
+    if sample is not None and not sample.interrupted:
+        try:
+            found = attack(setting, loop, seed, report)
+            one = disturbance_of(setting, [found])
+            worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
+            measured = compare(setting, worst, loop.promise)
+        except KeyboardInterrupt:
+            found, worst = None, None
+    return Attack(
+        loop=loop,
+        sample=sample,
+        comparison=None if sample is None else compare(setting, sample.runs, loop.promise),
+        worst=worst,
+        case=found,
+        worst_comparison=measured,
+    )

@@ -1,0 +1,113 @@
+"""A certificate, read back: whether it is one, whether it is about this specification, and its plan.
+
+Nothing is believed that the hash does not cover; nothing is proven here either (that is `recheck`'s task).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, Final, cast
+
+from tubecert.certificate import FORMAT, digest
+from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
+from tubecert.findings import Finding
+from tubecert.model import ControlAffineModel
+from tubecert.spec import Interpolation, Knots, Spec, canonical, load_text
+from tubecert.spec.source import read_bytes
+from tubecert.trajectory import Plan
+from tubecert.trajectory.pieces import piecewise_plan
+
+Result = Mapping[str, Any]
+
+MAX_BYTES: Final = 100_000_000
+_FREE: Final = ("name", "obstacles", "simulation", "expect", "conditions")  # no claim depends on them
+
+
+def read_certificate(path: str) -> dict[str, Any]:
+    """The certificate in a file; raises `TargetError` if it cannot be read or is none, or was changed."""
+    data = read_bytes(path, "give the JSON file that certify has written", MAX_BYTES)
+    try:
+        certificate = json.loads(data)
+        genuine = certificate["format"] == FORMAT and certificate["result"]["verdict"]
+        unchanged = certificate["hash"] == digest(certificate["result"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        genuine = unchanged = False
+    if not genuine:
+        help = "give the JSON file that certify has written"
+        raise TargetError(
+            [Finding(code="TC601", message=f"{path} is not a certificate ({FORMAT})", help=help)]
+        )
+    if not unchanged:
+        message = f"{path} was changed after it had been written: its hash does not match its result"
+        raise TargetError([Finding(code="TC601", message=message, help="certify again")])
+    return cast(dict[str, Any], certificate)
+
+
+def adopted(spec: Spec, result: Result) -> Spec:
+    """The specification with what the certificate's command line had changed (radii, metric).
+
+    Raises `SpecError` if the certificate is about another system.
+    """
+    effective = result["spec"]["effective"]
+    changed = result["overrides"]
+    other = load_text(json.dumps(effective), "certificate")
+    if "epsilon" in changed or "rho_a" in changed:
+        spec = replace(spec, tube=other.tube)
+    if "metric" in changed:
+        spec = replace(spec, metric=other.metric)
+    own = canonical(spec)
+    differing = [
+        key for key in sorted({*own, *effective} - set(_FREE)) if own.get(key, {}) != effective.get(key, {})
+    ]
+    if differing:
+        message = f"the certificate is about another system: {', '.join(differing)} differ"
+        help = "give the specification that was certified, or certify this one"
+        raise SpecError(
+            [Finding(code="TC602", message=message, location=spec.location(differing[0]), help=help)]
+        )
+    return spec
+
+
+def require_tube(result: Result) -> None:
+    """Raises the reason why there is no tube to be compared with, if there is none."""
+    if "rho_r" in result.get("tube", {}) and result.get("constants"):
+        return
+    reason = next((item for item in result["reasons"] if item["verdict"] == result["verdict"]), None)
+    why = f"{reason['claim']}: {reason['message']}" if reason else "certification stopped"
+    error = TubecertError(
+        [
+            Finding(
+                code="TC603",
+                message=f"there is no tube that a simulation could leave ({result['verdict']}: {why})",
+                help=(reason or {}).get("relax", "") or "tubecert certify tells more",
+            )
+        ]
+    )
+    error.exit_code = ExitCode.NOT_CERTIFIED if result["verdict"] == "refuted" else ExitCode.UNDECIDED
+    raise error
+
+
+def plan_of(spec: Spec, model: ControlAffineModel, result: Result) -> Plan:
+    """The plan that was certified: the specification's expressions, or the certificate's knots."""
+    knots = result["plan"].get("knots")
+    trajectory = spec.trajectory
+    if knots is None:
+        x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
+        return Plan(x, u, trajectory.horizon)
+    rows = {name: tuple(tuple(map(Fraction, row)) for row in knots[name]) for name in ("x", "u")}
+    interpolation = cast(Interpolation, result["plan"]["interpolation"])
+    exact = Knots(t=tuple(map(Fraction, knots["t"])), interpolation=interpolation, **rows)
+    return piecewise_plan(model, exact, trajectory.horizon)
+
+
+def above(result: Result, name: str) -> float:
+    """The safe side of a constant."""
+    return float(result["constants"][name]["above"])
+
+
+def number(value: float | str) -> float:
+    """A number of a certificate: a decimal, or a text p/q."""
+    return float(Fraction(value)) if isinstance(value, str) else float(value)

@@ -1,0 +1,167 @@
+"""Many runs of one loop: random members of the class, random starts, and a search for the worst member.
+
+Run i draws everything from its own generator, keyed by (seed, i): it can be repeated alone, and results depend neither
+on the number of cores nor on how runs are grouped. What is finished when the user interrupts is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.simulate.integrator import integrate
+from tubecert.simulate.problem import Disturbance, LoopProblem
+from tubecert.simulate.runs import Runs, joined
+from tubecert.simulate.setting import Loop, Setting
+from tubecert.simulate.uncertainty import Member, adversary, assembled, genes_of, random_member
+
+Report = Callable[[str, int, int], None]  # what is done, how many runs of how many
+
+BATCH: Final = 256
+TIMES: Final = 201  # output times of a run
+_POPULATION: Final = 64
+_ELITE: Final = 12
+_ROUNDS: Final = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """One run: a start (n,) and a member of the class."""
+
+    start: Array
+    member: Member
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sample:
+    """Runs of a loop and their cases, in the order of their numbers; `asked` is how many there were to be."""
+
+    runs: Runs
+    cases: tuple[Case, ...]
+    asked: int
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether some runs are missing."""
+        return len(self.cases) < self.asked
+
+
+def case(setting: Setting, seed: int, number: int) -> Case:
+    """What run `number` of a seed does: half of the runs are random members, half are random adversaries."""
+    rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(number,)))
+    start = _random_start(setting, rng)
+    kind, centre = setting.uncertainty, setting.centre
+    if rng.random() < 0.5:
+        member = random_member(kind, start, centre, rng)
+    else:
+        member = adversary(kind, rng.random(genes_of(kind)), start, centre, setting.layer)
+    return Case(start=start, member=member)
+
+
+def _random_start(setting: Setting, rng: np.random.Generator) -> Array:
+    """The initial state, or a point of the ball that is allowed (its surface, half of the time)."""
+    if not setting.within:
+        return setting.x0
+    n = len(setting.x0)
+    direction = rng.normal(size=n)
+    radius = 1.0 if rng.random() < 0.5 else rng.random() ** (1 / n)
+    return np.asarray(setting.centre + setting.within * radius * direction / np.linalg.norm(direction))
+
+
+def disturbance_of(setting: Setting, cases: Sequence[Case]) -> Disturbance:
+    """One lane for each case."""
+    members = [item.member for item in cases]
+    return assembled(members, setting.uncertainty, setting.centre, setting.layer)
+
+
+def monte_carlo(
+    setting: Setting, loop: Loop, count: int, seed: int, report: Report | None = None
+) -> Sample | None:
+    """`count` runs; fewer, or None, if the user interrupts."""
+    problem = with_times(loop.problem, TIMES)
+    parts: list[Runs] = []
+    cases: list[Case] = []
+    name = f"{loop.controller}, random runs"
+    try:
+        for batch in _batches(setting, count, seed):
+            if report is not None:
+                report(name, len(cases), count)
+            parts.append(_slim(_run(setting, problem, batch)))
+            cases += batch
+    except KeyboardInterrupt:
+        del cases[sum(part.lanes for part in parts) :]
+    return Sample(runs=joined(parts), cases=tuple(cases), asked=count) if parts else None
+
+
+def _batches(setting: Setting, count: int, seed: int) -> Iterator[list[Case]]:
+    for first in range(0, count, BATCH):
+        yield [case(setting, seed, number) for number in range(first, min(first + BATCH, count))]
+
+
+def _run(setting: Setting, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
+    starts = np.array([item.start for item in cases])
+    return integrate(problem, starts, disturbance_of(setting, cases), tolerance=setting.tolerance)
+
+
+def _slim(runs: Runs) -> Runs:
+    """Runs without what only drawings need: many of them fit into memory."""
+    return replace(
+        runs,
+        k=runs.k[:, :0],
+        u_a=runs.u_a[:, :0],
+        sigma_hat=runs.sigma_hat[:, :0],
+        h=runs.h[:, :0],
+        xtilde=runs.xtilde[:, :0],
+    )
+
+
+def with_times(problem: LoopProblem, count: int) -> LoopProblem:
+    """The problem with another number of output times."""
+    return replace(problem, times=np.linspace(0.0, problem.horizon, count))
+
+
+def attack(setting: Setting, loop: Loop, seed: int, report: Report | None = None) -> Case:
+    """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
+    rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
+    problem = with_times(loop.problem, 2)
+    n = len(setting.x0) if setting.within else 0
+    size = genes_of(setting.uncertainty) + n
+    genes, worst = rng.random((_POPULATION, size)), np.full(_POPULATION, -np.inf)
+    kept = np.zeros((0, size))
+    scores = np.zeros(0)
+    for turn in range(_ROUNDS):
+        if report is not None:
+            report(f"{loop.controller}, adversary", turn * _POPULATION, _ROUNDS * _POPULATION)
+        runs = _run(setting, problem, [_bred(setting, row) for row in genes])
+        worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
+        pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])
+        order = np.argsort(-values, kind="stable")[:_ELITE]
+        kept, scores = pool[order], values[order]
+        genes = _children(kept, 0.5 ** (turn + 1), rng)
+    return _bred(setting, kept[0])
+
+
+def _children(parents: Array, spread: float, rng: np.random.Generator) -> Array:
+    """Mixtures of two parents each, moved a little; genes are mirrored at 0 and 1."""
+    chosen = rng.integers(len(parents), size=(2, _POPULATION))
+    take = rng.random((_POPULATION, parents.shape[1])) < 0.5
+    mixed = np.where(take, parents[chosen[0]], parents[chosen[1]])
+    moved = mixed + 0.3 * spread * rng.normal(size=mixed.shape)
+    folded = np.abs(np.remainder(moved + 1, 2) - 1)
+    return np.asarray(folded)
+
+
+def _bred(setting: Setting, genes: Array) -> Case:
+    kind = setting.uncertainty
+    own = genes_of(kind)
+    start = setting.x0
+    if setting.within:
+        direction = 2 * genes[own:] - 1
+        length = float(np.linalg.norm(direction)) or 1.0
+        start = setting.centre + setting.within * direction / length
+    member = adversary(kind, genes[:own], start, setting.centre, setting.layer)
+    return Case(start=start, member=member)

@@ -1,0 +1,213 @@
+"""What is simulated: plan, times, starts, and each loop with its gains and what a certificate promises about it.
+
+Gains come from a certificate, or are chosen; only what a certificate covers can be falsified.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.errors import TubecertError
+from tubecert.expression import Expression
+from tubecert.findings import Finding
+from tubecert.model import ControlAffineModel, build
+from tubecert.simulate.certified import Result, above, number, plan_of
+from tubecert.simulate.problem import Controller, Gains, LoopProblem
+from tubecert.simulate.promise import SECTIONS, TITLES, Promise, promise
+from tubecert.simulate.uncertainty import Class, class_of
+from tubecert.spec import Spec
+from tubecert.trajectory import Plan
+
+ADAPTIVE: Final = ("l1", "sampled")
+TIMES: Final = 501  # output times of the loops that are drawn
+_LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
+_TOLERANCE: Final = 1e-3  # of rho, asked of the integrator
+CHOSEN: Final = "chosen, not certified"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What the command line says about gains: which certificate, and what replaces its numbers."""
+
+    source: str = "distance"
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    sample_time: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Loop:
+    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
+
+    problem: LoopProblem
+    origin: str
+    promise: Promise | None
+
+    @property
+    def controller(self) -> Controller:
+        """Its controller."""
+        return self.problem.controller
+
+    @property
+    def tested(self) -> bool:
+        """Whether leaving the tube counts: it adapts, so it is meant to stay."""
+        return self.controller in ADAPTIVE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Setting:
+    """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0."""
+
+    spec: Spec
+    result: Result
+    model: ControlAffineModel
+    plan: Plan
+    horizon: float
+    times: Array
+    rho: float
+    reach: float
+    x0: Array
+    centre: Array
+    within: float
+    uncertainty: Class
+    h: tuple[Expression, ...] | None
+    layer: float
+
+    @property
+    def tolerance(self) -> float:
+        """The error of |x| that the integrator is asked for."""
+        return _TOLERANCE * self.rho
+
+    @property
+    def half_widths(self) -> Array:
+        """Bounds of |x_i - x_i*| in the tube, (n,)."""
+        return np.array([float(width) for width in self.result["tube"]["half_widths"].values()])
+
+
+def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> Setting:
+    """The setting of a specification and its certification, which has a tube."""
+    model = build(spec)
+    plan = plan_of(spec, model, result)
+    horizon = _horizon(spec, duration)
+    rho = number(result["tube"]["rho"])
+    kind = class_of(result, len(spec.states), len(spec.inputs))
+    reach = math.sqrt(result["metric"]["lower"][0]) * rho
+    wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
+    return Setting(
+        spec=spec,
+        result=result,
+        model=model,
+        plan=plan,
+        horizon=horizon,
+        times=np.linspace(0.0, horizon, TIMES),
+        rho=rho,
+        reach=reach,
+        x0=np.array([float(value) for value in spec.x0]),
+        centre=Tape(plan.start, ()).run_floats([], ()),
+        within=0.0 if spec.within is None else float(spec.within),
+        uncertainty=kind,
+        h=None if wanted is None else tuple(term.expression for term in wanted),
+        layer=_LAYER * above(result, "metric_input_gain") * reach,
+    )
+
+
+def _horizon(spec: Spec, duration: Fraction | None) -> float:
+    """The duration asked for; else the plan's horizon; else ten time constants of the metric."""
+    wanted = duration or (spec.simulation.duration if spec.simulation else None) or spec.trajectory.horizon
+    if wanted is None:
+        assert spec.metric is not None
+        wanted = 10 / spec.metric.rate
+    if spec.trajectory.horizon is not None and wanted > spec.trajectory.horizon:
+        message = f"the plan ends at {float(spec.trajectory.horizon):g} s, before {float(wanted):g} s"
+        raise TubecertError([Finding(code="TC604", message=message, help="ask for a shorter duration")])
+    return float(wanted)
+
+
+def loop_of(
+    setting: Setting, controller: Controller, choice: Choice, control_rate: Fraction | None = None
+) -> Loop:
+    """A loop with its gains; raises `TubecertError` if there are none for it."""
+    gains, source, origin = _gains(setting, controller, choice)
+    covered = controller in ADAPTIVE and control_rate is None and origin != CHOSEN
+    problem = LoopProblem(
+        model=setting.model,
+        plan=setting.plan,
+        controller=controller,
+        horizon=setting.horizon,
+        times=setting.times,
+        gains=gains,
+        control_rate=None if control_rate is None else float(control_rate),
+    )
+    return Loop(problem=problem, origin=origin, promise=promise(setting.result, source) if covered else None)
+
+
+def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[Gains | None, str, str]:
+    """Gains, the certificate they belong to, and their origin in words."""
+    if controller in ("nominal", "ccm"):
+        return None, "", "no adaptation"
+    source = "sampled" if controller == "sampled" or choice.source == "sampled" else choice.source
+    if controller == "l1" and source == "sampled":
+        source = "distance"
+    wanted: dict[str, Any] = {"bandwidth": choice.bandwidth}
+    if controller == "sampled":
+        wanted["sample_time"] = choice.sample_time
+    if controller == "l1":
+        wanted["adaptation_rate"] = choice.adaptation_rate
+    replaced = {name: float(value) for name, value in wanted.items() if value is not None}
+    found = _certified(setting.result, source)
+    missing = [name for name in wanted if name not in {**found, **replaced}]
+    if missing:
+        raise TubecertError([_no_gains(setting, controller, source, missing)])
+    numbers = {**found, **replaced}
+    gains = Gains(
+        bandwidth=numbers["bandwidth"],
+        projection_radius=numbers.get("projection_radius", _radius(setting)),
+        predictor_gain=_predictor(setting, controller, numbers),
+        adaptation_rate=numbers.get("adaptation_rate"),
+        smooth=_smooth(setting, controller),
+        sample_time=numbers.get("sample_time") if controller == "sampled" else None,
+    )
+    same = all(found.get(name) == value for name, value in replaced.items())
+    return gains, source, f"certified by {TITLES[source]}" if same else CHOSEN
+
+
+def _certified(result: Result, source: str) -> dict[str, float]:
+    """The gains that a section proves, by name; empty if it proves none."""
+    recipe = result["proof"].get(SECTIONS[source]) if promise(result, source) else None
+    return {name: number(value) for name, value in (recipe or {}).items() if value is not None}
+
+
+def _no_gains(setting: Setting, controller: Controller, source: str, missing: list[str]) -> Finding:
+    options = " and ".join(f"--{name.replace('_', '-')}" for name in missing)
+    return Finding(
+        code="TC605",
+        message=f"{TITLES[source]} certifies no gains for the controller {controller}",
+        help=f"choose {options} (then nothing is covered by the certificate), or another --gains",
+    )
+
+
+def _radius(setting: Setting) -> float:
+    """R_H where no certificate gives one: Dh, with what the smooth layer needs."""
+    smooth = setting.spec.adaptation.smooth
+    return setting.uncertainty.h * math.sqrt(1 + float(smooth or 0)) * (1 + 1e-6) or 1.0
+
+
+def _smooth(setting: Setting, controller: Controller) -> float | None:
+    smooth = setting.spec.adaptation.smooth
+    return None if smooth is None or controller != "l1" else float(smooth)
+
+
+def _predictor(setting: Setting, controller: Controller, numbers: Mapping[str, float]) -> float | Array:
+    """A_m: the certificate's g, else the specification's matrix, else the bandwidth as g."""
+    A_m = setting.spec.adaptation.A_m
+    if controller != "sampled" and A_m != "auto":
+        return np.array([[float(entry) for entry in row] for row in A_m])
+    return numbers.get("predictor_gain", numbers["bandwidth"])
