@@ -1,0 +1,127 @@
+"""The conditions at finitely many points as a semidefinite program in the coefficients and kappa.
+
+At points of the first kind W <= kappa I and floor <= W, at points of the second -N'(F_0 + 2 rate W)N >= 0. Fewer points
+are fewer conditions: the least kappa is a bound from below for every member of the family, as far as the solver may be
+trusted. The blocks of a point are made once and kept.
+Untrusted. Implements: (CCM_1), (CCM_2) at points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from tubecert.enclosure.interval import Array
+from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution, Semidefinite, Solver, solve
+from tubecert.metric.synthesis.forms import FormsTape, Unknowns, upper
+from tubecert.metric.synthesis.problem import Floor
+
+LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Points (N, n) and their rows on the unknowns, (N, s, U); `floor` (N, s): what W has to exceed there, or empty."""
+
+    at: Array
+    rows: Array
+    floor: Array
+
+    def kept(self, chosen: Array) -> Points:
+        """Those with a True in `chosen` (N,)."""
+        return Points(at=self.at[chosen], rows=self.rows[chosen], floor=self.floor[chosen])
+
+    def joined(self, other: Points) -> Points:
+        """These and the others."""
+        pairs = ((self.at, other.at), (self.rows, other.rows), (self.floor, other.floor))
+        at, rows, floor = (np.concatenate(pair) for pair in pairs)
+        return Points(at=at, rows=rows, floor=floor)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointProgram:
+    """The conditions at `metric` points (C1) and `contraction` points (C2)."""
+
+    unknowns: Unknowns
+    metric: Points
+    contraction: Points
+    floor: Floor
+    solver: Solver
+
+    def least_kappa(self) -> ConicSolution:
+        """Minimise kappa; the unknowns come first, kappa last."""
+        width = self.unknowns.count
+        cost = np.zeros(width + 1)
+        cost[-1] = 1.0
+        blocks = [*self._between(0.0, None), *self._contracting(None)]
+        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver)
+
+    def central(self, kappa: float, slack: float, reference: Array) -> ConicSolution:
+        """With kappa given, the greatest extra rate mu (the last unknown), W kept inside by a relative `slack`.
+
+        -N'(F_0 + 2 rate W)N >= 2 mu N'W_r N with W_r given by `reference`, the unknowns found before (U,).
+        """
+        cost = np.zeros(self.unknowns.count + 1)
+        cost[-1] = -1.0
+        blocks = [*self._between(slack, kappa), *self._contracting(reference)]
+        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=1e-6)
+
+    def _between(self, slack: float, kappa: float | None) -> list[Semidefinite]:
+        """W - floor >= 0 and kappa I - W >= 0 at the metric points."""
+        n = self.unknowns.mask.shape[1]
+        eye = upper(np.eye(n))
+        blocks = []
+        for rows, floor in zip(self.metric.rows, self.metric.floor, strict=True):
+            if kappa is None:
+                above, ceiling = _block(n, 0.0 * eye, -rows, eye), 0.0 * eye
+            else:
+                ceiling = kappa * (1 - slack) * eye
+                above = _block(n, ceiling, -rows, 0.0 * eye)
+            blocks += [above, _block(n, -(1 + slack) * floor, rows, 0.0 * eye)]
+            if self.floor == "input":
+                fixed = -LEAST * (kappa or 0.0) * eye
+                blocks.append(_block(n, fixed, rows, -LEAST * eye if kappa is None else 0.0 * eye))
+        return blocks
+
+    def _contracting(self, reference: Array | None) -> list[Semidefinite]:
+        """The C2 blocks; with a reference, less 2 mu N'W_r N."""
+        blocks = []
+        for rows, weight in zip(self.contraction.rows, self.contraction.floor, strict=True):
+            order = round((np.sqrt(8 * len(rows) + 1) - 1) / 2)
+            last = np.zeros(len(rows)) if reference is None else -2 * weight.reshape(rows.shape) @ reference
+            blocks.append(_block(order, np.zeros(len(rows)), rows, last))
+        return blocks
+
+
+def _block(order: int, constant: Array, rows: Array, last: Array) -> Semidefinite:
+    slopes = np.concatenate([rows, last[:, None]], axis=1)
+    return Semidefinite(order=order, entries=Affine(constant=constant, slopes=sparse.csr_array(slopes)))
+
+
+def metric_points(forms: FormsTape, unknowns: Unknowns, at: Array, floor: Floor) -> Points:
+    """Points for C1."""
+    here = forms(at)
+    n = at.shape[1]
+    below = here.input if floor == "input" else np.broadcast_to(np.eye(n), (len(at), n, n))
+    return Points(at=at, rows=here.metric_rows(unknowns), floor=upper(below))
+
+
+def contraction_points(forms: FormsTape, unknowns: Unknowns, at: Array, rate: float) -> Points:
+    """Points for C2; `floor` holds the rows of N'W N."""
+    here = forms(at)
+    return Points(
+        at=at, rows=here.contraction_rows(unknowns, rate), floor=here.projected_rows(unknowns).reshape(len(at), -1)
+    )
+
+
+def finite(points: Points) -> Points:
+    """Without those at which something is not finite."""
+    return points.kept(np.isfinite(points.rows).all(axis=(1, 2)) & np.isfinite(points.floor).all(axis=1))
+
+
+def start(regions: Sequence[Array]) -> Array:
+    """Points without repetitions."""
+    return np.unique(np.concatenate(list(regions)), axis=0)
