@@ -1,4 +1,4 @@
-"""A metric file (JSON, as `synth` will write it) -> the metric of a specification; nothing in it is believed.
+"""A metric file (JSON, as `synth` writes it) -> the metric of a specification; nothing in it is believed.
 
 JSON is read by the reader of specifications: numbers from their text, expressions in the same grammar, every
 problem with its place. Only `rate` and `dual_metric` are used; what else the file says is proven again.
@@ -13,13 +13,13 @@ from tubecert.errors import SpecError
 from tubecert.spec.document import MappingNode, compose
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader, root_field
-from tubecert.spec.source import check_limits, read_source
+from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_metric
 from tubecert.spec.types import Metric, Spec
 
 FORMAT: Final = "tubecert-metric/1"
 
-_REPORTED = ("verified_on", "margin", "lower", "upper", "condition_number", "solver")
+_REPORTED: Final = ("verified_on", "margin", "lower", "upper", "condition_number", "solver")
 
 
 def with_metric(spec: Spec, path: str) -> Spec:
@@ -27,7 +27,15 @@ def with_metric(spec: Spec, path: str) -> Spec:
 
     Raises `TargetError` if the file cannot be read, `SpecError` with every problem in it.
     """
-    source = read_source(path)
+    return _with(spec, read_source(path))
+
+
+def with_metric_text(spec: Spec, text: str, file: str) -> Spec:
+    """The same for the text of a metric file; `file` is what findings call it."""
+    return _with(spec, Source.of(file, text))
+
+
+def _with(spec: Spec, source: Source) -> Spec:
     check_limits(source)
     node, findings = compose(source)
     reader = Reader(source)
