@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from tubecert.cli import everyday
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
 from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
 
@@ -41,22 +42,11 @@ Examples:
   tubecert certify plant.yaml -q -o - | jq .result.tube
 """
 
-_CHECK_AFTER = """\b
-Examples:
-  tubecert check plant.yaml
-  tubecert check configs/ other.yaml
-"""
-
-_VERSION_AFTER = """\b
-Example:
-  tubecert version -v
-"""
-
 app = typer.Typer(
     name="tubecert",
     help=_ABOUT,
     epilog=_AFTER,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,  # rich would double the time of --help
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -80,10 +70,6 @@ class Formulas(StrEnum):
 
 
 _Spec = Annotated[str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)]
-_Specs = Annotated[
-    list[str],
-    typer.Argument(metavar="SPEC", help="Specifications, or folders with some.", show_default=False),
-]
 
 
 def _number(flag: str, help: str) -> object:
@@ -162,47 +148,7 @@ def certify(
     raise typer.Exit(code)
 
 
-@app.command(epilog=_CHECK_AFTER, short_help="Check specifications, without certifying.")
-def check(
-    context: typer.Context,
-    specs: _Specs,
-    *,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
-) -> None:
-    """Check specifications without certifying: the format, that f, B, W are smooth, that B has full rank."""
-    how = Output.of(context, locals())
-    with guarded(how):
-        from tubecert.cli.check import run
-
-        code = run(specs, how)
-    raise typer.Exit(code)
-
-
-@app.command("version", epilog=_VERSION_AFTER, short_help="Show the version.")
-def show_version(
-    context: typer.Context,
-    *,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
-) -> None:
-    """Show the version; with -v, also those of Python and of the libraries that results rest on."""
-    how = Output.of(context, locals())
-    with guarded(how):
-        from tubecert.cli.version import run
-
-        run(how)
-    raise typer.Exit(0)
+everyday.register(app)
 
 
 def main() -> None:

@@ -1,66 +1,137 @@
-"""`check`: what is wrong with specifications, without certifying them."""
+"""`check`: what is wrong with specifications, for people and for continuous integration."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output
-from tubecert.errors import ExitCode, TubecertError
-from tubecert.findings import Finding, Severity
+from tubecert.cli.options import Numbers, Output
+from tubecert.errors import ExitCode
+from tubecert.findings import Finding
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
 
+if TYPE_CHECKING:
+    from tubecert.pipeline.checking import Checked, CheckOptions
+
 _SUFFIXES = {".yaml", ".yml"}
+_WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
 
 
-def run(paths: Sequence[str], output: Output) -> ExitCode:
+def run(paths: Sequence[str], given: Mapping[str, Any], output: Output) -> ExitCode:
     """Check every file; findings are the result and go to stdout."""
-    findings: list[Finding] = []
-    worst, files = ExitCode.CERTIFIED, 0
-    for path in _expand(paths):
-        found, code = _check(path)
-        findings += found
-        worst = _worse(worst, code)
-        files += 1
-    if not files:
-        finding = Finding(
-            code="TC100",
-            message=f"no specification in {', '.join(paths)}",
-            help="give files, or folders that contain files *.yaml",
-        )
-        findings, worst = [finding], ExitCode.INVALID
-    write_stdout(_text(findings, files, output))
-    return worst
+    format_ = _format(given, output)
+    jobs, options = _options(given)
+    files = list(_expand(paths))
+    results = _nothing(paths) if not files else _checked(files, options, jobs, output)
+    write_stdout(_text(results, format_, output))
+    if format_ == "github":
+        from tubecert.report import github
+
+        github.append_step_summary(results)
+    return max((result.code for result in results), key=_WORST.index)
 
 
-def _text(findings: Sequence[Finding], files: int, output: Output) -> str:
+def _format(given: Mapping[str, Any], output: Output) -> str:
+    """The format asked for; in a workflow of GitHub, without being asked, the one that it understands."""
+    if given["format_"] is not None:
+        return str(given["format_"])
+    from tubecert.report import github
+
     if output.json:
+        return "json"
+    return "github" if github.detected() else "text"
+
+
+def _options(given: Mapping[str, Any]) -> tuple[int, CheckOptions]:
+    """The number of jobs and what a check has to know; raises `SpecError` with everything that is wrong."""
+    from tubecert.pipeline.checking import CheckOptions
+
+    numbers = Numbers()
+    jobs = numbers.count("--jobs", given["jobs"])
+    gap = numbers.positive("--gap", given["gap"], below=1)
+    budget = numbers.count("--budget", given["budget"])
+    numbers.check()
+    options = CheckOptions(certify=given["certify"], strict=given["strict"], cached=not given["no_cache"])
+    options = replace(options, gap=gap or options.gap, budget=budget or options.budget)
+    return jobs or 1, options
+
+
+def _nothing(paths: Sequence[str]) -> list[Checked]:
+    """What there is to say where there is nothing to check."""
+    from tubecert.pipeline.checking import Checked
+
+    finding = Finding(
+        code="TC100",
+        message=f"no specification in {', '.join(paths)}",
+        help="give files, or folders that contain files *.yaml",
+    )
+    return [Checked(path=paths[0], findings=(finding,), code=ExitCode.INVALID)]
+
+
+def _checked(files: Sequence[str], options: CheckOptions, jobs: int, output: Output) -> list[Checked]:
+    """The results in the order of the files, whichever is ready first."""
+    from tubecert.pipeline.checking import check
+
+    workers = min(jobs, len(files))
+    if workers > 1:
+        return _in_parallel(files, options, workers)
+    from tubecert.report import progress
+
+    terminal = Terminal.stderr(color=output.color)
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        return [check(file, options, report) for file in files]
+
+
+def _in_parallel(files: Sequence[str], options: CheckOptions, workers: int) -> list[Checked]:
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    from tubecert.pipeline.checking import check
+
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts) as pool:
+        try:
+            return [task.result() for task in [pool.submit(check, file, options) for file in files]]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _leave_interrupts() -> None:
+    """An interruption is dealt with by the command, not by each of its workers."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _text(results: Sequence[Checked], format_: str, output: Output) -> str:
+    findings = [item for result in results for item in result.findings]
+    if format_ == "json":
         return json.dumps([as_data(finding) for finding in findings], indent=1, ensure_ascii=False) + "\n"
+    if format_ == "github":
+        from tubecert.report import github
+
+        return github.render(results)
+    if format_ == "junit":
+        from tubecert.report import junit
+
+        return junit.render(results)
+    if format_ == "sarif":
+        from tubecert.report import sarif
+
+        return sarif.render(results)
+    count = sum(not _is_no_file(result) for result in results)
     shown = () if output.quiet else findings
-    return Terminal.stdout(color=output.color).text(render(shown, closing=summary(findings, files)))
+    return Terminal.stdout(color=output.color).text(render(shown, closing=summary(findings, count)))
 
 
-def _check(path: str) -> tuple[list[Finding], ExitCode]:
-    """The findings of one file, and the exit code they deserve."""
-    from tubecert.spec import load
-
-    try:
-        spec = load(path)
-        from tubecert.pipeline import inspect
-
-        findings = inspect(spec)
-    except TubecertError as error:
-        return list(error.findings), error.exit_code
-    wrong = any(finding.severity is Severity.ERROR for finding in findings)
-    return findings, ExitCode.NOT_CERTIFIED if wrong else ExitCode.CERTIFIED
-
-
-def _worse(one: ExitCode, other: ExitCode) -> ExitCode:
-    """An invalid file weighs more than a refuted one."""
-    return max(one, other)
+def _is_no_file(result: Checked) -> bool:
+    return len(result.findings) == 1 and result.findings[0].message.startswith("no specification in ")
 
 
 def _expand(paths: Sequence[str]) -> Iterator[str]:

@@ -35,8 +35,9 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
 def missing_parts(spec: Spec) -> list[Finding]:
     """What a certification needs and a specification may lack."""
     missing = []
-    if spec.metric is None:
-        missing.append(("metric", "give metric.dual_metric and metric.rate, or --metric FILE"))
+    if spec.metric is None and spec.synthesis is None:
+        remedy = "give metric.dual_metric and metric.rate, metric.synthesise, or --metric FILE"
+        missing.append(("metric", remedy))
     if spec.tube.epsilon is None:
         missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
     if spec.tube.rho_a is None:

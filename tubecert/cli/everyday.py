@@ -1,0 +1,204 @@
+"""The commands around a certification: check, schema, init, explain, version. `register` adds them to the app."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import guarded
+from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+
+_CHECK_AFTER = """\b
+Examples:
+  tubecert check plant.yaml
+  tubecert check configs/ other.yaml --strict
+  tubecert check configs/ --certify --jobs 4 --format junit > report.xml
+
+\b
+In a workflow of GitHub (GITHUB_ACTIONS=true) findings become annotations, and a summary of the step.
+Exit codes: 0 nothing to complain about; 1 errors in the mathematics, or not as expected; 2 invalid
+files; 4 undecided.
+"""
+
+_SCHEMA_AFTER = """\b
+Example:
+  tubecert schema spec > spec.schema.json
+and, as the first line of a specification:
+  # yaml-language-server: $schema=spec.schema.json
+"""
+
+_INIT_AFTER = """\b
+Example:
+  tubecert init --template tracking -o plant.yaml && tubecert certify plant.yaml
+"""
+
+_EXPLAIN_AFTER = """\b
+Examples:
+  tubecert explain TC302
+  tubecert explain feedback_gain
+  tubecert explain 26c
+"""
+
+_VERSION_AFTER = """\b
+Example:
+  tubecert version --json
+"""
+
+
+class Format(StrEnum):
+    """What findings are written as."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+    JUNIT = "junit"
+    SARIF = "sarif"
+
+
+class Schema(StrEnum):
+    """What a schema describes."""
+
+    SPEC = "spec"
+    METRIC = "metric"
+    CERTIFICATE = "certificate"
+
+
+class Template(StrEnum):
+    """What to start from."""
+
+    REGULATION = "regulation"
+    TRACKING = "tracking"
+    PVTOL = "pvtol"
+
+
+_Specs = Annotated[
+    list[str],
+    typer.Argument(metavar="SPEC", help="Specifications, or folders with some.", show_default=False),
+]
+
+
+def check(
+    context: typer.Context,
+    specs: _Specs,
+    *,
+    format_: Annotated[
+        Format | None, typer.Option("--format", help="What to write.  [text; github in its workflows]")
+    ] = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Certify, too, and compare with the file's expect.")
+    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Warnings are errors.")] = False,
+    jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Files checked at a time.")] = "1",
+    no_cache: Annotated[
+        bool, typer.Option("--no-cache", help="Do not use what earlier checks have found.")
+    ] = False,
+    gap: Annotated[str, typer.Option(metavar="NUMBER", help="As for certify; with --certify.")] = "1/100",
+    budget: Annotated[
+        str | None, typer.Option(metavar="NUMBER", help="As for certify; with --certify.")
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Check specifications: format, mathematics, what is odd; with --certify also the locked results.
+
+    Nothing is written but the findings; what files are found to be is remembered, so that a file that has not
+    changed costs nothing.
+    """
+    given = dict(locals())
+    how = Output.of(context, given)
+    if how.json and format_ not in (None, Format.JSON):
+        raise typer.BadParameter("--json and --format exclude each other", ctx=context)
+    with guarded(how):
+        from tubecert.cli.check import run
+
+        code = run(specs, given, how)
+    raise typer.Exit(code)
+
+
+def schema(
+    context: typer.Context,
+    name: Annotated[
+        Schema, typer.Argument(metavar="[spec|metric|certificate]", help="Of what.", show_default=False)
+    ] = Schema.SPEC,
+    *,
+    debug: Debug = False,
+) -> None:
+    """Show a JSON Schema: of specifications (for editors), of metric files, of certificates."""
+    with guarded(Output(debug=debug)):
+        from tubecert.cli.schema import run
+
+        run(str(name))
+
+
+def init(
+    context: typer.Context,
+    *,
+    template: Annotated[
+        Template, typer.Option("--template", "-t", help="What to start from.")
+    ] = Template.REGULATION,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The new file; - is stdout.  [TEMPLATE.yaml]"),
+    ] = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a commented specification to start from; it certifies as it is. Nothing is overwritten."""
+    with guarded(Output(debug=debug)):
+        from tubecert.cli.init import run
+
+        run(str(template), output, quiet=quiet)
+
+
+def explain(
+    context: typer.Context,
+    topic: Annotated[
+        str | None,
+        typer.Argument(metavar="[TOPIC]", help="A code, a constant or an equation.", show_default=False),
+    ] = None,
+    *,
+    debug: Debug = False,
+) -> None:
+    """Explain a finding code, a constant or an equation; without a topic, list all that there are."""
+    with guarded(Output(debug=debug)):
+        from tubecert.cli.explain import run
+
+        run(topic)
+
+
+def show_version(
+    context: typer.Context,
+    *,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Show the version; with -v, also those of Python and of the libraries that results rest on."""
+    how = Output.of(context, locals())
+    with guarded(how):
+        from tubecert.cli.version import run
+
+        run(how)
+    raise typer.Exit(0)
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the commands."""
+    app.command("check", epilog=_CHECK_AFTER, short_help="Check specifications, for you and for CI.")(check)
+    app.command("init", epilog=_INIT_AFTER, short_help="Write a specification to start from.")(init)
+    app.command("schema", epilog=_SCHEMA_AFTER, short_help="Show the JSON Schemas.")(schema)
+    app.command("explain", epilog=_EXPLAIN_AFTER, short_help="Explain a code, a constant, an equation.")(
+        explain
+    )
+    app.command("version", epilog=_VERSION_AFTER, short_help="Show the version.")(show_version)

@@ -1,0 +1,35 @@
+"""`explain`: one page about a finding code, a constant or an equation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tubecert.cli.guard import write_stdout
+from tubecert.errors import SpecError
+from tubecert.expression import suggestion
+from tubecert.findings import Finding
+from tubecert.report import pages
+
+
+def run(topic: str | None) -> None:
+    """Show the page of a topic, or every topic; raises `SpecError` if there is no such page."""
+    if topic is None:
+        write_stdout("\n".join(_index()) + "\n")
+        return
+    page = pages.find(topic)
+    if page is None:
+        help = suggestion(topic, pages.topics(), what="topics") if topic.isascii() else ""
+        message = f"there is no page about {topic[:60]!r}"
+        raise SpecError(
+            [Finding(code="TC112", message=message, help=help or "tubecert explain lists all topics")]
+        )
+    write_stdout(page.text() + "\n")
+
+
+def _index() -> Iterator[str]:
+    yield "Finding codes"
+    yield from (f"  {code}  {page.title}" for code, page in pages.codes().items())
+    yield "\nConstants (by name or symbol)"
+    yield from (f"  {name:<20} {page.symbol:<14} {page.words}" for name, page in pages.constants().items())
+    yield "\nEquations"
+    yield from (f"  {tag:<20} {page.title}" for tag, page in pages.equations().items())

@@ -1,0 +1,41 @@
+"""`init`: a commented specification to start from, which certifies as it is."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
+
+TEMPLATES: Final = ("regulation", "tracking", "pvtol")
+
+
+def run(template: str, target: str | None, *, quiet: bool) -> None:
+    """Write a template to a file that does not exist yet (`-`: to stdout); raises `TargetError`."""
+    text = (resources.files("tubecert") / "templates" / f"{template}.yaml").read_text(encoding="utf-8")
+    if target == certificate.STDOUT:
+        write_stdout(text)
+        return
+    name = f"{template}.yaml" if target is None else target
+    _create(name, text)
+    if not quiet:
+        write_stdout(f"{name}: a specification that certifies as it is\n  tubecert certify {name}\n")
+
+
+def _create(name: str, text: str) -> None:
+    try:
+        with Path(name).open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise _refused(f"{name} exists and is not overwritten") from None
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise _refused(f"cannot write {name}: {reason}") from None
+
+
+def _refused(message: str) -> TargetError:
+    return TargetError([Finding(code="TC120", message=message, help="choose another file with -o FILE")])

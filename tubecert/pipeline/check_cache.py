@@ -1,0 +1,136 @@
+"""What checks have found, kept in the user's cache, so that an unchanged file costs nothing.
+
+Findings belong to a text (they have places), outcomes of certifications to the effective specification. Both keys
+hold a fingerprint of this program and of the libraries that results rest on. An entry that is not sealed as it was
+written, or cannot be read, counts as absent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+from dataclasses import asdict
+from fractions import Fraction
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import tubecert
+from tubecert.findings import Finding, Location, Severity
+from tubecert.pipeline.expectations import Claim, Outcome
+from tubecert.spec import Spec, canonical
+
+_LIBRARIES = ("numpy", "scipy", "pyyaml")
+
+
+def folder() -> Path:
+    """Where checks are kept."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(base) if Path(base).is_absolute() else Path.home() / ".cache") / "tubecert" / "checks"
+
+
+def key_of_text(what: str, spec: Spec) -> str:
+    """The name of what follows from a file's text (and its plan file)."""
+    return _key([what, spec.source, _plan_file(spec)])
+
+
+def key_of_system(spec: Spec, gap: Fraction, budget: int) -> str:
+    """The name of what follows from the effective specification and the effort; `expect` decides nothing."""
+    effective = {name: value for name, value in canonical(spec).items() if name != "expect"}
+    return _key(["outcome", effective, _plan_file(spec), str(gap), budget])
+
+
+def _plan_file(spec: Spec) -> str:
+    return "" if spec.trajectory.table is None else spec.trajectory.table.sha256
+
+
+def _key(content: Any) -> str:
+    return hashlib.sha256(json.dumps([_program(), content], sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def _program() -> list[str]:
+    """A fingerprint of the program: its version, its source, and the versions of libraries."""
+    package = Path(tubecert.__file__).parent
+    source = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        source.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    versions = [f"{name} {metadata.version(name)}" for name in _LIBRARIES]
+    return [tubecert.__version__, source.hexdigest(), *versions]
+
+
+def read_findings(name: str, spec: Spec) -> list[Finding] | None:
+    """The findings kept under a name, at their places in the file of `spec`."""
+    data = _read(name)
+    try:
+        return None if data is None else [_finding(item, spec.path) for item in data]
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def write_findings(name: str, findings: list[Finding]) -> None:
+    """Keep findings; those of other files (a plan's) are not kept, since these may change."""
+    files = {item.location.file for item in findings if item.location}
+    if len(files) <= 1:
+        _write(name, [asdict(item) for item in findings])
+
+
+def _finding(data: dict[str, Any], path: str) -> Finding:
+    place = data["location"]
+    location = None if place is None else Location(**{**place, "file": path})
+    return Finding(**{**data, "location": location, "severity": Severity(data["severity"])})
+
+
+def read_outcome(name: str) -> Outcome | None:
+    """The outcome kept under a name."""
+    data = _read(name)
+    try:
+        return None if data is None else _outcome(data)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def write_outcome(name: str, found: Outcome) -> None:
+    """Keep an outcome."""
+    _write(name, asdict(found))
+
+
+def _outcome(data: dict[str, Any]) -> Outcome:
+    return Outcome(
+        verdict=str(data["verdict"]),
+        numbers=tuple((str(key), value) for key, value in data["numbers"]),
+        claims=tuple(Claim(**claim) for claim in data["claims"]),
+    )
+
+
+def _read(name: str) -> Any:
+    try:
+        kept = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
+        return kept["data"] if kept["key"] == name and kept["seal"] == _seal(kept["data"]) else None
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, RecursionError):
+        return None
+
+
+def _write(name: str, data: Any) -> None:
+    """Keep data; a cache that cannot be written is no one's concern."""
+    text = json.dumps({"key": name, "seal": _seal(data), "data": data})
+    with contextlib.suppress(OSError, RuntimeError):
+        place = folder()
+        place.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=place, suffix=".part")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            Path(temporary).replace(place / f"{name}.json")
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(temporary).unlink()
+            raise
+
+
+def _seal(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

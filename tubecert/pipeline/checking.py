@@ -1,0 +1,108 @@
+"""Checking one file: what `check` says about it, with or without a certification."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from tubecert import pipeline
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.findings import Finding, Severity
+from tubecert.pipeline import check_cache
+from tubecert.pipeline.expectations import UNDECIDED, Claim, Outcome, compared, outcome
+from tubecert.pipeline.options import Options, Progress
+from tubecert.spec import Spec, load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions:
+    """How to check: with a certification, warnings as errors, and whether to remember."""
+
+    certify: bool = False
+    strict: bool = False
+    cached: bool = True
+    gap: Fraction = Fraction(1, 100)
+    budget: int = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked:
+    """What was found in one file; `claims` are those of its certification, `seconds` what the check took."""
+
+    path: str
+    findings: tuple[Finding, ...]
+    code: ExitCode
+    claims: tuple[Claim, ...] = ()
+    seconds: float = 0.0
+
+
+def check(path: str, options: CheckOptions, progress: Progress | None = None) -> Checked:
+    """The findings of a file, and the exit code that they deserve."""
+    started = time.perf_counter()
+    claims: tuple[Claim, ...] = ()
+    try:
+        spec = load(path)
+        findings = _remembered("lint", spec, options, lambda: pipeline.inspect(spec))
+        if options.certify and not _errors(findings):
+            found = _certified(spec, options, progress)
+            findings = [*findings, *compared(spec, found)]
+            claims = found.claims
+    except TubecertError as error:
+        findings = list(error.findings)
+        return Checked(
+            path=path, findings=tuple(findings), code=error.exit_code, seconds=time.perf_counter() - started
+        )
+    findings = [_promoted(item) for item in findings] if options.strict else findings
+    return Checked(
+        path=path,
+        findings=tuple(findings),
+        code=_code(findings),
+        claims=claims,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _errors(findings: list[Finding]) -> list[Finding]:
+    return [item for item in findings if item.severity is Severity.ERROR]
+
+
+def _promoted(finding: Finding) -> Finding:
+    return replace(finding, severity=Severity.ERROR) if finding.severity is Severity.WARNING else finding
+
+
+def _code(findings: list[Finding]) -> ExitCode:
+    """Undecided only if nothing worse is the matter."""
+    errors = _errors(findings)
+    if not errors:
+        return ExitCode.CERTIFIED
+    if all(item.code == UNDECIDED for item in errors):
+        return ExitCode.UNDECIDED
+    return ExitCode.NOT_CERTIFIED
+
+
+def _remembered(
+    what: str, spec: Spec, options: CheckOptions, work: Callable[[], list[Finding]]
+) -> list[Finding]:
+    """Findings of a text that has not changed, or those that `work` finds."""
+    if not options.cached:
+        return work()
+    name = check_cache.key_of_text(what, spec)
+    kept = check_cache.read_findings(name, spec)
+    if kept is None:
+        kept = work()
+        check_cache.write_findings(name, kept)
+    return kept
+
+
+def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
+    """The outcome of a system that has not changed, or of a new certification; raises `TubecertError`."""
+    name = check_cache.key_of_system(spec, options.gap, options.budget)
+    kept = check_cache.read_outcome(name) if options.cached else None
+    if kept is None:
+        effort = Options(gap=options.gap, budget=options.budget)
+        kept = outcome(pipeline.certify(spec, effort, progress))
+        if options.cached:
+            check_cache.write_outcome(name, kept)
+    return kept

@@ -1,0 +1,134 @@
+"""What a certification found, in short; and its comparison with the `expect:` block of a specification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tubecert.expression import number_text
+from tubecert.findings import Finding, Location
+from tubecert.spec import Expectation, Spec
+
+VERDICT_MISMATCH = "TC502"
+RANGE_MISMATCH = "TC503"
+REFUTED = "TC504"
+UNDECIDED = "TC505"
+
+CODES: Mapping[str, str] = {
+    VERDICT_MISMATCH: "the verdict is not the expected one",
+    RANGE_MISMATCH: "a number of the certificate is outside its expected range",
+    REFUTED: "the certification refutes a claim",
+    UNDECIDED: "the certification could not decide",
+}
+
+_SECTIONS = ("conditions_26", "distance", "sampled")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """A claim of a certification with its verdict; `message` says what binds or fails."""
+
+    name: str
+    verdict: str
+    message: str = ""
+    relax: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """A certification in short: the verdict, the numbers that can be expected, and every claim."""
+
+    verdict: str
+    numbers: tuple[tuple[str, float], ...]
+    claims: tuple[Claim, ...]
+
+
+def outcome(result: Mapping[str, Any]) -> Outcome:
+    """What a `result` comes down to."""
+    return Outcome(verdict=result["verdict"], numbers=tuple(_numbers(result)), claims=tuple(_claims(result)))
+
+
+def _numbers(result: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """rho, and the gains of the certificate that decides: A, else B; the sample time is that of C."""
+    if "rho" in result.get("tube", {}):
+        yield "rho", result["tube"]["rho"]
+    decided = result.get("decided_by", [])
+    name = next((name for name in decided if name in result), None)
+    section: Mapping[str, Any] = result.get(name or "", {})
+    if name == "distance":
+        section = section.get("asked") or section.get("least_adaptation") or {}
+    for key in ("bandwidth", "adaptation_rate"):
+        if section.get(key) is not None:
+            yield key, section[key]
+    if result.get("sampled", {}).get("sample_time") is not None:
+        yield "sample_time", result["sampled"]["sample_time"]
+
+
+def _claims(result: Mapping[str, Any]) -> Iterator[Claim]:
+    """A claim per reason, and one per certificate that has no reason among them."""
+    named = set()
+    for reason in result["reasons"]:
+        named.add(reason["claim"].split(":")[0])
+        yield Claim(
+            name=reason["claim"],
+            verdict=reason["verdict"],
+            message=reason["message"],
+            relax=reason.get("relax", ""),
+        )
+    if "verdict" in result.get("metric", {}) and not any(name.startswith("metric") for name in named):
+        yield Claim(name="metric", verdict=result["metric"]["verdict"])
+    for name in result.get("decided_by", ()):
+        if name in result and name not in named:
+            yield Claim(name=name, verdict=result[name]["verdict"])
+
+
+def compared(spec: Spec, found: Outcome) -> list[Finding]:
+    """What is not as expected; without an expectation, a verdict that is not `certified`."""
+    expect = spec.expect
+    if expect is None or expect.verdict is None:
+        findings = list(_not_certified(spec, found))
+    elif expect.verdict == found.verdict:
+        findings = []
+    else:
+        findings = [
+            Finding(
+                code=VERDICT_MISMATCH,
+                message=f"the verdict is {found.verdict}, expected: {expect.verdict}",
+                location=spec.location("expect.verdict"),
+                help="; ".join(claim.message for claim in found.claims if claim.verdict == found.verdict)[
+                    :400
+                ],
+            )
+        ]
+    return findings if expect is None else [*findings, *_ranges(spec, expect, found)]
+
+
+def _not_certified(spec: Spec, found: Outcome) -> Iterator[Finding]:
+    if found.verdict == "certified":
+        return
+    top = spec.location("name") or Location(file=spec.path, line=1, column=1)
+    for claim in found.claims:
+        if claim.verdict == found.verdict:
+            yield Finding(
+                code=REFUTED if found.verdict == "refuted" else UNDECIDED,
+                message=f"{found.verdict}: {claim.name}: {claim.message}",
+                location=top,
+                help=claim.relax,
+            )
+
+
+def _ranges(spec: Spec, expect: Expectation, found: Outcome) -> Iterator[Finding]:
+    numbers = dict(found.numbers)
+    for name, (least, most) in expect.ranges:
+        value = numbers.get(name)
+        if value is not None and least <= Fraction(str(value)) <= most:
+            continue
+        shown = "is not in the certificate" if value is None else f"is {value:g}"
+        yield Finding(
+            code=RANGE_MISMATCH,
+            message=f"{name} {shown}, expected: [{number_text(least)}, {number_text(most)}]",
+            location=spec.location(f"expect.{name}"),
+            help="find out what has changed; if it is meant, change the range",
+        )

@@ -1,0 +1,111 @@
+"""Findings as GitHub workflow commands (annotations) and as a summary of a step.
+
+A workflow command is one line: `::error file=f,line=1,col=2,title=T::message`. Values are escaped as GitHub's own
+toolkit does it (`%`, CR, LF; in properties also `:` and `,`), so that no text of a file can be taken for a command.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from tubecert.findings import Finding, Severity
+from tubecert.pipeline.checking import Checked
+from tubecert.report.findings import summary
+
+_COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
+_MARKS = {Severity.ERROR: "❌", Severity.WARNING: "⚠️", Severity.NOTE: "ℹ️"}
+_DATA = {"%": "%25", "\r": "%0D", "\n": "%0A"}
+_PROPERTY = _DATA | {":": "%3A", ",": "%2C"}
+_LARGEST_SUMMARY = 1_000_000  # GitHub refuses more than 1 MiB
+
+
+def render(results: Sequence[Checked]) -> str:
+    """One command per finding, then how many there are."""
+    findings = [item for result in results for item in result.findings]
+    lines = [annotation(item) for item in findings]
+    return "\n".join([*lines, summary(findings, len(results))]) + "\n"
+
+
+def annotation(finding: Finding) -> str:
+    """The workflow command of a finding."""
+    place = finding.location
+    properties: dict[str, object] = {}
+    if place is not None:
+        properties = {"file": relative(place.file), "line": place.line, "endLine": place.line}
+        properties |= {"col": place.column, "endColumn": place.column + place.width}
+    properties["title"] = f"tubecert {finding.code}"
+    message = finding.message + (f"\nhelp: {finding.help}" if finding.help else "")
+    pairs = ",".join(f"{key}={escape_property(str(value))}" for key, value in properties.items())
+    return f"::{_COMMANDS[finding.severity]} {pairs}::{escape_data(message)}"
+
+
+def escape_data(text: str) -> str:
+    """A message as it may stand after `::`."""
+    return _replaced(text, _DATA)
+
+
+def escape_property(text: str) -> str:
+    """A value as it may stand between `=` and `,`."""
+    return _replaced(text, _PROPERTY)
+
+
+def _replaced(text: str, table: Mapping[str, str]) -> str:
+    return "".join(table.get(character, character) for character in text)
+
+
+def relative(file: str) -> str:
+    """The path as GitHub wants it: from the root of the checkout, with forward slashes."""
+    root = os.environ.get("GITHUB_WORKSPACE") or os.getcwd()
+    with contextlib.suppress(OSError, ValueError):
+        return Path(file).resolve().relative_to(Path(root).resolve()).as_posix()
+    return Path(file).as_posix()
+
+
+def step_summary(results: Sequence[Checked]) -> str:
+    """The summary of a step, in Markdown."""
+    findings = [item for result in results for item in result.findings]
+    rows = ["### tubecert check", "", summary(findings, len(results)), ""]
+    if findings:
+        rows += ["| | file | code | what | help |", "|---|---|---|---|---|", *_rows(findings), ""]
+    text, kept = "", 0
+    for row in rows:
+        if len(text.encode()) + len(row.encode()) > _LARGEST_SUMMARY:
+            text += "\n... and more\n"
+            break
+        text, kept = text + row + "\n", kept + 1
+    return text
+
+
+def _rows(findings: Iterable[Finding]) -> list[str]:
+    return [
+        f"| {_MARKS[item.severity]} | {_cell(_where(item))} | {item.code} | {_cell(item.message)} "
+        f"| {_cell(item.help)} |"
+        for item in findings
+    ]
+
+
+def _where(finding: Finding) -> str:
+    place = finding.location
+    return "" if place is None else f"{relative(place.file)}:{place.line}:{place.column}"
+
+
+def _cell(text: str) -> str:
+    """Text in a cell of a table: no markup, no line breaks."""
+    table = {character: f"\\{character}" for character in "\\`*_{}[]()#+-!|~>"} | {"<": "&lt;", "&": "&amp;"}
+    return _replaced(" ".join(text.split()), table)
+
+
+def append_step_summary(results: Sequence[Checked]) -> None:
+    """Adds to the file that GitHub names, if it does; that it cannot be written is no failure of the check."""
+    target = os.environ.get("GITHUB_STEP_SUMMARY")
+    if target:
+        with contextlib.suppress(OSError), open(target, "a", encoding="utf-8") as file:
+            file.write(step_summary(results))
+
+
+def detected() -> bool:
+    """Whether this runs in a workflow of GitHub."""
+    return os.environ.get("GITHUB_ACTIONS") == "true"

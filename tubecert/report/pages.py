@@ -1,0 +1,148 @@
+"""The pages of `explain`: finding codes, constants and equations, each with meaning, formula and source.
+
+What a code or an equation means is data of this package (`tubecert/pages/*.toml`); names, symbols and units of the
+constants come from the table that reports read.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+_WIDTH = 96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodePage:
+    """A finding code: what it means, and an example with its remedy."""
+
+    code: str
+    title: str
+    meaning: str
+    wrong: str = ""
+    right: str = ""
+    command: str = "check"
+
+    def text(self) -> str:
+        """The page."""
+        parts = [f"{self.code}: {self.title}", _filled(self.meaning)]
+        parts += [
+            f"{name}:\n{_indented(text)}"
+            for name, text in (("Wrong", self.wrong), ("Right", self.right))
+            if text
+        ]
+        return "\n\n".join([*parts, f"Source: {self.command}, finding code {self.code}"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EquationPage:
+    """An equation: what it says, its formula, and where it is proven."""
+
+    tag: str
+    title: str
+    formula: str
+    meaning: str
+    source: str
+
+    def text(self) -> str:
+        """The page."""
+        parts = [f"{self.tag}: {self.title}", _indented(self.formula), _filled(self.meaning)]
+        return "\n\n".join([*parts, f"Source: {self.source}"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantPage:
+    """A constant of the certificates."""
+
+    name: str
+    symbol: str
+    words: str
+    unit: str
+    equation: str
+    formula: str
+    meaning: str
+
+    def text(self) -> str:
+        """The page."""
+        parts = [
+            f"{self.name} ({self.symbol}): {self.words}",
+            _indented(self.formula),
+            _filled(self.meaning),
+            f"Unit: {self.unit} (x: state, u: input, d: Riemannian distance)",
+            f"In a certificate: result.constants.{self.name}, as [proven below, proven above]",
+            f"Source: {self.equation}; docs/theory.md, docs/equations.md",
+        ]
+        return "\n\n".join(parts)
+
+
+Page = CodePage | EquationPage | ConstantPage
+
+
+def _data(name: str) -> Mapping[str, Any]:
+    return tomllib.loads((resources.files("tubecert") / "pages" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def codes() -> Mapping[str, CodePage]:
+    """The pages of the finding codes."""
+    return {code: CodePage(code=code, **page) for code, page in _data("codes").items()}
+
+
+@cache
+def equations() -> Mapping[str, EquationPage]:
+    """The pages of the equations, by their tags."""
+    return {tag: EquationPage(tag=tag, **page) for tag, page in _data("equations").items()}
+
+
+@cache
+def constants() -> Mapping[str, ConstantPage]:
+    """The pages of the constants, by their names in a certificate."""
+    from tubecert.bounds.constants import DERIVED, TABLE
+
+    data = _data("constants")
+    return {
+        name: ConstantPage(
+            name=name,
+            symbol=meaning.symbol,
+            words=meaning.words,
+            unit=meaning.unit,
+            equation=meaning.equation,
+            **data[name],
+        )
+        for name, meaning in {**TABLE, **DERIVED}.items()
+    }
+
+
+def find(topic: str) -> Page | None:
+    """The page of a code, an equation's tag, or a constant's name or symbol; case matters only where it has to."""
+    wanted = topic.strip().strip("()")
+    tables: tuple[Mapping[str, Page], ...] = (codes(), constants(), equations())
+    symbols: Mapping[str, Page] = {page.symbol: page for page in constants().values()}
+    for table in (*tables, symbols):
+        if wanted in table:
+            return table[wanted]
+    for table in (*tables, symbols):
+        folded = [page for key, page in table.items() if key.lower() == wanted.lower()]
+        if len(folded) == 1:
+            return folded[0]
+    return None
+
+
+def topics() -> list[str]:
+    """Everything that has a page."""
+    return [*codes(), *constants(), *(page.symbol for page in constants().values()), *equations()]
+
+
+def _filled(text: str) -> str:
+    import textwrap
+
+    paragraphs = text.strip().split("\n\n")
+    return "\n\n".join(textwrap.fill(" ".join(paragraph.split()), _WIDTH) for paragraph in paragraphs)
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"    {line}".rstrip() for line in text.strip("\n").splitlines())

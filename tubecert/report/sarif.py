@@ -1,0 +1,93 @@
+"""Findings as SARIF 2.1.0, the format of code scanning."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from tubecert import __version__
+from tubecert.findings import Finding, Location, Severity
+from tubecert.pipeline.checking import Checked
+from tubecert.report.pages import codes
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "note"}
+
+
+def render(results: Sequence[Checked]) -> str:
+    """The log: one run, a rule for each code that occurs."""
+    findings = [item for result in results for item in result.findings]
+    used = sorted({item.code for item in findings})
+    run = {
+        "tool": {"driver": _driver(used)},
+        "invocations": [{"executionSuccessful": True}],
+        "columnKind": "unicodeCodePoints",
+        "artifacts": [{"location": _artifact(result.path)} for result in results],
+        "results": _results(findings, used),
+    }
+    log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+    return json.dumps(log, indent=1, ensure_ascii=False) + "\n"
+
+
+def _driver(used: Sequence[str]) -> dict[str, Any]:
+    return {
+        "name": "tubecert",
+        "semanticVersion": __version__,
+        "rules": [_rule(code) for code in used],
+    }
+
+
+def _rule(code: str) -> dict[str, Any]:
+    page = codes().get(code)
+    title = page.title if page else code
+    return {
+        "id": code,
+        "shortDescription": {"text": title},
+        "fullDescription": {"text": page.meaning if page else title},
+        "help": {"text": f"tubecert explain {code}"},
+    }
+
+
+def _results(findings: Sequence[Finding], used: Sequence[str]) -> list[dict[str, Any]]:
+    seen: dict[str, int] = {}
+    results = []
+    for item in findings:
+        text = item.message + (f"\nhelp: {item.help}" if item.help else "")
+        result: dict[str, Any] = {
+            "ruleId": item.code,
+            "ruleIndex": used.index(item.code),
+            "level": _LEVELS[item.severity],
+            "message": {"text": text},
+        }
+        if item.location is not None:
+            result["locations"] = [{"physicalLocation": _place(item.location)}]
+            line = hashlib.sha256(f"{item.code} {item.location.source.strip()}".encode()).hexdigest()[:16]
+            seen[line] = seen.get(line, 0) + 1
+            result["partialFingerprints"] = {"primaryLocationLineHash": f"{line}:{seen[line]}"}
+        results.append(result)
+    return results
+
+
+def _place(location: Location) -> dict[str, Any]:
+    region: dict[str, Any] = {
+        "startLine": location.line,
+        "startColumn": location.column,
+        "endColumn": location.column + location.width,
+    }
+    if location.source:
+        region["snippet"] = {"text": location.source}
+    return {"artifactLocation": _artifact(location.file), "region": region}
+
+
+def _artifact(file: str) -> dict[str, str]:
+    """A path below the current folder relative to it, any other one as an absolute URI."""
+    path = Path(os.path.abspath(file))
+    try:
+        return {"uri": quote(path.relative_to(Path.cwd()).as_posix()), "uriBaseId": "%SRCROOT%"}
+    except ValueError:
+        return {"uri": path.as_uri()}
