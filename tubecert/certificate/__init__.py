@@ -11,8 +11,11 @@ from tubecert.certificate.file import (
     digest,
     dump,
     exit_code,
+    load,
     seal,
+    unreadable,
     write,
+    write_text,
 )
 
 __all__ = [
@@ -23,6 +26,9 @@ __all__ = [
     "digest",
     "dump",
     "exit_code",
+    "load",
     "seal",
+    "unreadable",
     "write",
+    "write_text",
 ]

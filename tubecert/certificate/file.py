@@ -1,4 +1,4 @@
-"""The certificate as data: sealed with a hash, written atomically, mapped to an exit code.
+"""The certificate as data: sealed with a hash, written atomically, read back, mapped to an exit code.
 
 In: the `result` of a certification. Out: canonical JSON. The hash is of the canonical bytes of `result` (UTF-8, sorted
 keys, no spaces, no NaN), so that any change of what was proven shows. Trusted: yes.
@@ -21,6 +21,7 @@ from tubecert.findings import Finding
 
 FORMAT = "tubecert-certificate/1"
 STDOUT = "-"
+REMEDY = "choose another file with -o FILE, or -o - for stdout"
 
 _CODES = {
     "certified": ExitCode.CERTIFIED,
@@ -55,30 +56,69 @@ def dump(certificate: Mapping[str, Any]) -> str:
     return json.dumps(certificate, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def check_target(target: str) -> None:
+def load(path: str) -> dict[str, Any]:
+    """The certificate in a file, if its format is known and its hash is that of its result.
+
+    Raises `TargetError` (TC121) for anything else. What the result says is not examined here.
+    """
+    try:
+        certificate = json.loads(Path(path).read_text(encoding="utf-8"))
+        if not isinstance(certificate, dict) or not isinstance(certificate.get("result"), dict):
+            raise ValueError("it is JSON, but no certificate")
+        if certificate.get("format") != FORMAT:
+            raise ValueError(f"its format is {str(certificate.get('format'))[:60]!r}, not {FORMAT!r}")
+        if certificate.get("hash") != digest(certificate["result"]):
+            raise ValueError("its hash is not that of its result: the file was changed")
+    except OSError as error:
+        raise unreadable(path, error.strerror or str(error)) from error
+    except UnicodeDecodeError as error:
+        raise unreadable(path, "it is not UTF-8") from error
+    except json.JSONDecodeError as error:
+        raise unreadable(path, f"it is not JSON (line {error.lineno}: {error.msg})") from error
+    except RecursionError as error:
+        raise unreadable(path, "it is nested too deeply") from error
+    except ValueError as error:
+        raise unreadable(path, str(error)) from error
+    return certificate
+
+
+def unreadable(path: str, why: str) -> TargetError:
+    """The error for a file that is no certificate."""
+    remedy = "give a file that tubecert certify wrote"
+    return TargetError(
+        [Finding(code="TC121", message=f"{path} is no certificate that can be read: {why}", help=remedy)]
+    )
+
+
+def check_target(target: str, remedy: str = REMEDY) -> None:
     """Raise `TargetError` now if `target` cannot become a file, before any work is done."""
     if target == STDOUT:
         return
     path = Path(target)
     if path.is_dir():
-        raise _unwritable(target, "it is a folder")
+        raise _unwritable(target, "it is a folder", remedy)
     if not path.parent.is_dir():
-        raise _unwritable(target, f"there is no folder {path.parent}")
+        raise _unwritable(target, f"there is no folder {path.parent}", remedy)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise _unwritable(target, "permission denied")
+        raise _unwritable(target, "permission denied", remedy)
 
 
 def write(target: str, certificate: Mapping[str, Any]) -> None:
-    """Write the certificate to a temporary file and rename it; `-` is stdout, devices are written to directly.
-
-    Raises `TargetError`; then nothing is left behind and an older file is untouched.
-    """
+    """Write the certificate; `-` is stdout. Raises `TargetError`."""
     text = dump(certificate)
     if target == STDOUT:
         sys.stdout.write(text)
         sys.stdout.flush()
         return
-    check_target(target)
+    write_text(target, text)
+
+
+def write_text(target: str, text: str, remedy: str = REMEDY) -> None:
+    """Write a text to a temporary file and rename it; devices are written to directly.
+
+    Raises `TargetError`; then nothing is left behind and an older file is untouched.
+    """
+    check_target(target, remedy)
     path = Path(target)
     try:
         if path.exists() and not path.is_file():
@@ -87,7 +127,7 @@ def write(target: str, certificate: Mapping[str, Any]) -> None:
         else:
             _replace(path, text)
     except OSError as error:
-        raise _unwritable(target, error.strerror or str(error)) from error
+        raise _unwritable(target, error.strerror or str(error), remedy) from error
 
 
 def _replace(path: Path, text: str) -> None:
@@ -109,13 +149,5 @@ def _replace(path: Path, text: str) -> None:
         raise
 
 
-def _unwritable(target: str, why: str) -> TargetError:
-    return TargetError(
-        [
-            Finding(
-                code="TC120",
-                message=f"cannot write {target}: {why}",
-                help="choose another file with -o FILE, or -o - for stdout",
-            )
-        ]
-    )
+def _unwritable(target: str, why: str, remedy: str) -> TargetError:
+    return TargetError([Finding(code="TC120", message=f"cannot write {target}: {why}", help=remedy)])

@@ -22,7 +22,7 @@ from tubecert.search.results import (
 
 Reason = dict[str, Any]
 
-_EXPLAINED = {
+EXPLAINED = {
     "26a": "(26a): the initial error and the filter's share must fit into rho_r",
     "26b": "(26b): the metric's lower bound must exceed zeta_2 + zeta_3",
     "26c": "(26c): the adaptation rate must make up for the estimation error",
@@ -97,7 +97,7 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...], gain
     """Claims that are not proven; those that depend on the predictor name it, since another one may serve."""
     reasons = []
     for item in shortfalls:
-        message = _EXPLAINED.get(item.claim, item.claim)
+        message = EXPLAINED.get(item.claim, item.claim)
         if item.allowed is not None and item.needed is not None:
             message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
         elif item.claim != "as-printed":

@@ -92,11 +92,9 @@ def plan_data(spec: Spec, plan: Plan) -> Result:
 
 
 def _samples(plan: Plan) -> Result:
-    """Points of a plan that moves, to draw it: 7 digits, no part of any proof."""
-    if plan.is_constant or plan.horizon is None:
-        return {}
-    t = np.linspace(0.0, float(plan.horizon), _SAMPLES)
-    t[-1] = np.nextafter(t[-1], 0.0)  # not beyond an exact horizon that lies below its float
+    """Points of the plan, to draw it: 7 digits, no part of any proof. A constant plan is one point."""
+    end = 0.0 if plan.horizon is None else float(plan.horizon)
+    t = np.zeros(1) if plan.is_constant else np.linspace(0.0, np.nextafter(end, 0.0), _SAMPLES)
     x = plan.enclose(t, t)[0]
     middle = 0.5 * x.lo + 0.5 * x.hi
     if not np.all(np.isfinite(middle)):

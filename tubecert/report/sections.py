@@ -41,13 +41,14 @@ def of(result: Mapping[str, Any], *, verbose: bool) -> Iterator[Section]:
 
 def span(result: Mapping[str, Any]) -> str:
     """The time that is claimed."""
-    horizon = _horizon(result)
-    return "for all t >= 0" if horizon is None else f"for 0 <= t <= {short(horizon, 12)} s"
+    end = horizon(result)
+    return "for all t >= 0" if end is None else f"for 0 <= t <= {short(end, 12)} s"
 
 
-def _horizon(result: Mapping[str, Any]) -> Number | None:
-    horizon: Number | None = result["spec"]["effective"]["trajectory"].get("horizon")
-    return horizon
+def horizon(result: Mapping[str, Any]) -> Number | None:
+    """The end of the plan in s, None if it has none."""
+    end: Number | None = result["spec"]["effective"]["trajectory"].get("horizon")
+    return end
 
 
 # -- why not
@@ -145,7 +146,7 @@ def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
 
 def _in_the_long_run(result: Mapping[str, Any]) -> list[Text]:
     """The radius that remains when the initial error has died out, for each certificate that holds."""
-    if _horizon(result) is not None:
+    if horizon(result) is not None:
         return []
     found = [
         (title, data["ultimate_radius"])
@@ -176,7 +177,7 @@ def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[Rend
 def _constants(result: Mapping[str, Any]) -> Table:
     table = _table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
     for name, item in result["constants"].items():
-        table.add_row(item["symbol"], _described(result, name, item), _proven(item), item["unit"], _gap(item))
+        table.add_row(item["symbol"], _described(result, name, item), proven(item), item["unit"], gap(item))
     return table
 
 
@@ -187,14 +188,14 @@ def _described(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) ->
     return text
 
 
-def _proven(item: Mapping[str, Any]) -> str:
+def proven(item: Mapping[str, Any]) -> str:
     """The side that the certificate uses: from below for an infimum, from above for a supremum."""
     if item.get("meaning", "").startswith(("inf", "smallest")):
         return f">= {down(item['below'], 6)}"
     return f"<= {up(item['above'], 6)}"
 
 
-def _gap(item: Mapping[str, Any]) -> str:
+def gap(item: Mapping[str, Any]) -> str:
     """How far the two proven sides are apart, relative to the larger one."""
     low, high = item["below"], item["above"]
     if low is None or high is None or low < 0 < high:

@@ -12,12 +12,12 @@ from fractions import Fraction
 
 import numpy as np
 
-from tubecert.conditions.decimals import round_up
+from tubecert.conditions.decimals import printed, round_up
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.rates import margins_26_along
 from tubecert.enclosure.constant import printable_below
 from tubecert.search.distance import prove
-from tubecert.search.results import DistancePair, Json, RatePair, printed
+from tubecert.search.results import DistancePair, Json, RatePair
 
 _POINTS = 41
 _BELOW, _ABOVE = 0.4, 6.0  # times the bandwidth of the pair

@@ -1,0 +1,231 @@
+"""Figures of the tube: the plan, what is proven around it, the safe set, obstacles, witnesses, suprema.
+
+In: `result` of a certificate. Out: one figure per pair of states. Nothing is decided here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tubecert.report.figures_axes import Axis, Chart, Point
+from tubecert.report.page import Figure
+from tubecert.report.sections import claim, horizon, point
+
+_NEAR = 0.25  # places closer than this part of rho share a number
+_ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plane:
+    """What is known in the plane of two states: the plan, radius and half-widths of the tube, the safe set."""
+
+    names: tuple[str, str]
+    units: tuple[str, str]
+    index: tuple[int, int]
+    plan: tuple[Point, ...]
+    rho: float | None
+    sides: Point | None
+    safe: tuple[Point, Point]
+
+    def of(self, x: Sequence[float]) -> Point:
+        """The two coordinates of a state."""
+        return float(x[self.index[0]]), float(x[self.index[1]])
+
+    def axes(self, marks: Sequence[Point]) -> tuple[Axis, Axis]:
+        """Axes that show the tube, the marks, and of the safe set as much as leaves the tube visible."""
+        return self._axis(0, [mark[0] for mark in marks]), self._axis(1, [mark[1] for mark in marks])
+
+    def _axis(self, i: int, marks: list[float]) -> Axis:
+        reach = self.rho or 0.0
+        shown = [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
+        low, high = self.safe[0][i], self.safe[1][i]
+        near = not shown or high - low <= _ZOOM * (max(shown) - min(shown))
+        label = f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
+        return Axis.around([*shown, low, high] if near else shown, label, pad=0.06 if near else 0.25)
+
+
+def planes(result: Mapping[str, Any]) -> list[Plane]:
+    """The planes to draw: all pairs of up to three states, else neighbours two by two."""
+    states = list(result["spec"]["effective"]["system"]["states"])
+    n = len(states)
+    if n <= 3:
+        pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
+    else:
+        pairs = [(i, i + 1) if i + 1 < n else (i - 1, i) for i in range(0, n, 2)]
+    return [_plane(result, states, pair) for pair in pairs]
+
+
+def _plane(result: Mapping[str, Any], states: list[str], pair: tuple[int, int]) -> Plane:
+    i, j = pair
+    units = result["spec"]["effective"]["system"].get("units", {})
+    tube = result.get("tube", {})
+    widths = tube.get("half_widths")
+    samples = result["plan"].get("samples", {}).get("x", [])
+    low, high = zip(*(map(_float, result["safe_set"][states[k]]) for k in pair), strict=True)
+    return Plane(
+        names=(states[i], states[j]),
+        units=(units.get(states[i], ""), units.get(states[j], "")),
+        index=pair,
+        plan=tuple((float(x[i]), float(x[j])) for x in samples),
+        rho=_float(tube["rho"]) if "rho" in tube else None,
+        sides=(float(widths[states[i]]), float(widths[states[j]])) if widths else None,
+        safe=((low[0], low[1]), (high[0], high[1])),
+    )
+
+
+def tube_figures(result: Mapping[str, Any]) -> list[Figure]:
+    """The tube in each plane, with the obstacles that lie in it and the witnesses of what was refuted."""
+    if len(result["spec"]["effective"]["system"]["states"]) == 1:
+        return _over_time(result)
+    return [_tube(result, plane) for plane in planes(result)]
+
+
+def _over_time(result: Mapping[str, Any]) -> list[Figure]:
+    """The tube of a single state against time; a plan without an end is drawn for one second."""
+    (name,) = result["spec"]["effective"]["system"]["states"]
+    samples = result["plan"].get("samples")
+    if not samples or "rho" not in result.get("tube", {}):
+        return []
+    end = _float(horizon(result) or 1)
+    x = [float(row[0]) for row in samples["x"]]
+    plan = list(zip(samples["t"], x, strict=True)) if len(x) > 1 else [(0.0, x[0]), (end, x[0])]
+    side = float(result["tube"].get("half_widths", {}).get(name, _float(result["tube"]["rho"])))
+    low, high = map(_float, result["safe_set"][name])
+    time = Axis(label="t (s)", low=0.0, high=end)
+    chart = Chart("tube-0", f"Plan and tube of {name}", time, Axis.around([low, high], name, pad=0.06))
+    chart.box((time.low, chart.y.low), (time.high, chart.y.high), "outside")
+    chart.box((time.low, low), (time.high, high), "safe")
+    chart.area([*((t, v + side) for t, v in plan), *((t, v - side) for t, v in reversed(plan))], "tube")
+    chart.line(plan, "plan")
+    legend = (("safe", "safe set"), ("tube", "within the half-width"), ("plan", "plan"))
+    return [Figure(key=chart.key, title=f"{name} over time", svg=chart.text(), legend=legend)]
+
+
+def _tube(result: Mapping[str, Any], plane: Plane) -> Figure:
+    title = f"{plane.names[0]}, {plane.names[1]}"
+    witnesses = [
+        (plane.of(at["x"]), f"{claim(reason)}: {point(result, at)}")
+        for reason in result["reasons"]
+        if (at := reason.get("at")) and len(at.get("x", ())) > max(plane.index)
+    ]
+    proven = "rho_r" in result.get("tube", {})
+    chart, legend = _scene(
+        f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven
+    )
+    for shown in _obstacles(result, plane, chart):
+        legend.append(shown)
+    if plane.plan:
+        chart.dot(plane.plan[0], "start", words=f"start of the plan: {_pair(plane, plane.plan[0])}")
+        legend.append(("start", "start of the plan" if len(plane.plan) > 1 else "the plan, an equilibrium"))
+    for place, words in witnesses:
+        chart.dot(place, "witness", 6, words)
+    if witnesses:
+        legend.append(("witness", "witness"))
+    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(dict.fromkeys(legend)))
+
+
+def _scene(
+    key: str, plane: Plane, marks: list[Point], proven: bool = True
+) -> tuple[Chart, list[tuple[str, str]]]:
+    """A chart with the safe set, the tube and the plan; and their legend."""
+    x, y = plane.axes(marks)
+    chart = Chart(key, f"Plan and tube in the plane of {plane.names[0]} and {plane.names[1]}", x, y)
+    chart.box((x.low, y.low), (x.high, y.high), "outside")
+    chart.box(*plane.safe, "safe")
+    legend = [("safe", "safe set")]
+    if plane.plan and plane.rho is not None:
+        inner = chart if plane.sides is None else chart.clipped(plane.plan, plane.sides)
+        inner.sweep(plane.plan, (plane.rho, plane.rho), "tube" if proven else "unproven")
+        legend.append(
+            ("tube", "tube") if proven else ("unproven", "tube, not proven to stay in the safe set")
+        )
+    if len(plane.plan) > 1:
+        chart.line(plane.plan, "plan")
+        legend.append(("plan", "plan"))
+    return chart, legend
+
+
+def _obstacles(result: Mapping[str, Any], plane: Plane, chart: Chart) -> list[tuple[str, str]]:
+    shown = []
+    for obstacle in result["spec"]["effective"].get("obstacles", ()):
+        names = tuple(obstacle["states"])
+        if set(names) != set(plane.names):
+            continue
+        order = (0, 1) if names == plane.names else (1, 0)
+        if disc := obstacle.get("disc"):
+            center = [_float(value) for value in disc["center"]]
+            radius = _float(disc["radius"])
+            chart.ellipse((center[order[0]], center[order[1]]), (radius, radius), "obstacle")
+        else:
+            corners = [[_float(value) for value in corner] for corner in obstacle["polygon"]]
+            chart.area([(corner[order[0]], corner[order[1]]) for corner in corners], "obstacle")
+        shown = [("obstacle", "obstacle")]
+    return shown
+
+
+# -- suprema
+
+
+def suprema_figures(result: Mapping[str, Any]) -> list[Figure]:
+    """Where on the tube the constants attain their suprema: numbered places, the numbers explained below."""
+    symbols = _places(result)
+    if not symbols:
+        return []
+    numbers = {x: str(i + 1) for i, x in enumerate(symbols)}
+    figures = []
+    for plane in planes(result):
+        if not plane.plan:
+            continue
+        key = f"suprema-{plane.index[0]}-{plane.index[1]}"
+        chart, _ = _scene(key, plane, [plane.of(x) for x in symbols])
+        for place, found in _close(chart, plane, list(symbols)).items():
+            words = "; ".join(f"{numbers[x]}: {', '.join(symbols[x])}" for x in found)
+            chart.dot(place, "numbered", 8, words)
+            label = ",".join(numbers[x] for x in found) if len(found) < 3 else f"{numbers[found[0]]}+"
+            chart.label(place, label, "badge middle", (0.0, 3.5))
+        title = f"{plane.names[0]}, {plane.names[1]}"
+        figures.append(Figure(key=key, title=title, svg=chart.text()))
+    return figures
+
+
+def places(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """What the numbers in the figures of suprema stand for."""
+    return tuple(f"{', '.join(s)} near {point(result, {'x': x})}" for x, s in _places(result).items())
+
+
+def _places(result: Mapping[str, Any]) -> dict[tuple[float, ...], list[str]]:
+    """The symbols of the constants by the state at which they were found largest; those that vanish left out."""
+    n = len(result["spec"]["effective"]["system"]["states"])
+    near = _NEAR * _float(result.get("tube", {}).get("rho", 0))
+    found: dict[tuple[float, ...], list[str]] = {}
+    for item in result.get("constants", {}).values():
+        at = item.get("at")
+        if at and len(at.get("x", ())) == n and item["above"] != 0:
+            here = tuple(float(f"{value:.4g}") for value in at["x"])
+            place = next((x for x in found if math.dist(x, here) <= near), here)
+            found.setdefault(place, []).append(item["symbol"])
+    return found
+
+
+def _close(
+    chart: Chart, plane: Plane, places: list[tuple[float, ...]]
+) -> dict[Point, list[tuple[float, ...]]]:
+    """Places that would cover each other in the drawing share a mark."""
+    groups: dict[Point, list[tuple[float, ...]]] = {}
+    for x in places:
+        here = plane.of(x)
+        near = next((p for p in groups if math.dist(chart.at(p), chart.at(here)) < 14), here)
+        groups.setdefault(near, []).append(x)
+    return groups
+
+
+def _pair(plane: Plane, value: Point) -> str:
+    return f"{plane.names[0]} = {value[0]:.4g}, {plane.names[1]} = {value[1]:.4g}"
+
+
+def _float(value: float | int | str) -> float:
+    return float(Fraction(value)) if isinstance(value, str) else float(value)

@@ -1,0 +1,38 @@
+"""A page as HTML: one file that needs nothing else, with no script, for screens wide and narrow, light, dark and paper.
+
+In: a certificate. Out: the text of the page, the same for the same certificate. The template escapes every text;
+only the drawings, which `figures_axes` writes as well-formed SVG, and the style sheet are put in as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from tubecert.report.page import typeset
+from tubecert.report.page_sections import page_of
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+def render(certificate: Mapping[str, Any]) -> str:
+    """The page of a certificate."""
+    environment = _environment()
+    return environment.get_template("page.html").render(page=page_of(certificate)) + "\n"
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("tubecert.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["typeset"] = typeset
+    return environment

@@ -1,0 +1,99 @@
+"""A page as Markdown: the tables and the words, for reviews and wikis; figures are left to the HTML page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tubecert.report.page import (
+    Block,
+    Cell,
+    Facts,
+    Items,
+    Listing,
+    Page,
+    Reason,
+    Section,
+    Table,
+    Words,
+    typeset,
+)
+from tubecert.report.page_sections import page_of
+
+_SPECIAL = re.compile(r"([\\`*_\[\]<>|~&$])")
+
+
+def render(certificate: Mapping[str, Any]) -> str:
+    """The page of a certificate."""
+    return "\n".join(_lines(page_of(certificate))).rstrip() + "\n"
+
+
+def _lines(page: Page) -> Iterator[str]:
+    yield f"# {escape(page.name)}: {page.verdict}"
+    yield ""
+    yield f"**{escape(page.summary)}**"
+    yield ""
+    yield escape(page.meaning)
+    for section in page.sections:
+        yield from _section(section)
+
+
+def _section(section: Section) -> Iterator[str]:
+    yield ""
+    yield f"## {section.title}"
+    for block in section.blocks:
+        lines = list(_block(block))
+        if lines:
+            yield ""
+            yield from lines
+
+
+def _block(block: Block) -> Iterator[str]:
+    match block:
+        case Words():
+            yield escape(block.text)
+        case Items():
+            if block.title:
+                yield from (f"### {block.title}", "")
+            yield from (f"- {escape(item)}" for item in block.items)
+        case Facts():
+            yield from (f"- {escape(name)}: {_cell(cell)}" for name, cell in block.facts)
+        case Table():
+            yield from _table(block)
+        case Listing():
+            yield from ("", *(f"    {line}" for line in block.text.splitlines()))
+        case Reason():
+            yield from _reason(block)
+
+
+def _table(table: Table) -> Iterator[str]:
+    yield _row(escape(column) for column in table.columns)
+    kinds = (row[0] for row in zip(*table.rows, strict=True)) if table.rows else ()
+    yield _row("---:" if cell.kind == "number" else "---" for cell in kinds)
+    yield from (_row(_cell(cell) for cell in row) for row in table.rows)
+    if table.note:
+        yield from ("", escape(table.note))
+
+
+def _row(cells: Iterator[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _cell(cell: Cell) -> str:
+    text = escape(cell.text)
+    return f"{text}, {escape(cell.note)}" if cell.note else text
+
+
+def _reason(reason: Reason) -> Iterator[str]:
+    yield f"- **{reason.verdict}** {escape(reason.claim)}: {escape(reason.message)}"
+    if reason.at:
+        yield f"  at {escape(reason.at)}"
+    if reason.relax:
+        yield f"  help: {escape(reason.relax)}"
+
+
+def escape(text: str) -> str:
+    """A text that Markdown shows as it is, on one line."""
+    flat = " ".join(typeset(text).split())
+    return _SPECIAL.sub(r"\\\1", flat)

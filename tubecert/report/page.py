@@ -1,0 +1,140 @@
+"""A page as data: sections of blocks, with nothing of HTML or Markdown in it.
+
+`page_sections` fills it from a certificate; `html` and `markdown` show it. Every text is plain text: who shows it
+escapes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+Kind = Literal["text", "number", "code", "verdict"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """A figure: SVG that adapts to light and dark, what its colours mean (class, words), and a caption."""
+
+    key: str
+    title: str
+    svg: str
+    legend: tuple[tuple[str, str], ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """A value; `note` is a second, smaller line, `share` in [0, 1] the length of a bar beside it."""
+
+    text: str
+    kind: Kind = "text"
+    note: str = ""
+    share: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Words:
+    """A paragraph."""
+
+    block: ClassVar[str] = "words"
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Items:
+    """A list, with or without a title."""
+
+    block: ClassVar[str] = "items"
+    title: str = ""
+    items: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """Names and values."""
+
+    block: ClassVar[str] = "facts"
+    facts: tuple[tuple[str, Cell], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table; every row has as many cells as there are columns."""
+
+    block: ClassVar[str] = "table"
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if any(len(row) != len(self.columns) for row in self.rows):
+            raise ValueError("a row of a table has another number of cells than the table has columns")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """Preformatted text: equations, commands."""
+
+    block: ClassVar[str] = "listing"
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """Figures side by side where there is room; `places` is what the numbers in them stand for, from 1."""
+
+    block: ClassVar[str] = "figures"
+    figures: tuple[Figure, ...]
+    places: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reason:
+    """Why a claim holds or not; `at` is the witness, `relax` what would help."""
+
+    block: ClassVar[str] = "reason"
+    verdict: str
+    claim: str
+    message: str
+    at: str = ""
+    relax: str = ""
+
+
+Block = Words | Items | Facts | Table | Listing | Figures | Reason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A titled part of the page; `key` is its anchor."""
+
+    key: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tile:
+    """A number to be seen first."""
+
+    symbol: str
+    value: str
+    unit: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """The whole page: the verdict, what it means, the numbers it is about, and everything one may ask next."""
+
+    name: str
+    verdict: str
+    summary: str
+    meaning: str
+    tiles: tuple[Tile, ...]
+    sections: tuple[Section, ...]
+
+
+def typeset(text: str) -> str:
+    """Words with their inequalities as one sign."""
+    return text.replace("<=", "≤").replace(">=", "≥")

@@ -1,0 +1,47 @@
+"""What a certificate has proven, and what it was told: one sentence per claim, only for claims that were reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tubecert.report.gains import NAMES
+from tubecert.report.numbers import exact, up
+
+
+def proven(result: Mapping[str, Any]) -> Iterator[str]:
+    """Claims that are proven whatever the verdict."""
+    metric, tube = result.get("metric", {}), result.get("tube", {})
+    if "metric" in result:
+        yield "B has full rank on the whole safe set."
+    if metric.get("verdict") == "certified":
+        yield (
+            f"The metric is positive definite, contracting at the rate {exact(metric['rate'])} 1/s (C2) and "
+            "compatible with the inputs (C3) on the whole safe set."
+        )
+    if "rho_r" in tube:
+        yield f"The tube of radius {up(tube['rho'])} around the plan lies in the safe set."
+    if metric.get("unique_geodesics", {}).get("holds"):
+        yield "Minimising geodesics in the tube are unique."
+    if constants := result.get("constants"):
+        yield f"Each of the {len(constants)} constants below is enclosed from both sides by interval arithmetic."
+    if result["formulas"] == "as-printed":
+        yield "Nothing about the gains: the formulas are those that the paper prints, and several of them are wrong."
+        return
+    for section, words in _CLAIMS.items():
+        if result.get(section, {}).get("verdict") == "certified":
+            yield f"{NAMES[section]}: {words}"
+
+
+_CLAIMS = {
+    "conditions_26": "the conditions (26a), (26b) and (26c), corrected, hold at its gains.",
+    "distance": "the Riemannian distance to the plan stays below its bound at its gains.",
+    "sampled": "the same with adaptation in samples, at its sample time.",
+}
+_DECLARED = {"h": "|h|", "h_x": "|dh/dx|", "h_t": "|dh/dt|"}
+
+
+def declared(result: Mapping[str, Any]) -> Iterator[str]:
+    """What the specification declares and nobody proves."""
+    for name, value in result["declared"].items():
+        yield f"{_DECLARED.get(name, name)} <= {up(value, 12)} on the tube"
