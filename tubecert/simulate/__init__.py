@@ -1,7 +1,7 @@
 """Simulation: the closed loops of the paper, integrated fast, to attack a certificate.
 
-In: a model, a plan, gains and a disturbance. Out: `Runs` with their own error estimate. Trusted: no. A simulation may falsify
-a certificate and never supports one; no trusted room imports this one. Implements: theory 2 to 4b, the loops.
+In: a model, a plan, gains and a disturbance. Out: `Runs` with their own error estimate. Trusted: no. A simulation may
+falsify a certificate and never supports one; no trusted room imports this one. Implements: theory 2 to 4b, the loops.
 
 | module | what it does |
 |---|---|

@@ -108,9 +108,10 @@ class LoopProblem:
 class Disturbance:
     """h(t, x) of N lanes, evaluated inside the compiled loop; every array has the lanes first.
 
-    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c), where clip is the
-    projection to the ball of `radius` (inf: none), and c = B'M gamma_s / sqrt(|B'M gamma_s|^2 + layer^2) at x, the direction
-    that pushes away from the plan. At fixed x the rate of a wave is at most |amplitude| frequency, its slope |amplitude| |wave|.
+    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c), where clip is
+    the projection to the ball of `radius` (inf: none), and c = B'M gamma_s / sqrt(|B'M gamma_s|^2 + layer^2) at x, the
+    direction that pushes away from the plan. At fixed x the rate of a wave is at most |amplitude| frequency, its slope
+    |amplitude| |wave|.
 
     Shapes: base (m,) expressions of t and the states, or None for 0; amplitude (N, W, m), frequency (N, W) in rad/s,
     wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,).

@@ -47,10 +47,10 @@ class Runs:
     """N runs at K output times.
 
     Shapes: t (K,), x (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m), xtilde (N, K, n),
-    distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; k and u_a
-    are then the held ones, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is 0.
-    After a lane was stopped its values are nan. `error` (N,) is the difference in |x| to the run with steps twice as long, an
-    estimate of the error and mostly far above it; it is inf for a lane that was stopped.
+    distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a is
+    then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is 0.
+    After a lane was stopped its values are nan. `error` (N,) is the largest difference in |x| to the run with steps twice
+    as long, an estimate of the error and mostly far above it; it is inf for a lane that was stopped.
     """
 
     t: Array

@@ -1,0 +1,167 @@
+"""The times of the steps, the plan at them, and the gains in the form that compiled lanes read."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.simulate.computer import Computer
+from tubecert.simulate.fast import KINDS, NONE, SAMPLED, Fast, exact_flows
+from tubecert.simulate.problem import LoopProblem
+from tubecert.simulate.stepping import Course, Grid
+from tubecert.spec import Knots
+
+_SAME = 1e-11  # of the horizon: times that differ by less are one
+_FEWEST_STEPS = 64
+MOST_STEPS = 4_000_000
+
+
+def corners(problem: LoopProblem) -> tuple[Array, Array]:
+    """Times (C,) that must be ends of steps, and which of them are samples of a computer."""
+    end = problem.horizon
+    period = sample_period(problem)
+    ticks = np.array([0.0])
+    if period is not None:
+        if end / period > MOST_STEPS:
+            raise ValueError(
+                f"a sample time of {period:g} s needs more than {MOST_STEPS} samples in {end:g} s"
+            )
+        ticks = np.arange(math.floor(end / period * (1 + 1e-12)) + 1) * period
+    kinks = _kinks(problem.plan.knots)
+    every = np.concatenate([[0.0, end], problem.times, kinks[kinks < end], ticks[ticks <= end]])
+    every = np.unique(np.minimum(every, end))
+    t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
+    t[-1] = end
+    ticking = np.zeros(len(t), dtype=np.int64)
+    if period is not None:
+        ticking[nearest(t, ticks)] = 1
+    return t, ticking
+
+
+def _kinks(knots: Knots | None) -> Array:
+    """Times at which u* jumps or has a corner."""
+    if knots is None:
+        return np.zeros(0)
+    values = knots.u
+    if knots.interpolation == "hold":
+        return np.array(
+            [float(t) for t, a, b in zip(knots.t[1:], values, values[1:], strict=False) if a != b]
+        )
+    slopes = [
+        tuple((p - q) / (s - t) for p, q in zip(a, b, strict=True))
+        for a, b, s, t in zip(values[1:], values, knots.t[1:], knots.t, strict=False)
+    ]
+    inner = zip(knots.t[1:], slopes, slopes[1:], strict=False)
+    return np.array([float(t) for t, a, b in inner if a != b])
+
+
+def nearest(t: Array, wanted: Array) -> Array:
+    """Numbers of the entries of t (increasing) that are nearest to the wanted times."""
+    right = np.clip(np.searchsorted(t, wanted), 1, len(t) - 1)
+    return np.asarray(right - (wanted - t[right - 1] < t[right] - wanted))
+
+
+def sample_period(problem: LoopProblem) -> float | None:
+    """Time between samples of the computer in s; None if there is none."""
+    if problem.control_rate is not None:
+        return 1.0 / problem.control_rate
+    if problem.controller == "sampled" and problem.gains is not None:
+        return problem.gains.sample_time
+    return None
+
+
+def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
+    """The steps of a level, each level with twice as many as the one before, and their distinct lengths (Q,)."""
+    t, ticking = corners(problem)
+    spans = np.diff(t)
+    counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
+    if counts.sum() > MOST_STEPS:
+        raise ValueError(f"more than {MOST_STEPS} steps")
+    first = np.concatenate([[0], np.cumsum(counts)])
+    inside = np.arange(first[-1]) - np.repeat(first[:-1], counts)
+    start = np.repeat(t[:-1], counts) + inside * np.repeat(spans / counts, counts)
+    length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
+    distinct, which = np.unique(length, return_inverse=True)
+    exact_length = np.repeat(spans / counts, counts)
+    S = len(start)
+    output, tick = np.full(S + 1, -1, dtype=np.int64), np.zeros(S + 1, dtype=np.int64)
+    tick[first] = ticking
+    output[first[nearest(t, problem.times)]] = np.arange(len(problem.times))
+    grid = Grid(
+        np.append(start, problem.horizon),
+        np.append(exact_length, 0.0),
+        np.append(which, 0).astype(np.int64),
+        tick,
+        output,
+        course(problem, start, exact_length),
+    )
+    return grid, distinct
+
+
+def course(problem: LoopProblem, start: Array, length: Array) -> Course:
+    """The plan on every step, and after the last one: where u* jumps, the side that belongs to the step."""
+    plan, model = problem.plan, problem.model
+    n, S = len(model.states), len(start)
+    t = np.minimum(start[:, None] + length[:, None] * np.array([0.0, 0.5, 1.0]), problem.horizon)
+    t[-1, 2] = problem.horizon
+    span = None
+    if plan.spans is not None:
+        span = np.searchsorted(plan.spans.lo, t[:, 1], side="right") - 1
+        span = np.repeat(np.clip(span, 0, len(plan.spans.lo) - 1), 3)
+    flat = t.ravel()
+    x, u = (part.mid.reshape(S, 3, -1) for part in plan.enclose(flat, flat, span))
+    x, u = (np.concatenate([part, np.repeat(part[-1:, 2:], 3, axis=1)]) for part in (x, u))
+    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
+    values = [*np.moveaxis(x, -1, 0), *np.moveaxis(u, -1, 0)]
+    speed = np.moveaxis(drift.run_floats(values, (S + 1, 3)), 0, -1)
+    assert x.shape[-1] == n
+    return Course(*(np.ascontiguousarray(part) for part in (x, u, speed)))
+
+
+def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
+    """The fast part for steps of the lengths (Q,); its own steps are halved with the level, too."""
+    model, gains = problem.model, problem.gains
+    n, m = len(model.states), len(model.inputs)
+    Y = 3 * n + 2 * m
+    kind = KINDS[problem.controller]
+    found = Fast(
+        kind,
+        n,
+        m,
+        np.zeros((n, n)) if gains is None else gains.A_m(n),
+        1.0 if gains is None or gains.adaptation_rate is None else gains.adaptation_rate,
+        1.0 if gains is None else gains.bandwidth,
+        1.0 if gains is None else gains.projection_radius,
+        0.0 if gains is None or gains.smooth is None else gains.smooth,
+        False,
+        np.zeros((1, 2, Y, Y)),
+        np.zeros((1, 2, 3, Y, m)),
+        0.5**level,
+    )
+    if kind == NONE or problem.control_rate is not None or not model.constant_input:
+        return found
+    B = np.array([[float(e.fraction) for e in row] for row in model.B])
+    return exact_flows(found, B, lengths)
+
+
+def computer(problem: LoopProblem) -> Computer:
+    """The computer of the loop; ValueError if the sample time is no multiple of the control period."""
+    gains, rate = problem.gains, problem.control_rate
+    dt = 0.0 if rate is None else 1.0 / rate
+    every, weight, growth = 1, 0.0, 1.0
+    if gains is not None and KINDS[problem.controller] == SAMPLED:
+        Ts, g = gains.sample_time, gains.predictor_gain
+        assert Ts is not None
+        assert isinstance(g, float | int)
+        if rate is not None:
+            every = round(Ts * rate)
+            if every < 1 or abs(Ts * rate - every) > 1e-6 * every:
+                raise ValueError(
+                    f"the sample time {Ts:g} s must be a multiple of the control period {dt:g} s"
+                )
+        weight, growth = g / math.expm1(g * Ts), math.exp(g * Ts)
+    decay = math.exp(-gains.bandwidth * dt) if gains is not None else 1.0
+    return Computer(rate is not None, dt, every, decay, weight, growth)

@@ -1,0 +1,126 @@
+"""Expressions as arrays: a straight-line program for one compiled interpreter, so that no system needs a compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.interval import Array
+from tubecert.expression import Expression, topological
+from tubecert.simulate.compiled import compiled
+
+Index = NDArray[np.int64]
+_ADD, _MUL, _DIV, _POW, _SQRT, _SIN, _COS, _TAN, _EXP = range(9)
+_CODES = {
+    "add": _ADD,
+    "mul": _MUL,
+    "div": _DIV,
+    "pow": _POW,
+    "sqrt": _SQRT,
+    "sin": _SIN,
+    "cos": _COS,
+    "tan": _TAN,
+    "exp": _EXP,
+}
+
+
+class Program(NamedTuple):
+    """Memory is (inputs, constants, results); operation i writes at `first + i`.
+
+    `start` is the memory with its constants; operation i is `code[i]` on the places `left[i]`, `right[i]` (of a power,
+    `right` is the exponent); `outputs` are the places of the results asked for.
+    """
+
+    start: Array
+    first: int
+    code: Index
+    left: Index
+    right: Index
+    outputs: Index
+
+
+def assemble(outputs: Sequence[Expression], inputs: Sequence[str]) -> Program:
+    """The program of the outputs; ValueError if they depend on anything but the inputs."""
+    order = topological(outputs)
+    names = {name: index for index, name in enumerate(inputs)}
+    constants = [node for node in order if node.op in ("const", "pi")]
+    first = len(names) + len(constants)
+    start = [0.0] * len(names) + [np.pi if e.op == "pi" else _float(e) for e in constants]
+    place = {node: len(names) + i for i, node in enumerate(constants)}
+    steps: list[tuple[int, int, int]] = []
+
+    def emit(code: int, left: int, right: int = 0) -> int:
+        steps.append((code, left, right))
+        return first + len(steps) - 1
+
+    def length(args: Sequence[int]) -> int:
+        total = emit(_MUL, args[0], args[0])
+        for arg in args[1:]:
+            total = emit(_ADD, total, emit(_MUL, arg, arg))
+        return emit(_SQRT, total)
+
+    for node in order:
+        args = [place[arg] for arg in node.args]
+        if node.op == "symbol":
+            if node.value not in names:
+                raise ValueError(f"{node.value} is not an input of the program")
+            place[node] = names[str(node.value)]
+        elif node.op == "norm":
+            place[node] = length(args)
+        elif node.op == "direction":
+            place[node] = emit(_DIV, args[int(str(node.value))], length(args))
+        elif node.op == "pow":
+            place[node] = emit(_POW, args[0], int(str(node.value)))
+        elif node.op in _CODES:
+            place[node] = emit(_CODES[node.op], args[0], args[-1])
+    table = np.array(steps, dtype=np.int64).reshape(-1, 3)
+    memory = np.array(start + [0.0] * len(steps))
+    places = np.array([place[node] for node in outputs], dtype=np.int64)
+    return Program(memory, first, *(np.ascontiguousarray(column) for column in table.T), places)
+
+
+def _float(node: Expression) -> float:
+    try:
+        return float(node.fraction)
+    except OverflowError:
+        return np.inf if node.fraction > 0 else -np.inf
+
+
+@compiled
+def execute(program: Any, memory: Any) -> None:
+    """Runs the program on a memory whose inputs and constants are in place."""
+    target = program.first
+    for i in range(program.code.size):
+        code = program.code[i]
+        x = memory[program.left[i]]
+        if code == _MUL:
+            value = x * memory[program.right[i]]
+        elif code == _ADD:
+            value = x + memory[program.right[i]]
+        elif code == _POW:
+            value = _power(x, program.right[i])
+        elif code == _SIN:
+            value = np.sin(x)
+        elif code == _COS:
+            value = np.cos(x)
+        elif code == _DIV:
+            value = x / memory[program.right[i]]
+        elif code == _SQRT:
+            value = np.sqrt(x)
+        elif code == _TAN:
+            value = np.tan(x)
+        else:
+            value = np.exp(x)
+        memory[target] = value
+        target += 1
+
+
+@compiled
+def _power(x: float, exponent: int) -> float:
+    value = 1.0
+    for _ in range(abs(exponent)):
+        value *= x
+    return value if exponent > 0 else 1.0 / value
