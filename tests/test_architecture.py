@@ -29,6 +29,7 @@ ROOMS = [
     "certificate",
     "simulate",
     "pipeline",
+    "checking",
     "report",
     "cli",
 ]

@@ -16,7 +16,7 @@ from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
-    from tubecert.pipeline.checking import Checked, CheckOptions
+    from tubecert.checking import Checked, CheckOptions
 
 _SUFFIXES = {".yaml", ".yml"}
 _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
@@ -49,7 +49,7 @@ def _format(given: Mapping[str, Any], output: Output) -> str:
 
 def _options(given: Mapping[str, Any]) -> tuple[int, CheckOptions]:
     """The number of jobs and what a check has to know; raises `SpecError` with everything that is wrong."""
-    from tubecert.pipeline.checking import CheckOptions
+    from tubecert.checking import CheckOptions
 
     numbers = Numbers()
     jobs = numbers.count("--jobs", given["jobs"])
@@ -63,7 +63,7 @@ def _options(given: Mapping[str, Any]) -> tuple[int, CheckOptions]:
 
 def _nothing(paths: Sequence[str]) -> list[Checked]:
     """What there is to say where there is nothing to check."""
-    from tubecert.pipeline.checking import Checked
+    from tubecert.checking import Checked
 
     finding = Finding(
         code="TC100",
@@ -75,7 +75,7 @@ def _nothing(paths: Sequence[str]) -> list[Checked]:
 
 def _checked(files: Sequence[str], options: CheckOptions, jobs: int, output: Output) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
-    from tubecert.pipeline.checking import check
+    from tubecert.checking import check
 
     workers = min(jobs, len(files))
     if workers > 1:
@@ -91,7 +91,7 @@ def _in_parallel(files: Sequence[str], options: CheckOptions, workers: int) -> l
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    from tubecert.pipeline.checking import check
+    from tubecert.checking import check
 
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts) as pool:

@@ -11,8 +11,8 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from tubecert.checking import Checked
 from tubecert.findings import Finding, Severity
-from tubecert.pipeline.checking import Checked
 from tubecert.report.findings import summary
 
 _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}

@@ -6,9 +6,8 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
+from tubecert.checking import Checked, Claim
 from tubecert.findings import Finding, Severity
-from tubecert.pipeline.checking import Checked
-from tubecert.pipeline.expectations import Claim
 
 PARTS = {
     "TC1": "specification",

@@ -11,8 +11,8 @@ from typing import Any
 from urllib.parse import quote
 
 from tubecert import __version__
+from tubecert.checking import Checked
 from tubecert.findings import Finding, Location, Severity
-from tubecert.pipeline.checking import Checked
 from tubecert.report.pages import codes
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"

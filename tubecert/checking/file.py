@@ -6,14 +6,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from tubecert import pipeline
+from tubecert.checking import cache
+from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, outcome
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding, Severity
-from tubecert.pipeline import check_cache
-from tubecert.pipeline.expectations import UNDECIDED, Claim, Outcome, compared, outcome
-from tubecert.pipeline.options import Options, Progress
 from tubecert.spec import Spec, load
+
+if TYPE_CHECKING:
+    from tubecert.pipeline import Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ def check(path: str, options: CheckOptions, progress: Progress | None = None) ->
     claims: tuple[Claim, ...] = ()
     try:
         spec = load(path)
-        findings = _remembered("lint", spec, options, lambda: pipeline.inspect(spec))
+        findings = _remembered("lint", spec, options, lambda: _inspected(spec))
         if options.certify and not _errors(findings):
             found = _certified(spec, options, progress)
             findings = [*findings, *compared(spec, found)]
@@ -62,6 +64,12 @@ def check(path: str, options: CheckOptions, progress: Progress | None = None) ->
         claims=claims,
         seconds=time.perf_counter() - started,
     )
+
+
+def _inspected(spec: Spec) -> list[Finding]:
+    from tubecert import pipeline  # numerics, only where they are needed
+
+    return pipeline.inspect(spec)
 
 
 def _errors(findings: list[Finding]) -> list[Finding]:
@@ -88,21 +96,23 @@ def _remembered(
     """Findings of a text that has not changed, or those that `work` finds."""
     if not options.cached:
         return work()
-    name = check_cache.key_of_text(what, spec)
-    kept = check_cache.read_findings(name, spec)
+    name = cache.key_of_text(what, spec)
+    kept = cache.read_findings(name, spec)
     if kept is None:
         kept = work()
-        check_cache.write_findings(name, kept)
+        cache.write_findings(name, kept)
     return kept
 
 
 def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
     """The outcome of a system that has not changed, or of a new certification; raises `TubecertError`."""
-    name = check_cache.key_of_system(spec, options.gap, options.budget)
-    kept = check_cache.read_outcome(name) if options.cached else None
+    name = cache.key_of_system(spec, options.gap, options.budget)
+    kept = cache.read_outcome(name) if options.cached else None
     if kept is None:
-        effort = Options(gap=options.gap, budget=options.budget)
+        from tubecert import pipeline
+
+        effort = pipeline.Options(gap=options.gap, budget=options.budget)
         kept = outcome(pipeline.certify(spec, effort, progress))
         if options.cached:
-            check_cache.write_outcome(name, kept)
+            cache.write_outcome(name, kept)
     return kept

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import tubecert
+from tubecert.checking.expectations import Claim, Outcome
 from tubecert.findings import Finding, Location, Severity
-from tubecert.pipeline.expectations import Claim, Outcome
 from tubecert.spec import Spec, canonical
 
 _LIBRARIES = ("numpy", "scipy", "pyyaml")
