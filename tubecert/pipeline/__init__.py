@@ -8,7 +8,10 @@ In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | the claims in their order, up to the constants |
 | `gains` | gains of A, B and C, and the verdict |
+| `synthesis`, `synthesised` | a metric where none is given: objectives, the sweep over rates, why there is none |
 """
+
+from dataclasses import replace
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
@@ -17,9 +20,22 @@ from tubecert.model import domain_findings
 from tubecert.pipeline.certification import Certification, Result
 from tubecert.pipeline.checks import inspect, missing_parts, time_of
 from tubecert.pipeline.options import CONDITIONS, Options, Progress, Step, overridden
-from tubecert.spec import Spec
+from tubecert.pipeline.synthesis import SynthesisRun
+from tubecert.pipeline.synthesised import Synthesised, metric_file
+from tubecert.spec import Spec, Synthesis
 
-__all__ = ["CONDITIONS", "Options", "Progress", "Result", "Step", "certify", "inspect"]
+__all__ = [
+    "CONDITIONS",
+    "Options",
+    "Progress",
+    "Result",
+    "Step",
+    "Synthesised",
+    "certify",
+    "inspect",
+    "metric_file",
+    "synthesise",
+]
 
 
 def certify(spec: Spec, options: Options, progress: Progress | None = None) -> Result:
@@ -31,4 +47,22 @@ def certify(spec: Spec, options: Options, progress: Progress | None = None) -> R
         findings = domain_findings(spec, time, Effort(budget=options.budget))
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
+    if spec.metric is None and spec.synthesis is not None:
+        found = synthesise(spec, spec.synthesis, options, progress)
+        return Certification(found.spec or spec, options, time, progress, found).run()
     return Certification(spec, options, time, progress).run()
+
+
+def synthesise(
+    spec: Spec, wanted: Synthesis, options: Options, progress: Progress | None = None, *, sweep: bool = False
+) -> Synthesised:
+    """A proven metric for a specification, or why there is none; with `sweep` others over a range of rates beside it.
+
+    Raises `SpecError` for what makes the question meaningless.
+    """
+    spec = replace(overridden(spec, options), metric=None, synthesis=None)
+    findings, time = time_of(spec)
+    findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
+    if any(item.severity is Severity.ERROR for item in findings):
+        raise SpecError(findings)
+    return SynthesisRun(spec, wanted, options, certify, progress).run(sweep=sweep)

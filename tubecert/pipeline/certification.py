@@ -40,6 +40,7 @@ from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import TIME, ControlAffineModel, build, rank_decision
 from tubecert.pipeline.gains import gains
 from tubecert.pipeline.options import Options, Progress, Step, overrides_data
+from tubecert.pipeline.synthesised import Synthesised
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import Room, plan_of, remedy
@@ -52,8 +53,15 @@ _NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is 
 class Certification:
     """One run; `result` grows as the rooms answer."""
 
-    def __init__(self, spec: Spec, options: Options, time: Range | None, progress: Progress | None) -> None:
-        self.spec, self.options, self.time = spec, options, time
+    def __init__(
+        self,
+        spec: Spec,
+        options: Options,
+        time: Range | None,
+        progress: Progress | None,
+        found: Synthesised | None = None,
+    ) -> None:
+        self.spec, self.options, self.time, self.found = spec, options, time, found
         self.model: ControlAffineModel = build(spec)
         self.plan: Plan
         within = spec.within
@@ -105,6 +113,13 @@ class Certification:
         return self._stop("rank of B", decision.verdict, f"B {word}", Witness(x=x))
 
     def _metric(self) -> bool:
+        if self.found is not None:
+            self.result["synthesis"] = self.found.data()
+        if self.spec.metric is None:
+            assert self.found is not None
+            return self._stop(
+                "metric synthesis", self.found.verdict, self.found.reason, relax=self.found.relax
+            )
         proof = verify_metric(self.model, self.spec.safe_set, self._effort("metric"))
         self.result["metric"] = metric_data(self.spec, proof)
         if proof.verdict != "certified":

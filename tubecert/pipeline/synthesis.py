@@ -1,0 +1,318 @@
+"""Synthesis of a metric for a specification: objectives, the sweep over rates, the metric file, and why there is none.
+
+The ladder of `metric.synthesis` finds metrics at given rates; here they are compared by what the user wants in the end,
+which for `adaptation` and `tube` is a certification with each of them. What is returned was read back from the text
+that a metric file will hold, and proven as read.
+Trusted: `_proven`, nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from math import sqrt
+from typing import Any
+
+from tubecert.certificate.sections import decimal_data, metric_data
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.errors import SpecError
+from tubecert.expression import to_text
+from tubecert.metric.synthesis.diagnose import uncontrollable_mode
+from tubecert.metric.synthesis.family import suggested
+from tubecert.metric.synthesis.ladder import Ladder, Request, digits_below
+from tubecert.metric.synthesis.problem import Floor
+from tubecert.metric.synthesis.rounding import VerifiedMetric
+from tubecert.metric.synthesis.routes import routes
+from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.model import build, rank_decision
+from tubecert.pipeline.options import Options, Progress, Step
+from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
+from tubecert.spec import Spec, Synthesis
+from tubecert.spec.metric_file import FORMAT, with_metric_text
+
+_RATES = 6  # of the first sweep
+_REFINED = 4  # further rates, about the best
+_SHARE = 0.97  # of the largest rate: where the sweep ends
+_COARSE = Options(gap=Fraction(1, 20), conditions="distance", budget=200_000)
+
+Certify = Callable[[Spec, Options], Mapping[str, Any]]
+
+
+class SynthesisRun:
+    """One synthesis: its ladder, and the certifications that metrics are compared by."""
+
+    def __init__(
+        self, spec: Spec, wanted: Synthesis, options: Options, certify: Certify, progress: Progress | None
+    ) -> None:
+        self.spec, self.wanted, self.options, self.certify = spec, wanted, options, certify
+        self.model = build(replace(spec, metric=None))
+        self.progress = progress
+        self.effort = Effort(gap=float(options.gap), budget=options.budget)
+        self.limit = None if wanted.condition_number is None else float(wanted.condition_number)
+        self.ladder = Ladder(
+            Request(
+                model=self.model,
+                safe_set=spec.safe_set,
+                routes=routes(wanted.route),
+                degree=wanted.degree,
+                variables=wanted.variables,
+                limit=self.limit,
+                solver=wanted.solver,
+                effort=self.effort,
+                progress=self._tell,
+            )
+        )
+        self.rows: list[Row] = []
+        self.said = 0
+
+    def run(self, *, sweep: bool) -> Synthesised:
+        """The metric that was asked for, or why there is none."""
+        rank = rank_decision(self.model, self.spec.safe_set, self.effort)
+        if rank.verdict != "proven":
+            return self._failed(
+                "B could not be proven to have full rank on the safe set", "shrink the safe set"
+            )
+        try:
+            best = self._best()
+        except ValueError as error:  # what C3 forbids
+            return self._failed(str(error), "choose other variables, or leave them to tubecert")
+        if best is None:
+            return self._explained()
+        if sweep and not self.rows:
+            self._sweep(best.rate)
+        return self._written(best)
+
+    # -- objectives ------------------------------------------------------------------------------------------------
+
+    def _best(self) -> VerifiedMetric | None:
+        wanted = self.wanted
+        if wanted.objective == "rate":
+            found = self.ladder.largest_rate(self.limit)
+            return found and self.ladder.metric(found.rate)
+        if wanted.objective in ("adaptation", "tube"):
+            return self._end_to_end(wanted.objective)
+        assert wanted.rate is not None
+        found = self.ladder.metric(wanted.rate)
+        if found is None or not self._allowed(found):
+            return None
+        if wanted.objective == "condition":
+            return found
+        limit = self.limit or 2 * found.condition_number.above
+        wide = self.ladder.largest_rate(limit, least=wanted.rate)
+        return self._at_rate(wide or found, wanted.rate)
+
+    def _at_rate(self, metric: VerifiedMetric, rate: Fraction) -> VerifiedMetric | None:
+        """The same metric with the rate that was asked for: what it supports beyond is its margin."""
+        proof = self._verified(metric, rate)
+        return replace(metric, rate=rate, proof=proof) if proof.verdict == "certified" else None
+
+    def _verified(self, metric: VerifiedMetric, rate: Fraction) -> MetricProof:
+        model = replace(self.model, W=metric.dual_metric, rate=rate)
+        return verify_metric(model, self.spec.safe_set, self.effort)
+
+    def _allowed(self, metric: VerifiedMetric) -> bool:
+        return self.limit is None or metric.condition_number.above <= self.limit
+
+    def _end_to_end(self, objective: str) -> VerifiedMetric | None:
+        """The metric whose certification comes out best, over rates and over what is bounded from below."""
+        self._certifiable()
+        if self.wanted.rate is not None:
+            self._compared([self.wanted.rate])
+        else:
+            top = self.ladder.largest_rate(self.limit)
+            if top is None:
+                return None
+            self._sweep(top.rate)
+            for _ in range(_REFINED):
+                self._compared(self._between(objective))
+        if not self.rows:
+            return None
+        return min(self.rows, key=lambda row: row.score(objective)).metric
+
+    def _certifiable(self) -> None:
+        """Raises `SpecError` if the end cannot be judged: what `certify` needs is missing."""
+        from tubecert.pipeline.checks import missing_parts
+
+        missing = [item for item in missing_parts(self.spec) if not item.message.startswith("metric ")]
+        if missing:
+            raise SpecError(missing)
+
+    def _sweep(self, top: Fraction) -> None:
+        last = _SHARE * float(top)
+        self._compared([digits_below(last * (k + 1) / _RATES, 3) for k in range(_RATES)])
+
+    def _compared(self, rates: Sequence[Fraction]) -> None:
+        floors: tuple[Floor, ...] = ("identity", "input")
+        done = {(row.rate, row.floor) for row in self.rows}
+        for rate in rates:
+            for floor in floors:
+                if (rate, floor) in done:
+                    continue
+                metric = self.ladder.metric(rate, floor)
+                if metric is not None and self._allowed(metric):
+                    self.rows.append(self._row(metric, floor))
+
+    def _between(self, objective: str) -> list[Fraction]:
+        """Rates halfway between the best one and its neighbours."""
+        best = min(self.rows, key=lambda row: row.score(objective)).rate
+        rates = sorted({row.rate for row in self.rows})
+        i = rates.index(best)
+        neighbours = [rates[k] for k in (i - 1, i + 1) if 0 <= k < len(rates)]
+        return [digits_below((best + other) / 2, 3) for other in neighbours]
+
+    def _row(self, metric: VerifiedMetric, floor: Floor) -> Row:
+        row = Row(
+            rate=metric.rate,
+            floor=floor,
+            degree=metric.family.degree,
+            condition_number=metric.condition_number.above,
+            metric=metric,
+        )
+        tube = self.spec.tube
+        if tube.epsilon is None or tube.rho_a is None:
+            return row
+        self._tell(f"rate {float(metric.rate):.4g}: certifying")
+        result = self.certify(self._with(metric), _COARSE)
+        distance = result.get("distance", {})
+        least = distance.get("least_adaptation") or {}
+        return replace(
+            row,
+            verdict=str(result["verdict"]),
+            input_gain=_input_gain(result),
+            rho=_float(result.get("tube", {}).get("rho")),
+            ultimate_radius=_float(distance.get("ultimate_radius")),
+            adaptation_rate=_float(least.get("adaptation_rate")),
+        )
+
+    # -- outcomes ---------------------------------------------------------------------------------------------------
+
+    def _with(self, metric: VerifiedMetric) -> Spec:
+        content = {"format": FORMAT, **_metric_data(metric)}
+        return with_metric_text(self.spec, json.dumps(content), "<synthesised>")
+
+    def _written(self, metric: VerifiedMetric) -> Synthesised:
+        """The metric as a file will hold it: read back, and proven as read."""
+        spec = self._with(metric)
+        proof = verify_metric(build(spec), spec.safe_set, self.effort)
+        if proof.verdict != "certified":
+            return self._failed(
+                f"the metric as written could not be proven: {proof.reason}", "raise --budget"
+            )
+        safe_set = {
+            name: [decimal_data(low), decimal_data(high)]
+            for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
+        }
+        return Synthesised(
+            verdict="certified",
+            wanted=self.wanted,
+            spec=spec,
+            file=metric_file(safe_set, metric_data(spec, proof), _solver(metric)),
+            rows=tuple(sorted(self.rows, key=lambda row: (row.rate, row.floor))),
+            attempts=tuple(self.ladder.attempts),
+        )
+
+    def _failed(self, reason: str, relax: str, verdict: str = "undecided") -> Synthesised:
+        return Synthesised(
+            verdict=verdict,
+            wanted=self.wanted,
+            reason=reason,
+            relax=relax,
+            rows=tuple(self.rows),
+            attempts=tuple(self.ladder.attempts),
+        )
+
+    def _explained(self) -> Synthesised:
+        """Why there is no metric: a mode that excludes the rate, the condition number, the degree, the box."""
+        rate = self.wanted.rate
+        if rate is not None:
+            mode = uncontrollable_mode(self.model, self._equilibria(), rate)
+            if mode is not None:
+                lower = f"ask for a rate below {mode.bound:.6g}"
+                return self._failed(mode.words(self.spec.states), lower, verdict="refuted")
+            found = self.ladder.metric(rate)
+            if found is not None:
+                number = found.condition_number.above
+                return self._failed(
+                    f"the least condition number found at rate {float(rate):g} is {number:.5g}, above the limit",
+                    f"raise condition_number to {number:.4g}, or lower the rate",
+                )
+        return self._failed(f"no metric was found{self._tried()}", self._remedies(rate))
+
+    def _tried(self) -> str:
+        attempts = self.ladder.attempts
+        if not attempts:
+            return ""
+        degrees = sorted({a.degree for a in attempts})
+        names = sorted({a.route for a in attempts})
+        tried = f"{len(attempts)} attempts by {' and '.join(names)}, degree {', '.join(map(str, degrees))}"
+        return f": {tried}; the last: {attempts[-1].outcome}"
+
+    def _remedies(self, rate: Fraction | None) -> str:
+        remedies = []
+        if self.wanted.degree is not None and suggested(self.model):
+            remedies.append(f"a degree above {self.wanted.degree}, or auto")
+        if rate is not None:
+            self._tell("looking for a rate that works")
+            lower = self.ladder.largest_rate(self.limit)
+            if lower is not None and lower.rate < rate:
+                remedies.append(f"a rate up to {float(lower.rate):g}, which works on this box")
+            self._tell("looking for a box that works")
+            box = self.ladder.largest_box(rate)
+            if box is not None:
+                remedies.append(
+                    f"the safe set shrunk to {box[0]:.3g} of its size about its centre, where {float(rate):g} works"
+                )
+        return "try " + "; or ".join(remedies) if remedies else "lower the rate, or shrink the safe set"
+
+    def _equilibria(self) -> list[tuple[Fraction, ...]]:
+        """Rational points that may be equilibria: the plan's, its target, the centre of the box, the origin."""
+        spec = self.spec
+        points: list[tuple[Fraction, ...]] = []
+        if spec.trajectory.kind == "equilibrium" and all(t.expression.is_constant for t in spec.trajectory.x):
+            points.append(tuple(t.expression.fraction for t in spec.trajectory.x))
+        if spec.trajectory.task is not None:
+            points.append(spec.trajectory.task.target)
+        points.append(tuple((low + high) / 2 for low, high in spec.safe_set))
+        points.append((Fraction(0),) * len(spec.states))
+        return [
+            p
+            for p in dict.fromkeys(points)
+            if all(low <= q <= high for q, (low, high) in zip(p, spec.safe_set, strict=True))
+        ]
+
+    def _tell(self, words: str) -> None:
+        if self.progress is not None:
+            self.said += 1
+            self.progress(Step(name=f"synthesis, {words}", boxes=self.said, unit="steps"))
+
+
+def _solver(metric: VerifiedMetric) -> dict[str, Any]:
+    """How a metric was found."""
+    return {
+        "route": metric.proposal.route,
+        "degree": metric.family.degree,
+        "variables": list(metric.family.variables),
+        "digits": metric.digits,
+    }
+
+
+def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
+    return {
+        "rate": decimal_data(metric.rate),
+        "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],
+    }
+
+
+def _input_gain(result: Mapping[str, Any]) -> float | None:
+    """beta/sqrt(a), from a result."""
+    gain = result.get("constants", {}).get("metric_input_gain")
+    lower = result.get("metric", {}).get("lower")
+    if not gain or not lower or gain["above"] is None or not lower[0]:
+        return None
+    return float(gain["above"]) / sqrt(float(lower[0]))
+
+
+def _float(value: object) -> float | None:
+    return None if value is None else float(Fraction(str(value)))
