@@ -10,29 +10,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 import numpy as np
 
-from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import finite as finite_matrices
 from tubecert.enclosure.linalg import whitening
 from tubecert.metric.synthesis.conic import ConicSolution
+from tubecert.metric.synthesis.counterexample import Judgement, counterexample
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns
 from tubecert.metric.synthesis.parity import canonical, invariant_entries
 from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
 from tubecert.metric.synthesis.program import PointProgram, contraction_points, finite, metric_points
 from tubecert.metric.synthesis.sampling import Region, floats, worst
-from tubecert.metric.verify import MetricProof, verify_metric
 
 ROUTE = "cegis"
 _ROUNDS = 40
 _GAP = 0.01  # between kappa and its bound
 _HOPELESS = 1e7  # a larger kappa is no metric
 _SAMPLES = 4000
-_DIGITS = 9
-_EFFORT = Effort(gap=0.1, budget=200_000)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +59,8 @@ class _Synthesis:
             problem.model, problem.family, np.stack([lo, hi], axis=1), self.forms
         )
         self.unknowns = Unknowns(free)
+        some = np.random.default_rng(13).uniform(lo, hi, (20 * len(problem.family.functions) + 20, len(lo)))
+        self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in symmetries)]))
         affine = self.forms.affine_variables(lo, hi)
         self.contracting = Region(
             lo=lo, hi=hi, variables=self.forms.variables, at_ends=affine, symmetries=symmetries
@@ -86,7 +84,7 @@ class _Synthesis:
             kappa = float(least.values[-1])
             if not np.isfinite(kappa) or kappa <= 0:
                 return self._answer(best, None, "the solver's kappa is no positive number")
-            if least.finished:
+            if least.feasible and np.isfinite(least.bound):
                 self.bound = max(self.bound, min(kappa, least.bound))
             if self.bound > limit:
                 return self._answer(best, False, f"kappa is at least {self.bound:.4g}, above the limit")
@@ -98,16 +96,17 @@ class _Synthesis:
                 self.problem.progress(
                     f"round {self.rounds}: kappa >= {self.bound:.5g}, this metric {attack.kappa:.5g}, "
                     f"rate short by {attack.shortfall:.3g} at {len(attack.contraction)} points; "
+                    f"{least.status} {least.iterations}, {central.status} {central.iterations}"
                     f"{len(self.program.metric.at)} + {len(self.program.contraction.at)} conditions"
                 )
             if attack.shortfall <= 0 and np.isfinite(attack.kappa):
                 if best is None or attack.kappa < best[0]:
-                    best = attack.kappa, coefficients * attack.scale
+                    best = attack.kappa, self.forms.coefficients(coefficients) * attack.scale
                 if attack.kappa <= self.bound * (1 + 1.1 * _GAP):
-                    proof = self._verify(best[1])
-                    if proof.verdict == "certified":
-                        return self._answer(best, True, "proven by branch and bound")
-                    attack = self._with_witness(attack, proof)
+                    found = counterexample(self.problem, best[1])
+                    if found.proven:
+                        return self._answer(best, True, "no counterexample, by branch and bound")
+                    attack = self._with_witness(attack, found)
                     best = None
             if not self._add(attack):
                 return self._answer(best, None, "no further points to add")
@@ -117,10 +116,17 @@ class _Synthesis:
 
     def _start(self) -> PointProgram:
         inner = len(self.contracting.inner)
-        c2 = [self.contracting.corners(64, self.generator), self.contracting.random(12 * (1 + inner), self.generator)]
-        c1 = [self.bounded.corners(32, self.generator), self.bounded.random(8 * len(self.bounded.variables) + 1, self.generator)]
+        c2 = [
+            self.contracting.corners(64, self.generator),
+            self.contracting.random(12 * (1 + inner), self.generator),
+        ]
+        c1 = [
+            self.bounded.corners(32, self.generator),
+            self.bounded.random(8 * len(self.bounded.variables) + 1, self.generator),
+        ]
         metric, contraction = (
-            np.unique(canonical(np.concatenate(points), self.bounded.symmetries), axis=0) for points in (c1, c2)
+            np.unique(canonical(np.concatenate(points), self.bounded.symmetries), axis=0)
+            for points in (c1, c2)
         )
         return PointProgram(
             unknowns=self.unknowns,
@@ -135,7 +141,9 @@ class _Synthesis:
         program = self.program
         c1 = metric_points(self.forms, self.unknowns, attack.metric, self.problem.floor)
         c2 = contraction_points(self.forms, self.unknowns, attack.contraction, self.rate)
-        c1, c2 = (_new(finite(points), old) for points, old in ((c1, program.metric), (c2, program.contraction)))
+        c1, c2 = (
+            _new(finite(points), old) for points, old in ((c1, program.metric), (c2, program.contraction))
+        )
         self.program = replace(
             program, metric=program.metric.joined(c1), contraction=program.contraction.joined(c2)
         )
@@ -145,15 +153,27 @@ class _Synthesis:
         """The worst points for these coefficients, by sampling."""
         c2, short = worst(
             lambda x: self.rate - supported_rate(self.forms, coefficients, x),
-            self.contracting, self.generator, samples=_SAMPLES, climbers=24, keep=12,
+            self.contracting,
+            self.generator,
+            samples=_SAMPLES,
+            climbers=24,
+            keep=12,
         )
         low, least = worst(
             lambda x: -self._floor_margin(coefficients, x),
-            self.bounded, self.generator, samples=_SAMPLES // 4, climbers=12, keep=4,
+            self.bounded,
+            self.generator,
+            samples=_SAMPLES // 4,
+            climbers=12,
+            keep=4,
         )
         high, most = worst(
             lambda x: largest(self.forms(x).metric(coefficients)),
-            self.bounded, self.generator, samples=_SAMPLES // 4, climbers=12, keep=4,
+            self.bounded,
+            self.generator,
+            samples=_SAMPLES // 4,
+            climbers=12,
+            keep=4,
         )
         floor, ceiling = -float(least[0]), float(most[0])
         ratio = ceiling / floor if floor > 0 else np.inf
@@ -177,16 +197,11 @@ class _Synthesis:
 
     # -- proof and answer --------------------------------------------------------------------------------------
 
-    def _verify(self, coefficients: Array) -> MetricProof:
-        W = self.problem.family.dual_metric(rounded(coefficients))
-        model = replace(self.problem.model, W=W, rate=Fraction(self.rate))
-        return verify_metric(model, self.problem.safe_set, _EFFORT)
-
-    def _with_witness(self, attack: Attack, proof: MetricProof) -> Attack:
-        if proof.at is None:
+    def _with_witness(self, attack: Attack, found: Judgement) -> Attack:
+        if found.at is None:
             return attack
-        at = canonical(np.array([proof.at.x]), self.bounded.symmetries)
-        if proof.condition == "C1":
+        at = canonical(found.at[None], self.bounded.symmetries)
+        if found.condition == "C1":
             return replace(attack, metric=np.concatenate([attack.metric, at]))
         return replace(attack, contraction=np.concatenate([attack.contraction, at]))
 
@@ -223,11 +238,6 @@ def largest(matrices: Array) -> Array:
     known = finite_matrices(matrices)
     safe = np.where(known[:, None, None], matrices, 0.0)
     return np.where(known, np.linalg.eigvalsh(safe)[:, -1], np.inf)
-
-
-def rounded(coefficients: Array) -> list[list[list[Fraction]]]:
-    """The coefficients as decimals, for a proof."""
-    return [[[Fraction(f"{x:.{_DIGITS}g}") for x in row] for row in v] for v in coefficients.tolist()]
 
 
 def _new(points, old):

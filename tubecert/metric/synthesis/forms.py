@@ -114,6 +114,22 @@ class FormsTape:
         self.metric_variables = _used([*(e for row in E for e in row), *family.functions], model)
         self.input_variables = _used([e for row in model.B for e in row], model)
         self.variables = _used(entries, model)
+        self._basis = np.eye(len(family.functions))
+
+    def orthonormalise(self, points: Array) -> None:
+        """Change to functions that are orthonormal on the points (N, n): monomials are nearly dependent on small boxes.
+
+        Points that are closed under the sign symmetries keep even and odd functions apart.
+        """
+        values = self(points).values
+        r = np.linalg.qr(values[np.isfinite(values).all(axis=1)] / np.sqrt(len(points)), mode="r")
+        if r.shape[0] == r.shape[1] and np.abs(np.diag(r)).min() > 1e-9 * np.abs(r).max():
+            r = np.where(np.abs(r) > 1e-12 * np.abs(r).max(), r, 0.0)
+            self._basis = self._basis @ np.linalg.inv(r)
+
+    def coefficients(self, inner: Array) -> Array:
+        """The V_k of the family (K, n, n) from those of the changed functions."""
+        return np.einsum("kj,jab->kab", self._basis, inner)
 
     def __call__(self, points: Array, annihilator: Array | None = None) -> PointForms:
         """The forms at points (N, n), with the given N (N, n, r) if there is one."""
@@ -123,7 +139,14 @@ class FormsTape:
         E, A, g, rates, B = np.split(flat, sizes, axis=1)
         E, A, B = E.reshape(-1, n, n), A.reshape(-1, n, n), B.reshape(-1, n, m)
         N = null_bases(B) if annihilator is None else annihilator
-        return PointForms(frame=E, input=B @ _t(B), P=_t(N) @ E, Q=_t(N) @ A, values=g, rates=rates)
+        return PointForms(
+            frame=E,
+            input=B @ _t(B),
+            P=_t(N) @ E,
+            Q=_t(N) @ A,
+            values=g @ self._basis,
+            rates=rates @ self._basis,
+        )
 
     def bases(self, points: Array) -> Array:
         """N at points, (N, n, r)."""

@@ -8,7 +8,6 @@ Untrusted. Implements: (CCM_1), (CCM_2) at points.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +18,7 @@ from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution,
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns, upper
 from tubecert.metric.synthesis.problem import Floor
 
+_TOLERANCE, _ROUGH = 1e-7, 1e-5
 LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
 
 
@@ -57,7 +57,7 @@ class PointProgram:
         cost = np.zeros(width + 1)
         cost[-1] = 1.0
         blocks = [*self._between(0.0, None), *self._contracting(None)]
-        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver)
+        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=_TOLERANCE)
 
     def central(self, kappa: float, slack: float, reference: Array) -> ConicSolution:
         """With kappa given, the greatest extra rate mu (the last unknown), W kept inside by a relative `slack`.
@@ -67,7 +67,7 @@ class PointProgram:
         cost = np.zeros(self.unknowns.count + 1)
         cost[-1] = -1.0
         blocks = [*self._between(slack, kappa), *self._contracting(reference)]
-        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=1e-6)
+        return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=_ROUGH)
 
     def _between(self, slack: float, kappa: float | None) -> list[Semidefinite]:
         """W - floor >= 0 and kappa I - W >= 0 at the metric points."""
@@ -112,16 +112,11 @@ def metric_points(forms: FormsTape, unknowns: Unknowns, at: Array, floor: Floor)
 def contraction_points(forms: FormsTape, unknowns: Unknowns, at: Array, rate: float) -> Points:
     """Points for C2; `floor` holds the rows of N'W N."""
     here = forms(at)
-    return Points(
-        at=at, rows=here.contraction_rows(unknowns, rate), floor=here.projected_rows(unknowns).reshape(len(at), -1)
-    )
+    weight = here.projected_rows(unknowns)
+    floor = weight.reshape(len(at), weight.shape[1] * weight.shape[2])
+    return Points(at=at, rows=here.contraction_rows(unknowns, rate), floor=floor)
 
 
 def finite(points: Points) -> Points:
     """Without those at which something is not finite."""
     return points.kept(np.isfinite(points.rows).all(axis=(1, 2)) & np.isfinite(points.floor).all(axis=1))
-
-
-def start(regions: Sequence[Array]) -> Array:
-    """Points without repetitions."""
-    return np.unique(np.concatenate(list(regions)), axis=0)

@@ -1,0 +1,71 @@
+"""Branch and bound as the last attacker: a point where rounded coefficients fail, or none on the whole safe set.
+
+Only decisions at a threshold are asked for, which is much cheaper than the suprema that `verify` reports. It saves
+rounds and proofs that would fail; the proof that counts is made by the caller.
+Implements: (CCM_1), (CCM_2). Untrusted use of trusted parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
+from tubecert.enclosure.domain import BoxDomain
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.objective import Objective, Pencil
+from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.expression.matrix import identity, multiply, transpose
+from tubecert.metric.synthesis.problem import SynthesisProblem
+from tubecert.model import ControlAffineModel
+
+_DIGITS = 12
+_EFFORT = Effort(budget=100_000)
+_ALLOWED = 2.5e-4  # of the rate: less than any back-off, and much easier to decide than the rate itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """`proven`: C1 and C2 hold; else what was not proven, and the point (n,) that looked worst, if there is one."""
+
+    proven: bool
+    condition: Literal["", "C1", "C2"] = ""
+    at: Array | None = None
+
+
+def counterexample(problem: SynthesisProblem, coefficients: Array) -> Judgement:
+    """Decide C1 and C2, at a rate that is smaller by a hair, for the coefficients V_k (K, n, n) in decimals."""
+    W = problem.family.dual_metric(_decimals(coefficients))
+    model = replace(problem.model, W=W, rate=Fraction(problem.rate))
+    domain = BoxDomain(dict(zip(model.states, problem.safe_set, strict=True)))
+    negative = tuple(tuple(-e for e in row) for row in W)
+    found = decide(Pencil(negative, [identity(len(W))]), domain, 0.0, _EFFORT)
+    if found.verdict != "proven":
+        return _failed("C1", found, problem)
+    if len(model.inputs) == len(model.states):
+        return Judgement(proven=True)
+    found = decide(_contraction(model), domain, -2 * problem.rate * (1 - _ALLOWED), _EFFORT)
+    return Judgement(proven=True) if found.verdict == "proven" else _failed("C2", found, problem)
+
+
+def _contraction(model: ControlAffineModel) -> Objective:
+    """Its supremum is minus twice the largest rate that C2 supports."""
+    if not model.constant_input:
+        return ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+    N = model.annihilator
+    drift, weight = (multiply(transpose(N), multiply(a, N)) for a in (model.drift_form, model.W))
+    return Pencil(drift, [weight])
+
+
+def _failed(condition: Literal["C1", "C2"], found: Decision, problem: SynthesisProblem) -> Judgement:
+    middle = [float((lo + hi) / 2) for lo, hi in problem.safe_set]
+    at = np.array([found.at.get(v, m) for v, m in zip(problem.model.states, middle, strict=True)])
+    return Judgement(proven=False, condition=condition, at=at)
+
+
+def _decimals(coefficients: Array) -> list[list[list[Fraction]]]:
+    symmetric = 0.5 * (coefficients + np.swapaxes(coefficients, 1, 2))
+    return [[[Fraction(f"{x:.{_DIGITS}g}") for x in row] for row in v] for v in symmetric.tolist()]
