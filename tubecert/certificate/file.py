@@ -130,6 +130,14 @@ def write_text(target: str, text: str, remedy: str = REMEDY) -> None:
         raise _unwritable(target, error.strerror or str(error), remedy) from error
 
 
+def same_file(target: str, source: str | Path) -> bool:
+    """Whether two paths name the same existing file."""
+    try:
+        return Path(target).samefile(source)
+    except (OSError, ValueError):
+        return False
+
+
 def _replace(path: Path, text: str) -> None:
     # a link keeps pointing where it points: the file it names is replaced
     path = path.resolve()

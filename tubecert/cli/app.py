@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from tubecert.cli import everyday
+from tubecert.cli import everyday, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
 from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
 
@@ -39,7 +39,14 @@ Examples:
   tubecert certify plant.yaml
   tubecert certify plant.yaml --rho-a 0.05 --conditions all -o plant.json
   tubecert certify plant.yaml --bandwidth 50 --adaptation-rate 2e7
+  tubecert certify plant.yaml --report plant.html
   tubecert certify plant.yaml -q -o - | jq .result.tube
+"""
+
+_REPORT_AFTER = """\b
+Examples:
+  tubecert report plant.certificate.json
+  tubecert report plant.certificate.json -o plant.html -o plant.md
 """
 
 app = typer.Typer(
@@ -128,6 +135,10 @@ def certify(
             help="The certificate; - is stdout.  [SPEC's stem.certificate.json]",
         ),
     ] = None,
+    report: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="A page about it, too: FILE.html or FILE.md; may be repeated."),
+    ] = None,
     verbose: Verbose = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -148,6 +159,41 @@ def certify(
     raise typer.Exit(code)
 
 
+@app.command("report", epilog=_REPORT_AFTER, short_help="Make a page from a certificate.")
+def make_report(
+    context: typer.Context,
+    certificate: Annotated[
+        str, typer.Argument(metavar="CERT", help="A certificate (JSON).", show_default=False)
+    ],
+    *,
+    output: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]",
+        ),
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Make a page from a certificate, without certifying anything again."""
+    how = Output.of(context, locals())
+    with guarded(how):
+        from tubecert.cli.report import run
+
+        run(certificate, output, how)
+    raise typer.Exit(0)
+
+
+synthesising.register(app)
+simulating.register(app)
 everyday.register(app)
 
 

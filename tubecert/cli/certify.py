@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
+from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, TargetError
 from tubecert.findings import Finding
@@ -36,6 +37,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Certify; `given` holds the options by the names of their parameters."""
     numbers = _numbers(given)
     place = _place(given)
+    pages = _pages(given, place)
     from tubecert import spec
     from tubecert.spec.metric_file import with_metric
 
@@ -54,7 +56,8 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
     if not place.is_stdout:
         certificate.write(place.target, sealed)
-    _report(sealed, place, output)
+    write_pages(pages, sealed)
+    _report(sealed, place, pages, output)
     return certificate.exit_code(result)
 
 
@@ -81,7 +84,7 @@ def _place(given: Mapping[str, Any]) -> Place:
     )
     certificate.check_target(target)
     for what, source in (("specification", given["spec"]), ("metric file", given["metric"])):
-        if source is not None and target != certificate.STDOUT and _same_file(target, source):
+        if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
             finding = Finding(
                 code="TC120",
                 message=f"{target} is the {what} itself and would be overwritten",
@@ -91,11 +94,14 @@ def _place(given: Mapping[str, Any]) -> Place:
     return Place(target=target)
 
 
-def _same_file(target: str, source: str | Path) -> bool:
-    try:
-        return Path(target).samefile(source)
-    except (OSError, ValueError):
-        return False
+def _pages(given: Mapping[str, Any], place: Place) -> list[str]:
+    """Where the pages about the certificate go, checked before any work is done. Raises `TargetError`."""
+    pages = list(given["report"] or ())
+    written = None if place.is_stdout else place.target
+    check_pages(
+        pages, {"specification": given["spec"], "metric file": given["metric"], "certificate": written}
+    )
+    return pages
 
 
 def _record(started: datetime, seconds: float) -> dict[str, Any]:
@@ -108,7 +114,7 @@ def _record(started: datetime, seconds: float) -> dict[str, Any]:
     }
 
 
-def _report(sealed: Mapping[str, Any], place: Place, output: Output) -> None:
+def _report(sealed: Mapping[str, Any], place: Place, pages: Sequence[str], output: Output) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
@@ -122,5 +128,6 @@ def _report(sealed: Mapping[str, Any], place: Place, output: Output) -> None:
     if output.quiet:
         text = terminal.text(console.verdict_line(sealed["result"]))
     else:
-        text = terminal.text(console.report(sealed, target=place.target, verbose=output.verbose))
+        verbose = output.verbose
+        text = terminal.text(console.report(sealed, target=place.target, verbose=verbose, pages=pages))
     write_stdout(text)

@@ -111,7 +111,7 @@ class Synthesised:
         if self.file is not None:
             data["solver"] = self.file["solver"]
         if self.reason:
-            data["reason"] = self.reason
+            data |= {"reason": self.reason, "relax": self.relax}
         return data
 
 

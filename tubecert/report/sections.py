@@ -96,7 +96,7 @@ def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
     found = list(rows(result))
     body: list[RenderableType] = []
     if found:
-        table = _table("certificate", "gains", "verdict", ">omega", ">Gamma", ">Ts", "margin left")
+        table = plain_table("certificate", "gains", "verdict", ">omega", ">Gamma", ">Ts", "margin left")
         before = ""
         for row in found:
             table.add_row(
@@ -175,7 +175,7 @@ def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[Rend
 
 
 def _constants(result: Mapping[str, Any]) -> Table:
-    table = _table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
+    table = plain_table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
     for name, item in result["constants"].items():
         table.add_row(item["symbol"], _described(result, name, item), proven(item), item["unit"], gap(item))
     return table
@@ -226,7 +226,7 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
     return [Text(line) for line in [brief, *(believed if declared else [])]]
 
 
-def _table(*columns: str, wrapped: int | None = None) -> Table:
+def plain_table(*columns: str, wrapped: int | None = None) -> Table:
     """A table without lines; columns named >... are aligned to the right, only the one at `wrapped` wraps."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     for index, column in enumerate(columns):

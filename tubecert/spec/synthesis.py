@@ -34,7 +34,7 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
         variables=_variables(_unless_auto(entries.get("variables")), names),
         condition_number=limit.number(names.values, least=1) if limit else None,
         route=entries["route"].word(ROUTES) or "auto" if "route" in entries else "auto",
-        solver=entries["solver"].word(SOLVERS) or "clarabel" if "solver" in entries else "clarabel",
+        solver="scs" if "solver" in entries and entries["solver"].word(SOLVERS) == "scs" else "clarabel",
     )
     _consistent(field, found)
     return found if len(field.reader.findings) == before else None

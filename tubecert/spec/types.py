@@ -145,7 +145,7 @@ class Synthesis:
     variables: tuple[str, ...] | None = None
     condition_number: Fraction | None = None
     route: str = "auto"
-    solver: str = "clarabel"
+    solver: Literal["clarabel", "scs"] = "clarabel"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,121 @@
+"""`synth`: a specification in; a proven metric as a file, what was tried, and an exit code out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Numbers, Output
+from tubecert.errors import ExitCode, SpecError, TargetError
+from tubecert.findings import Finding, Location
+from tubecert.report.terminal import Terminal
+from tubecert.spec import Spec, Synthesis
+
+_CODES = {
+    "certified": ExitCode.CERTIFIED,
+    "refuted": ExitCode.NOT_CERTIFIED,
+    "undecided": ExitCode.UNDECIDED,
+}
+
+
+def run(given: Mapping[str, Any], output: Output) -> ExitCode:
+    """Synthesise; `given` holds the options by the names of their parameters."""
+    numbers = Numbers()
+    values = {
+        name: numbers.positive(f"--{name.replace('_', '-')}", given[name])
+        for name in ("rate", "condition_number", "rho_a", "epsilon")
+    }
+    budget = numbers.count("--budget", given["budget"])
+    numbers.check()
+    target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
+    for place in (target, *([given["plot"]] if given["plot"] else [])):
+        certificate.check_target(place)
+        if place != certificate.STDOUT and certificate.same_file(place, given["spec"]):
+            raise TargetError([Finding(code="TC120", message=f"{place} is the specification itself")])
+    from tubecert import spec
+
+    system = spec.load(given["spec"])
+    wanted = _wanted(system, given, values)
+    from tubecert import pipeline
+    from tubecert.report import progress
+
+    radii = {name: values[name] for name in ("rho_a", "epsilon") if values[name] is not None}
+    options = pipeline.Options(**radii, **({} if budget is None else {"budget": budget}))
+    terminal = Terminal.stderr(color=output.color)
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        found = pipeline.synthesise(
+            system, wanted, options, report, sweep=bool(given["sweep"] or given["plot"])
+        )
+    if found.file is not None and target != certificate.STDOUT:
+        certificate.write(target, found.file)
+    if given["plot"] and found.rows:
+        from tubecert.report.sweep import draw
+
+        certificate.write_text(given["plot"], draw([row.data() for row in found.rows]))
+    _report(found, system.name, target, output)
+    return _CODES[found.verdict]
+
+
+def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -> Synthesis:
+    """What is asked for: the specification's section, changed by the command line.
+
+    Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
+    """
+    own = system.synthesis
+    if own is None:
+        rate = None if system.metric is None else system.metric.rate
+        own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
+    changes: dict[str, Any] = {
+        name: values[name] for name in ("rate", "condition_number") if values[name] is not None
+    }
+    for name in ("degree", "route", "solver", "objective"):
+        if given[name] is not None:
+            changes[name] = given[name] if name == "degree" else str(given[name])
+    if given["variables"] is not None:
+        changes["variables"] = _names(system, given["variables"])
+    objective = changes.get("objective", own.objective)
+    if objective == "rate" or (
+        objective in ("adaptation", "tube") and given["rate"] is None and own.objective != objective
+    ):
+        changes["rate"] = None  # searched for
+    elif "rate" in changes and "objective" not in changes and own.rate is None:
+        changes["objective"] = "condition"
+    wanted = replace(own, **changes)
+    if wanted.objective == "rate" and given["rate"] is not None:
+        _refuse("--objective", "rate", "the objective rate searches for the rate; --rate cannot be given")
+    if wanted.objective in ("condition", "margin") and wanted.rate is None:
+        _refuse("--objective", wanted.objective, f"the objective {wanted.objective} needs --rate, in 1/s")
+    return wanted
+
+
+def _names(system: Spec, text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in system.states:
+            _refuse("--variables", text, f"{name} is no state; the states are {', '.join(system.states)}")
+    return names
+
+
+def _refuse(option: str, text: str, message: str) -> None:
+    place = Location(file=option, line=1, column=1, source=text, width=len(text))
+    raise SpecError([Finding(code="TC112", message=message, location=place)])
+
+
+def _report(found: Any, name: str, target: str, output: Output) -> None:
+    """The report on stdout, or the metric file, with the verdict line on stderr."""
+    from tubecert.report import synthesis
+
+    json = output.json or target == certificate.STDOUT
+    terminal = (Terminal.stderr if json else Terminal.stdout)(color=output.color)
+    line = synthesis.verdict_line(found.data(), found.file, name)
+    if json:
+        write_stdout(certificate.dump(found.file if found.file is not None else found.data()))
+        if not output.quiet:
+            terminal.show(line)
+        return
+    shown = [line] if output.quiet else synthesis.report(found.data(), found.file, name, target)
+    write_stdout(terminal.text(shown))

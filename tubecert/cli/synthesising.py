@@ -1,0 +1,113 @@
+"""The command `synth`: its options. `register` adds it to the app."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import guarded
+from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+
+_AFTER = """\b
+Examples:
+  tubecert synth plant.yaml --rate 0.8 -o metric.json
+  tubecert synth plant.yaml --objective adaptation --plot sweep.svg
+  tubecert certify plant.yaml --metric metric.json
+
+\b
+Exit codes: 0 a metric was proven and written; 1 no metric has the rate (the report says why); 2 invalid
+input; 4 none was found (the report says what was tried and what would help).
+"""
+
+
+class Objective(StrEnum):
+    """What makes a metric the best."""
+
+    CONDITION = "condition"
+    MARGIN = "margin"
+    RATE = "rate"
+    ADAPTATION = "adaptation"
+    TUBE = "tube"
+
+
+class Route(StrEnum):
+    """How metrics are found."""
+
+    AUTO = "auto"
+    SOS = "sos"
+    CEGIS = "cegis"
+
+
+class Solver(StrEnum):
+    """Which solver proposes."""
+
+    CLARABEL = "clarabel"
+    SCS = "scs"
+
+
+def _number(flag: str, help: str) -> object:
+    return typer.Option(flag, metavar="NUMBER", help=help)
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the app."""
+    app.command(epilog=_AFTER, short_help="Find a metric and prove it.")(synth)
+
+
+def synth(
+    context: typer.Context,
+    spec: Annotated[
+        str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
+    ],
+    *,
+    rate: Annotated[str | None, _number("--rate", "Contraction rate, in 1/s.")] = None,
+    objective: Annotated[
+        Objective | None,
+        typer.Option(
+            help="What is best. At a rate: the least condition number, the greatest margin. Else the rate that "
+            "gives the least adaptation rate or the smallest tube, or the greatest rate.",
+            show_default=False,
+        ),
+    ] = None,
+    degree: Annotated[
+        int | None, typer.Option(min=0, max=8, help="Degree of W(x).  [raised until it works]")
+    ] = None,
+    variables: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="States that W depends on, e.g. x1,x3.  [chosen]")
+    ] = None,
+    condition_number: Annotated[
+        str | None, _number("--condition-number", "Not to be exceeded on the safe set.")
+    ] = None,
+    route: Annotated[Route | None, typer.Option(help="How metrics are found.  [auto]")] = None,
+    solver: Annotated[Solver | None, typer.Option(help="Which solver proposes.  [clarabel]")] = None,
+    sweep: Annotated[bool, typer.Option("--sweep", help="Compare metrics over a range of rates.")] = False,
+    plot: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --sweep.")
+    ] = None,
+    rho_a: Annotated[str | None, _number("--rho-a", "Overrides tube.rho_a.")] = None,
+    epsilon: Annotated[str | None, _number("--epsilon", "Overrides tube.epsilon.")] = None,
+    budget: Annotated[str | None, _number("--budget", "Boxes examined per claim before giving up.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="The metric file; - is stdout.  [SPEC's stem.metric.json]"
+        ),
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
+    given = dict(locals())
+    how = Output.of(context, given)
+    with guarded(how):
+        from tubecert.cli.synth import run
+
+        code = run(given, how)
+    raise typer.Exit(code)

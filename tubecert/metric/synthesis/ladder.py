@@ -1,0 +1,263 @@
+"""From a wish to a proven metric: degrees, routes and back-offs are tried until one proposal survives its proof.
+
+A route proposes, `rounding` shortens, `tubecert.metric.verify` decides; no solver's status is believed. Every attempt
+is kept, so that a failure can say what was tried.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import floor, isfinite, log10, sqrt
+
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.metric.synthesis.family import MetricFamily, metric_family, suggested
+from tubecert.metric.synthesis.problem import Floor, Proposal, Solver, SynthesisProblem
+from tubecert.metric.synthesis.rounding import VerifiedMetric, shortest_proven
+from tubecert.model import ControlAffineModel
+
+_DEGREES = (0, 1, 2, 3, 4)
+_BACK_OFF = (1e-3, 1e-4, 1e-5)  # relative to the rate: what the proof may need
+_RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again with so much more
+_LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
+_SHARP = 1.01  # a searched rate is settled to this factor
+
+Route = Callable[[SynthesisProblem], Proposal]
+Box = tuple[tuple[Fraction, Fraction], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is wanted: a metric of `model` on `safe_set`.
+
+    `degrees` None: raised until it works; `variables` None: chosen; `routes` in the order in which they are tried;
+    `limit` of the condition number.
+    """
+
+    model: ControlAffineModel = field(repr=False)
+    safe_set: Box
+    routes: tuple[tuple[str, Route], ...]
+    degree: int | None = None
+    variables: tuple[str, ...] | None = None
+    limit: float | None = None
+    solver: Solver = "clarabel"
+    effort: Effort = field(default_factory=Effort)
+    progress: Callable[[str], None] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One proposal and what became of it; `condition_number` is proven, None if nothing was."""
+
+    rate: float
+    degree: int
+    floor: Floor
+    route: str
+    outcome: str
+    condition_number: float | None = None
+    seconds: float
+    solver_seconds: float
+
+
+class Ladder:
+    """Metrics at rates; what was found, and what was tried (`attempts`), is kept."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.attempts: list[Attempt] = []
+        self._families: dict[int, MetricFamily] = {}
+        self._found: dict[tuple[Fraction, Floor], VerifiedMetric | None] = {}
+        self._least_degree = 0  # below it nothing worked at a rate that was asked for before
+        self._hardest: float = 0.0
+
+    def metric(self, rate: Fraction, floor: Floor = "identity") -> VerifiedMetric | None:
+        """A proven metric at a rate, of nearly the least condition number (or input gain); None if none was found."""
+        key = rate, floor
+        if key not in self._found:
+            self._found[key] = self._searched(rate, floor)
+        return self._found[key]
+
+    def largest_rate(self, limit: float | None, least: Fraction | None = None) -> VerifiedMetric | None:
+        """A metric of (nearly) the largest rate at which one is found, with a condition number up to `limit`."""
+        best = self._first(limit, least)
+        if best is None:
+            return None
+        failed = None
+        while failed is None and best.rate < _MOST:
+            found = self._within(two_digits(best.rate * 2), limit)
+            failed = two_digits(best.rate * 2) if found is None else None
+            best = found or best
+        if failed is None:
+            return best
+        while failed > best.rate * Fraction(_SHARP):
+            middle = digits_below(sqrt(best.rate * failed), 4)
+            if not best.rate < middle < failed:
+                break
+            found = self._within(middle, limit)
+            best, failed = (found, failed) if found else (best, middle)
+        return best
+
+    def largest_box(self, rate: Fraction) -> tuple[float, VerifiedMetric] | None:
+        """The largest factor by which the box, shrunk about its centre, has a metric at `rate`."""
+        works: tuple[float, VerifiedMetric] | None = None
+        low, high = 0.0, 1.0
+        for _ in range(6):
+            factor = 0.5 * (low + high)
+            inner = Ladder(replace(self.request, safe_set=shrunk(self.request.safe_set, Fraction(factor))))
+            found = inner.metric(rate)
+            if found:
+                low, works = factor, (factor, found)
+            else:
+                high = factor
+        return works
+
+    # -- one rate -----------------------------------------------------------------------------------------------
+
+    def _first(self, limit: float | None, least: Fraction | None) -> VerifiedMetric | None:
+        """A metric at `least`, or at the largest power of two that has one."""
+        if least is not None:
+            return self._within(least, limit)
+        rate = Fraction(1)
+        while rate >= _LEAST:
+            if found := self._within(rate, limit):
+                return found
+            rate /= 4
+        return None
+
+    def _within(self, rate: Fraction, limit: float | None) -> VerifiedMetric | None:
+        found = self.metric(rate)
+        if found is None or (limit is not None and found.condition_number.above > limit):
+            return None
+        return found
+
+    def _searched(self, rate: Fraction, floor: Floor) -> VerifiedMetric | None:
+        for degree in self._degrees(rate):
+            for name, route in self.request.routes:
+                found = self._route(rate, floor, degree, name, route)
+                if found is not None:
+                    if rate >= self._hardest:
+                        self._least_degree, self._hardest = degree, float(rate)
+                    return found
+        return None
+
+    def _degrees(self, rate: Fraction) -> Iterator[int]:
+        """The degree that was asked for, or from the least that may work on: a higher rate needs no lower degree."""
+        if self.request.degree is not None:
+            yield self.request.degree
+            return
+        last = -1
+        for degree in _DEGREES:
+            if rate >= self._hardest and degree < self._least_degree:
+                continue
+            family = self._family(degree)
+            if family.degree > last:
+                yield degree
+            last = family.degree
+
+    def _route(
+        self, rate: Fraction, floor: Floor, degree: int, name: str, route: Route
+    ) -> VerifiedMetric | None:
+        """One route at one degree: a smaller back-off if it finds nothing, a larger one if the proof fails."""
+        retreated = False
+        back_offs = list(_BACK_OFF)
+        while back_offs:
+            back_off = back_offs.pop(0)
+            problem = self._problem(rate, floor, degree, back_off)
+            started = time.perf_counter()
+            proposal = _guarded(name, route, problem)
+            outcome = shortest_proven(problem, proposal, rate, self.request.effort)
+            self._note(
+                Attempt(
+                    rate=float(rate),
+                    degree=degree,
+                    floor=floor,
+                    route=proposal.route,
+                    outcome="proven" if isinstance(outcome, VerifiedMetric) else outcome.reason,
+                    condition_number=outcome.condition_number.above
+                    if isinstance(outcome, VerifiedMetric)
+                    else None,
+                    seconds=time.perf_counter() - started,
+                    solver_seconds=proposal.solver_seconds,
+                )
+            )
+            if isinstance(outcome, VerifiedMetric):
+                return outcome
+            if proposal.coefficients is not None and not retreated:
+                back_offs, retreated = [back_off * _RETREAT], True
+            elif retreated:
+                return None
+        return None
+
+    def _problem(self, rate: Fraction, floor: Floor, degree: int, back_off: float) -> SynthesisProblem:
+        request = self.request
+        return SynthesisProblem(
+            model=request.model,
+            safe_set=request.safe_set,
+            family=self._family(degree),
+            rate=float(rate) * (1 + back_off),
+            floor=floor,
+            limit=None if request.limit is None or floor != "identity" else 1.05 * request.limit,
+            solver=request.solver,
+            progress=request.progress,
+        )
+
+    def _family(self, degree: int) -> MetricFamily:
+        if degree not in self._families:
+            self._families[degree] = metric_family(
+                self.request.model, degree=degree, variables=self.request.variables
+            )
+        return self._families[degree]
+
+    def _note(self, attempt: Attempt) -> None:
+        self.attempts.append(attempt)
+        if self.request.progress:
+            number = attempt.condition_number
+            words = attempt.outcome if number is None else f"proven, condition number {number:.4g}"
+            self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+
+
+def _guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
+    """What a route proposes; a solver that breaks down has proposed nothing."""
+    started = time.perf_counter()
+    try:
+        return route(problem)
+    except (ArithmeticError, ValueError, RuntimeError) as error:
+        what = " ".join(str(error).split())[:120] or type(error).__name__
+        return Proposal(
+            route=name,
+            coefficients=None,
+            kappa=float("inf"),
+            feasible=None,
+            status=f"broke down ({what})",
+            seconds=time.perf_counter() - started,
+            solver_seconds=0.0,
+        )
+
+
+def shrunk(box: Sequence[tuple[Fraction, Fraction]], factor: Fraction) -> Box:
+    """The box scaled about its centre."""
+    result = []
+    for low, high in box:
+        centre, half = (low + high) / 2, (high - low) / 2 * factor
+        result.append((centre - half, centre + half))
+    return tuple(result)
+
+
+def digits_below(value: float | Fraction, digits: int) -> Fraction:
+    """The largest decimal of so many digits that does not exceed a positive value."""
+    assert isfinite(value)
+    assert value > 0
+    unit = Fraction(10) ** (floor(log10(value)) - digits + 1)
+    return (Fraction(value) // unit) * unit
+
+
+def two_digits(value: Fraction) -> Fraction:
+    """Two digits, rounded down."""
+    return digits_below(value, 2)
+
+
+def constant_is_all(model: ControlAffineModel) -> bool:
+    """Whether no variable promises anything: then only degree 0 is worth trying."""
+    return not suggested(model)

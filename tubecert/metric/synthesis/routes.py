@@ -1,0 +1,14 @@
+"""The routes of synthesis by name, in the order in which they are tried."""
+
+from __future__ import annotations
+
+from tubecert.metric.synthesis.ladder import Route
+
+
+def routes(choice: str) -> tuple[tuple[str, Route], ...]:
+    """The route that was chosen; for `auto` counterexamples first: they are faster, and treat every expression."""
+    from tubecert.metric.synthesis import cegis, sos
+
+    known: dict[str, Route] = {"cegis": cegis.propose, "sos": sos.propose_sos}
+    names = ("cegis", "sos") if choice == "auto" else (choice,)
+    return tuple((name, known[name]) for name in names)
