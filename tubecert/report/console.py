@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.padding import Padding
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 STYLES = {"certified": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
 
-def report(certificate: Mapping[str, Any], *, target: str, verbose: bool) -> list[RenderableType]:
-    """The whole report as renderables; `target` is the file that holds the certificate."""
+def report(
+    certificate: Mapping[str, Any], *, target: str, verbose: bool, pages: Sequence[str] = ()
+) -> list[RenderableType]:
+    """The whole report as renderables; `target` is the file of the certificate, `pages` are those about it."""
     result = certificate["result"]
     parts: list[RenderableType] = [verdict_line(result), _indented(meaning(result))]
     for title, body in sections.of(result, verbose=verbose):
         parts += [Text(), Text(title, style="bold"), *(_indented(item) for item in body)]
-    parts += [Text(), *_closing(certificate, target)]
+    parts += [Text(), *_closing(certificate, target, pages)]
     return parts
 
 
@@ -85,12 +87,17 @@ def _tube_is_known(result: Mapping[str, Any]) -> bool:
     return "rho_r" in result.get("tube", {})
 
 
-def _closing(certificate: Mapping[str, Any], target: str) -> list[RenderableType]:
+def _closing(certificate: Mapping[str, Any], target: str, pages: Sequence[str]) -> list[RenderableType]:
     """Where the certificate is, and how to see again that it is right."""
-    where = Text("certificate ", style="bold", no_wrap=True, overflow="ignore")
-    where.append(target, style="not bold")
     again = "To check it later: the same command gives the same hash on this machine with these versions."
-    return [where, _indented(Text(certificate["hash"], style="dim")), _indented(Text(again, style="dim"))]
+    sealed = [Text(certificate["hash"], style="dim"), Text(again, style="dim")]
+    return [_file("certificate", target), *map(_indented, sealed), *(_file("page", page) for page in pages)]
+
+
+def _file(what: str, path: str) -> Text:
+    """A file that was written; its name is neither wrapped nor cut."""
+    where = Text(f"{what} ", style="bold", no_wrap=True, overflow="ignore")
+    return where.append(path, style="not bold")
 
 
 def _indented(item: RenderableType) -> Padding:

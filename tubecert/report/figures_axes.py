@@ -63,7 +63,7 @@ class Axis:
 
 
 def _steps(low: float, high: float) -> list[float]:
-    raw = (high - low) / 6.5
+    raw = (high - low) / 8
     unit = 10.0 ** math.floor(math.log10(raw))
     step = next(f * unit for f in (1, 2, 5, 10) if f * unit >= raw * 0.999)
     return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]

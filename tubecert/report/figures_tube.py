@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tubecert.report.figures_axes import Axis, Chart, Point
+from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
 from tubecert.report.page import Figure
 from tubecert.report.sections import claim, horizon, point
 
@@ -133,7 +133,8 @@ def _scene(
 ) -> tuple[Chart, list[tuple[str, str]]]:
     """A chart with the safe set, the tube and the plan; and their legend."""
     x, y = plane.axes(marks)
-    chart = Chart(key, f"Plan and tube in the plane of {plane.names[0]} and {plane.names[1]}", x, y)
+    title = f"Plan and tube in the plane of {plane.names[0]} and {plane.names[1]}"
+    chart = Chart(key, title, x, y, height=_height(plane, x, y))
     chart.box((x.low, y.low), (x.high, y.high), "outside")
     chart.box(*plane.safe, "safe")
     legend = [("safe", "safe set")]
@@ -147,6 +148,14 @@ def _scene(
         chart.line(plane.plan, "plan")
         legend.append(("plan", "plan"))
     return chart, legend
+
+
+def _height(plane: Plane, x: Axis, y: Axis) -> int:
+    """The height at which a circle is round, if both states have one unit and neither side gets too short."""
+    if plane.units[0] != plane.units[1]:
+        return HEIGHT
+    height = round((WIDTH - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
+    return min(max(height, 200), 420)
 
 
 def _obstacles(result: Mapping[str, Any], plane: Plane, chart: Chart) -> list[tuple[str, str]]:

@@ -1,0 +1,83 @@
+"""`report`: a certificate in, pages out. Also what `certify --report` checks before it works, and writes after."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Output
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
+
+_HTML, _MARKDOWN = (".html", ".htm"), (".md", ".markdown")
+_REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
+
+
+def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
+    """Write the pages of the certificate in `source`. Raises `TargetError`."""
+    pages = list(targets) if targets else [_beside(source)]
+    check_pages(pages, {"certificate": source})
+    sealed = certificate.load(source)
+    try:
+        texts = {page: _render(page, sealed) for page in pages}
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
+        # with a hash that is right: somebody sealed a result that lacks something, or has it of another kind
+        raise certificate.unreadable(source, f"its result is not complete ({_what(error)})") from error
+    for page, text in texts.items():
+        certificate.write_text(page, text, _REMEDY)
+    if output.json:
+        write_stdout(json.dumps({"pages": pages}, ensure_ascii=False) + "\n")
+    elif not output.quiet:
+        write_stdout("".join(f"page {page}\n" for page in pages))
+
+
+def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:
+    """Raise `TargetError` now for a page that cannot be written, or would take the place of another file.
+
+    `taken` says which files must stay what they are.
+    """
+    kept = {what: path for what, path in taken.items() if path is not None}
+    for page in pages:
+        if Path(page).suffix.lower() not in (*_HTML, *_MARKDOWN):
+            raise _refused(page, "a page is HTML or Markdown", _REMEDY)
+        certificate.check_target(page, _REMEDY)
+        for what, path in kept.items():
+            if Path(path).resolve() == Path(page).resolve() or certificate.same_file(page, path):
+                raise _refused(page, f"it is the {what} itself", "choose another file for the page")
+        kept[f"page {page}"] = page
+
+
+def write_pages(pages: Sequence[str], sealed: Mapping[str, Any]) -> None:
+    """Write the pages of a certificate. Raises `TargetError`."""
+    for page in pages:
+        certificate.write_text(page, _render(page, sealed), _REMEDY)
+
+
+def _render(page: str, sealed: Mapping[str, Any]) -> str:
+    if Path(page).suffix.lower() in _MARKDOWN:
+        from tubecert.report import markdown
+
+        return markdown.render(sealed)
+    from tubecert.report import html
+
+    return html.render(sealed)
+
+
+def _beside(source: str) -> str:
+    """`plant.html` for `plant.certificate.json`, in the same folder."""
+    path = Path(source)
+    name = path.name.removesuffix(".json").removesuffix(".certificate")
+    return str(path.with_name(f"{name or 'certificate'}.html")) if path.name else source
+
+
+def _what(error: BaseException) -> str:
+    words = f"no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
+    return words[:100] or type(error).__name__
+
+
+def _refused(page: str, why: str, remedy: str) -> TargetError:
+    return TargetError([Finding(code="TC120", message=f"cannot write {page}: {why}", help=remedy)])
