@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
@@ -31,12 +33,13 @@ __all__ = ["CODES", "lint", "name_findings"]
 
 def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
     """Every finding; what a file is known to be refuted for (`expect: {verdict: refuted}`) is only a note."""
-    findings = [
-        *name_findings(spec),
-        *plan_findings(spec),
-        *uncertainty_findings(spec, time, effort),
-        *metric_findings(spec),
-    ]
+    with np.errstate(all="ignore"):  # what overflows is not finite, and nothing is said about it
+        findings = [
+            *name_findings(spec),
+            *plan_findings(spec),
+            *uncertainty_findings(spec, time, effort),
+            *metric_findings(spec),
+        ]
     if spec.expect is not None and spec.expect.verdict == "refuted":
         return [replace(item, severity=Severity.NOTE) for item in findings]
     return findings
