@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -43,7 +43,7 @@ class Plane:
         reach = self.rho or 0.0
         shown = [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
         low, high = self.safe[0][i], self.safe[1][i]
-        near = not shown or high - low <= _ZOOM * (max(shown) - min(shown))
+        near = not self.plan or high - low <= _ZOOM * (max(shown) - min(shown))
         label = f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
         return Axis.around([*shown, low, high] if near else shown, label, pad=0.06 if near else 0.25)
 
@@ -190,7 +190,7 @@ def suprema_figures(result: Mapping[str, Any]) -> list[Figure]:
         if not plane.plan:
             continue
         key = f"suprema-{plane.index[0]}-{plane.index[1]}"
-        chart, _ = _scene(key, plane, [plane.of(x) for x in symbols])
+        chart, _ = _scene(key, replace(plane, sides=None), [plane.of(x) for x in symbols])
         for place, found in _close(chart, plane, list(symbols)).items():
             words = "; ".join(f"{numbers[x]}: {', '.join(symbols[x])}" for x in found)
             chart.dot(place, "numbered", 8, words)

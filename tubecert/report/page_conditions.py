@@ -64,7 +64,11 @@ def _row(title: str, name: str, margin: Sequence[float | None] | None) -> tuple[
         Cell(text=title),
         Cell(text=f"({name})" if name.startswith("26") else name),
         Cell(text=said.removeprefix(f"({name}): ")),
-        Cell(text=_percent(low, down), kind="number", share=None if low is None else min(max(low, 0.0), 1.0)),
+        Cell(
+            text=_percent(low, down),
+            kind="number",
+            share=min(low, 1.0) if low is not None and low > 0 else None,
+        ),
         Cell(text=_percent(high, up), kind="number"),
     )
 

@@ -34,7 +34,8 @@ def _facts(result: Mapping[str, Any], effective: Mapping[str, Any]) -> Iterator[
         yield "parameters", Cell(text=_list(parameters))
     if units := model.get("units"):
         yield "units", Cell(text=", ".join(f"{name}: {unit}" for name, unit in units.items()))
-    box = (f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in result["safe_set"].items())
+    safe = result["safe_set"]
+    box = (f"{name} in [{exact(safe[name][0])}, {exact(safe[name][1])}]" for name in model["states"])
     yield "safe set", Cell(text=", ".join(box))
     if bounds := effective.get("uncertainty", {}).get("bounds"):
         yield "bounds declared", Cell(text=_list(bounds))

@@ -6,9 +6,11 @@ bounds from below rounded down.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
@@ -38,7 +40,8 @@ _TUBE = (
 
 
 def page_of(certificate: Mapping[str, Any]) -> Page:
-    """The page of a certificate, whatever its verdict."""
+    """The page of a certificate, whatever its verdict; the same before it is written and after it is read back."""
+    certificate = json.loads(json.dumps(certificate, sort_keys=True))
     result = certificate["result"]
     line = console.verdict_line(result).plain
     return Page(
@@ -72,7 +75,8 @@ def _sections(certificate: Mapping[str, Any]) -> Iterator[Section]:
         yield Section(key="why", title="Not certified", blocks=reasons)
     if any(name in result for name in NAMES):
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
-    yield Section(key="tube", title="Tube", blocks=tuple(_tube(result)))
+    if blocks := tuple(_tube(result)):
+        yield Section(key="tube", title="Tube" if "tube" in result else "Safe set", blocks=blocks)
     if any(name in result for name in NAMES):
         yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
@@ -143,8 +147,6 @@ def _tube(result: Mapping[str, Any]) -> Iterator[Block]:
         yield Figures(figures=figures)
         if "half_widths" in result.get("tube", {}):
             yield Words(text=_TUBE)
-    if not figures and "tube" not in result:
-        yield Words(text="The radius of the tube was not reached.")
 
 
 def _radii(result: Mapping[str, Any]) -> Iterator[tuple[str, Cell]]:
@@ -154,9 +156,10 @@ def _radii(result: Mapping[str, Any]) -> Iterator[tuple[str, Cell]]:
         rho += f" = {up(tube['rho_r'])} (rho_r) + {up(tube['rho_a'])} (rho_a)"
     yield "radius rho", Cell(text=rho)
     yield "epsilon", Cell(text=short(tube["epsilon"]))
-    units = result["spec"]["effective"]["system"].get("units", {})
+    system = result["spec"]["effective"]["system"]
+    units = system.get("units", {})
     if widths := tube.get("half_widths"):
-        sides = (f"{name} {up(width)} {units.get(name, '')}".strip() for name, width in widths.items())
+        sides = (f"{name} {up(widths[name])} {units.get(name, '')}".strip() for name in system["states"])
         yield "half-widths", Cell(text=", ".join(sides))
     yield "claimed", Cell(text=sections.span(result))
     if sections.horizon(result) is None:
@@ -196,14 +199,24 @@ def _metric(metric: Mapping[str, Any]) -> Iterator[Block]:
 def _constants(result: Mapping[str, Any]) -> Iterator[Block]:
     figures = tuple(suprema_figures(result))
     if figures:
-        yield Words(text="Where on the tube each constant was found largest (or smallest):")
+        yield Words(
+            text="Where in the tube, with all of its radius, each constant was found largest or smallest:"
+        )
         yield Figures(figures=figures, places=places(result))
     yield Table(
         columns=("symbol", "meaning", "proven", "unit", "equation", "gap"),
-        rows=tuple(_constant(result, name, item) for name, item in result["constants"].items()),
+        rows=tuple(
+            _constant(result, name, result["constants"][name]) for name in _order(result["constants"])
+        ),
         note="The proven side is the one that the conditions use. The gap is how far both proven sides are apart. "
         "In units, x and u stand for the units of states and inputs, d for Riemannian distance.",
     )
+
+
+def _order(constants: Mapping[str, Any]) -> list[str]:
+    """The constants of the paper first, then what follows from them, each in the order of its table."""
+    known = {name: i for i, name in enumerate([*TABLE, *DERIVED])}
+    return sorted(constants, key=lambda name: (known.get(name, len(known)), name))
 
 
 def _constant(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) -> tuple[Cell, ...]:
