@@ -109,6 +109,10 @@ class Numbers:
             return None
         return int(value)
 
+    def whole(self, option: str, text: str | None) -> int | None:
+        """A whole number, 0 or more; None if the option is absent or wrong."""
+        return 0 if text is not None and text.strip() == "0" else self.count(option, text)
+
     def check(self) -> None:
         """Raises `SpecError` with every problem met so far."""
         if self.findings:

@@ -21,7 +21,7 @@ from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
 
 SPECIFIED: Final = "of the specification"
-RANDOM: Final = "random, seed {seed}, run 0"
+RANDOM: Final = "of random run {run}, seed {seed}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,19 +105,28 @@ def _exits(found: Comparison) -> int:
 
 
 def simulate(
-    setting: Setting, loops: Sequence[Loop], *, count: int, seed: int, report: Report | None = None
+    setting: Setting,
+    loops: Sequence[Loop],
+    *,
+    count: int,
+    seed: int,
+    replay: int | None = None,
+    report: Report | None = None,
 ) -> Campaign:
     """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
 
-    Raises `TubecertError` if the uncertainty leaves its class while the state is in the tube.
+    The loops are drawn under the specification's h, or as random run `replay`. Raises `TubecertError` if the
+    specification's h leaves its class while the state is in the tube.
     """
-    h, words = _uncertainty(setting, seed)
+    if setting.h is None and replay is None:
+        replay = 0
+    start, h, words = _uncertainty(setting, seed, replay)
     drawn = []
     for loop in loops:
         if report is not None:
             report(f"{loop.controller}, {words}", 0, 1)
-        drawn.append(_drawn(setting, loop, h))
-    if setting.h is not None:
+        drawn.append(_drawn(setting, loop, start, h))
+    if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
             check_class(setting, item.runs, setting.h, where)
@@ -142,16 +151,17 @@ def simulate(
     )
 
 
-def _uncertainty(setting: Setting, seed: int) -> tuple[Disturbance, str]:
-    """The h that is drawn: the specification's own, or where there is none a random member of the class."""
-    if setting.h is not None:
-        return Disturbance.from_expressions(setting.h, setting.model, 1), SPECIFIED
-    return disturbance_of(setting, [case(setting, seed, 0)]), RANDOM.format(seed=seed)
+def _uncertainty(setting: Setting, seed: int, replay: int | None) -> tuple[Array, Disturbance, str]:
+    """Start (n,) and h of the runs that are drawn: the specification's own, or those of a random run."""
+    if replay is not None:
+        found = case(setting, seed, replay)
+        return found.start, disturbance_of(setting, [found]), RANDOM.format(run=replay, seed=seed)
+    start = _surface(setting) if setting.within else setting.x0
+    return start, Disturbance.from_expressions(setting.h, setting.model, 1), SPECIFIED
 
 
-def _drawn(setting: Setting, loop: Loop, h: Disturbance) -> Drawn:
-    start = setting.x0[None] if not setting.within else _surface(setting)[None]
-    runs = integrate(loop.problem, start, h, tolerance=setting.tolerance)
+def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
+    runs = integrate(loop.problem, start[None], h, tolerance=setting.tolerance)
     return Drawn(
         loop=loop,
         runs=runs,

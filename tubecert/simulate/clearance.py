@@ -60,7 +60,7 @@ def signed_distance(obstacle: Obstacle, points: Array) -> Array:
         return np.asarray(np.linalg.norm(points - centre, axis=-1) - float(obstacle.radius))
     corners = corners_of(obstacle)
     nearest = np.min(np.stack([_to_segment(points, *edge) for edge in _edges(corners)]), axis=0)
-    return np.where(_inside(corners, points), -nearest, nearest)
+    return np.asarray(np.where(_inside(corners, points), -nearest, nearest))
 
 
 def corners_of(obstacle: Obstacle) -> Array:

@@ -42,14 +42,13 @@ def corners(problem: LoopProblem) -> tuple[Array, Array]:
 
 
 def _kinks(knots: Knots | None) -> Array:
-    """Times at which u* jumps or has a corner."""
+    """Times that no step may straddle: the ends of pieces on which u* is held, the corners of a linear u*."""
     if knots is None:
         return np.zeros(0)
     values = knots.u
     if knots.interpolation == "hold":
-        return np.array(
-            [float(t) for t, a, b in zip(knots.t[1:], values, values[1:], strict=False) if a != b]
-        )
+        # also where u* does not jump: a step is evaluated on one piece of the plan
+        return np.array([float(t) for t in knots.t[1:]])
     slopes = [
         tuple((p - q) / (s - t) for p, q in zip(a, b, strict=True))
         for a, b, s, t in zip(values[1:], values, knots.t[1:], knots.t, strict=False)

@@ -1,0 +1,207 @@
+"""`simulate`: a specification and its certificate in; runs, figures and what they falsify out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Numbers, Output
+from tubecert.cli.version import versions
+from tubecert.errors import ExitCode, SpecError
+from tubecert.expression import suggestion
+from tubecert.findings import Finding
+from tubecert.report.terminal import Terminal
+
+if TYPE_CHECKING:
+    from tubecert.simulate.campaign import Campaign
+    from tubecert.simulate.problem import Controller
+    from tubecert.spec import Spec
+
+_POSITIVE: Final = (
+    "epsilon",
+    "rho_a",
+    "duration",
+    "control_rate",
+    "bandwidth",
+    "adaptation_rate",
+    "sample_time",
+)
+_CODES: Final = {
+    "falsified": ExitCode.NOT_CERTIFIED,
+    "tube left": ExitCode.NOT_CERTIFIED,
+    "no result": ExitCode.UNDECIDED,
+    "interrupted": ExitCode.INTERRUPTED,
+}
+RUNS: Final = 100
+SEED: Final = 0
+
+Step = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What the command line says, then the specification's section `simulation`, then defaults."""
+
+    controllers: tuple[str, ...]
+    gains: str
+    runs: int
+    seed: int
+    replay: int | None
+    numbers: Mapping[str, Fraction | None]
+
+
+def run(given: Mapping[str, Any], output: Output) -> ExitCode:
+    """Simulate; `given` holds the options by the names of their parameters."""
+    numbers = _numbers(given)
+    chosen = _controllers(given["controllers"])
+    from tubecert import spec
+
+    system = spec.load(given["spec"])
+    wishes = _wishes(given, numbers, chosen, system)
+    folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
+    from tubecert.simulate.output import check_folder, write
+    from tubecert.simulate.summary import outcome, summary
+
+    check_folder(folder)
+    terminal = Terminal.stderr(color=output.color)
+    with _progress(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        system, sealed = _certificate(given, system, wishes, folder, report)
+        campaign = _campaign(system, sealed, wishes, report)
+        if report is not None:
+            report("figures and data", 0, 1)
+        files = write(folder, campaign, certificate=sealed["hash"])
+    _report(summary(campaign, sealed["hash"]), folder, len(files), output)
+    return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
+
+
+def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
+    numbers = Numbers()
+    values: dict[str, Any] = {name: numbers.positive(_flag(name), given[name]) for name in _POSITIVE}
+    values |= {name: numbers.whole(_flag(name), given[name]) for name in ("runs", "seed", "replay")}
+    numbers.check()
+    return values
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _controllers(text: str | None) -> tuple[str, ...]:
+    """The loops that are asked for; raises `SpecError` for a name that is none."""
+    from tubecert.spec.simulation import CONTROLLERS
+
+    words = tuple(dict.fromkeys(word.strip() for word in (text or "").split(",") if word.strip()))
+    for word in words:
+        if word not in CONTROLLERS:
+            help = suggestion(word, CONTROLLERS, what="controllers")
+            message = f"--controllers: {word[:40]!r} is no controller"
+            raise SpecError([Finding(code="TC112", message=message, help=help)])
+    return words
+
+
+def _wishes(
+    given: Mapping[str, Any], numbers: Mapping[str, Any], chosen: tuple[str, ...], system: Spec
+) -> Wishes:
+    from tubecert.spec import Simulation
+
+    default = system.simulation or Simulation()
+    gains = (given["gains"] and str(given["gains"])) or default.gains or "distance"
+    adaptive = "sampled" if gains == "sampled" else "l1"
+    values = dict(numbers)
+    if values["control_rate"] is None:
+        values["control_rate"] = default.control_rate
+
+    def first(name: str, otherwise: int) -> int:
+        own = numbers[name]
+        wanted = getattr(default, name) if own is None else own
+        return otherwise if wanted is None else int(wanted)
+
+    return Wishes(
+        controllers=chosen or default.controllers or ("ccm", adaptive),
+        gains=gains,
+        runs=first("runs", RUNS),
+        seed=first("seed", SEED),
+        replay=numbers["replay"],
+        numbers=values,
+    )
+
+
+@contextmanager
+def _progress(terminal: Terminal, *, wanted: bool) -> Iterator[Step | None]:
+    """A callback that takes what is done, how many, of how many."""
+    from tubecert.pipeline import Step as Shown
+    from tubecert.report import progress
+
+    with progress.shown(terminal, wanted=wanted) as show:
+        if show is None:
+            yield None
+        else:
+            yield lambda name, done, total: show(Shown(name=name, boxes=done, unit=f"of {total}"))
+
+
+def _certificate(
+    given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Step | None
+) -> tuple[Spec, dict[str, Any]]:
+    """The specification as it was certified, and its certificate: the one that is given, or a new one."""
+    from tubecert.simulate.certified import adopted, read_certificate, require_tube
+
+    if given["certificate"] is not None:
+        sealed = read_certificate(str(given["certificate"]))
+        system = adopted(system, sealed["result"])
+        require_tube(sealed["result"])
+        return system, sealed
+    from tubecert import pipeline
+
+    options = pipeline.Options(epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"])
+    _tell("no certificate is given: certifying first")
+    show = report and (lambda step: report(f"certifying: {step.name}", step.boxes, step.boxes))
+    result = pipeline.certify(system, options, show)
+    sealed = certificate.seal(result, {"command": "simulate", "versions": versions()})
+    certificate.write(str(Path(folder) / "certificate.json"), sealed)
+    require_tube(result)
+    return pipeline.overridden(system, options), sealed
+
+
+def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: Step | None) -> Campaign:
+    from tubecert.simulate.campaign import simulate
+    from tubecert.simulate.setting import Choice, loop_of, setting_of
+
+    numbers = wishes.numbers
+    setting = setting_of(system, sealed["result"], numbers["duration"])
+    gains = {name: numbers[name] for name in ("bandwidth", "adaptation_rate", "sample_time")}
+    choice = Choice(source=wishes.gains, **gains)
+    rate = numbers["control_rate"]
+    loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in wishes.controllers]
+    return simulate(setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report)
+
+
+def _report(data: Mapping[str, Any], folder: str, files: int, output: Output) -> None:
+    """The report on stdout, or the summary as JSON, with the verdict line on stderr."""
+    from tubecert.report import simulation
+
+    terminal = (Terminal.stderr if output.json else Terminal.stdout)(color=output.color)
+    if output.json:
+        import json
+
+        write_stdout(json.dumps(data, indent=1, sort_keys=True, allow_nan=False) + "\n")
+        if not output.quiet:
+            terminal.show(simulation.verdict_line(data))
+    elif output.quiet:
+        write_stdout(terminal.text(simulation.verdict_line(data)))
+    else:
+        write_stdout(
+            terminal.text(simulation.report(data, folder=folder, files=files, verbose=output.verbose))
+        )
+
+
+def _tell(line: str) -> None:
+    if sys.stderr is not None:
+        print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,114 @@
+"""The command `simulate`: its options. `register` adds it to the app."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import guarded
+from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+
+_AFTER = """\b
+Examples:
+  tubecert simulate plant.yaml
+  tubecert simulate plant.yaml --certificate plant.certificate.json --runs 1000 -o plant.runs
+  tubecert simulate plant.yaml --controllers ccm,l1,sampled --control-rate 500
+  tubecert simulate plant.yaml --bandwidth 20 --adaptation-rate 1e5
+
+\b
+Exit codes: 0 nothing was falsified (which proves nothing); 1 a promise is broken, or a loop that adapts
+left the tube; 2 invalid input; 4 no result, or no tube to leave; 130 interrupted, what was finished is kept.
+"""
+
+
+class Source(StrEnum):
+    """Whose gains."""
+
+    PAPER = "26"
+    DISTANCE = "distance"
+    SAMPLED = "sampled"
+
+
+def _number(flag: str, help: str) -> object:
+    return typer.Option(flag, metavar="NUMBER", help=help)
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the app."""
+    app.command(epilog=_AFTER, short_help="Integrate the closed loops, try to break the certificate.")(
+        simulate
+    )
+
+
+def simulate(
+    context: typer.Context,
+    spec: Annotated[
+        str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
+    ],
+    *,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Its certificate; without one, simulate certifies first."),
+    ] = None,
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Loops, separated by commas: nominal, ccm, reference, l1, sampled.  [ccm,l1]",
+        ),
+    ] = None,
+    gains: Annotated[
+        Source | None,
+        typer.Option(help="The certificate whose gains are taken.  [distance]", show_default=False),
+    ] = None,
+    runs: Annotated[
+        str | None, _number("--runs", "Random runs against each loop that adapts; 0: no attacks.  [100]")
+    ] = None,
+    seed: Annotated[
+        str | None, _number("--seed", "Seed of the random runs and of the adversary.  [0]")
+    ] = None,
+    replay: Annotated[
+        str | None, _number("--replay", "Draw this random run in place of the specification's h.")
+    ] = None,
+    duration: Annotated[
+        str | None, _number("--duration", "How long, in s.  [the horizon, else 10/rate]")
+    ] = None,
+    control_rate: Annotated[
+        str | None, _number("--control-rate", "Hold the whole controller at this rate, in Hz.")
+    ] = None,
+    bandwidth: Annotated[str | None, _number("--bandwidth", "Choose the filter bandwidth, in rad/s.")] = None,
+    adaptation_rate: Annotated[
+        str | None, _number("--adaptation-rate", "Choose the adaptation rate of l1.")
+    ] = None,
+    sample_time: Annotated[
+        str | None, _number("--sample-time", "Choose the sample time of sampled, in s.")
+    ] = None,
+    epsilon: Annotated[
+        str | None, _number("--epsilon", "Overrides tube.epsilon (without --certificate).")
+    ] = None,
+    rho_a: Annotated[str | None, _number("--rho-a", "Overrides tube.rho_a (without --certificate).")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Data and figures.  [SPEC's stem.simulation]"),
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Integrate the closed loops, attack the tube, draw figures. It can falsify a certificate, never support one."""
+    given = dict(locals())
+    how = Output.of(context, given)
+    if certificate is not None and (epsilon is not None or rho_a is not None):
+        raise typer.BadParameter("a certificate has its own epsilon and rho_a", ctx=context)
+    with guarded(how):
+        from tubecert.cli.simulate import run
+
+        code = run(given, how)
+    raise typer.Exit(code)

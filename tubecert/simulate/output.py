@@ -1,0 +1,173 @@
+"""A campaign as files: data (NPZ, CSV), summary (JSON) and figures. The same campaign gives the same bytes."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
+from tubecert.simulate.campaign import Attack, Campaign, Drawn
+from tubecert.simulate.runs import Runs
+from tubecert.simulate.summary import summary
+
+SUMMARY: Final = "summary.json"
+
+
+def check_folder(folder: str) -> None:
+    """Makes the folder and tries to write to it, before any work is done; raises `TargetError`."""
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from None
+
+
+def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
+    """Writes every file, the summary last; returns their names. Raises `TargetError`."""
+    written = []
+    try:
+        for name, data in _files(campaign, certificate):
+            _replace(Path(folder) / name, data)
+            written.append(name)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    return written
+
+
+def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
+    from tubecert.simulate.figures import figures
+
+    yield "runs.npz", _npz(_arrays(campaign))
+    for item in campaign.drawn:
+        yield f"{item.loop.controller}.csv", _table(*_drawn_table(campaign, item))
+    for attack in campaign.attacks:
+        if attack.sample is not None:
+            yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
+    yield from figures(campaign)
+    text = json.dumps(summary(campaign, certificate), indent=1, sort_keys=True, allow_nan=False)
+    yield SUMMARY, (text + "\n").encode()
+
+
+def _arrays(campaign: Campaign) -> dict[str, Array]:
+    """Everything that was drawn and sampled, by `<controller>_<what>`."""
+    arrays: dict[str, Array] = {}
+    for item in campaign.drawn:
+        arrays |= _named(item.loop.controller, item.runs)
+    for attack in campaign.attacks:
+        prefix = attack.loop.controller
+        if attack.worst is not None:
+            arrays |= _named(f"{prefix}_adversary", attack.worst)
+        if attack.sample is not None:
+            runs = attack.sample.runs
+            arrays |= {
+                f"{prefix}_sample_t": runs.t,
+                f"{prefix}_sample_distance": runs.distance,
+                f"{prefix}_sample_x": runs.x,
+                f"{prefix}_sample_error": runs.error,
+                f"{prefix}_sample_start": np.array([case.start for case in attack.sample.cases]),
+            }
+    return arrays
+
+
+def _named(prefix: str, runs: Runs) -> dict[str, Array]:
+    shared = {"t": runs.t, "x_plan": runs.x_plan, "u_plan": runs.u_plan}
+    own = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")
+    return {f"{prefix}_{name}": value for name, value in shared.items()} | {
+        f"{prefix}_{name}": getattr(runs, name)[0] for name in own
+    }
+
+
+def _npz(arrays: dict[str, Array]) -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    return buffer.getvalue()
+
+
+def _drawn_table(campaign: Campaign, item: Drawn) -> tuple[list[str], Array]:
+    """One row for each output time."""
+    spec, runs = campaign.setting.spec, item.runs
+    groups = {
+        "": (spec.states, runs.x[0]),
+        "plan ": (spec.states, runs.x_plan),
+        " ": (spec.inputs, runs.u[0]),
+        "plan  ": (spec.inputs, runs.u_plan),
+        "k ": (spec.inputs, runs.k[0]),
+        "u_a ": (spec.inputs, runs.u_a[0]),
+        "h ": (spec.inputs, runs.h[0]),
+    }
+    header = [
+        "t",
+        *(f"{prefix.strip()}_{name}".lstrip("_") for prefix, (names, _) in groups.items() for name in names),
+    ]
+    columns = [runs.t[:, None], *(values for _, values in groups.values()), runs.distance[0][:, None]]
+    return [*header, "distance"], np.hstack(columns)
+
+
+def _sample_table(campaign: Campaign, attack: Attack) -> tuple[list[str], Array]:
+    """One row for each run: what it used of the tube, and when."""
+    assert attack.sample is not None
+    runs, setting = attack.sample.runs, campaign.setting
+    worst = runs.worst
+    columns = {
+        "run": np.arange(runs.lanes),
+        "distance_over_dbar": worst.distance.value / setting.reach,
+        "t_distance": worst.distance.time,
+        "deviation_over_rho": worst.deviation.value / setting.rho,
+        "u": worst.u.value,
+        "k": worst.k.value,
+        "xtilde": worst.xtilde.value,
+        "sigma_error": worst.sigma_error.value,
+        "h": worst.h.value,
+        "error_over_rho": runs.error / setting.rho,
+    }
+    return list(columns), np.stack(list(columns.values()), axis=1)
+
+
+def _table(header: list[str], rows: Array) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_cell(value) for value in row] for row in rows.tolist())
+    return text.getvalue().encode()
+
+
+def _cell(value: float) -> str:
+    if not math.isfinite(value):
+        return ""
+    return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else f"{value:.9g}"
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Writes to a temporary name and renames: an interruption leaves no half file."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(temporary).unlink()
+        raise
+
+
+def _unwritable(folder: str, error: Any) -> TargetError:
+    why = (getattr(error, "strerror", None) or str(error)).lower()
+    message = f"cannot write to the folder {folder}: {why}"
+    return TargetError([Finding(code="TC120", message=message, help="choose another folder with -o FOLDER")])
