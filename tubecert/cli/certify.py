@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -56,8 +56,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
     if not place.is_stdout:
         certificate.write(place.target, sealed)
+    metric = _kept_metric(result, place)
     write_pages(pages, sealed)
-    _report(sealed, place, pages, output)
+    _report(sealed, place, {"metric": metric, "pages": pages}, output)
     return certificate.exit_code(result)
 
 
@@ -104,6 +105,19 @@ def _pages(given: Mapping[str, Any], place: Place) -> list[str]:
     return pages
 
 
+def _kept_metric(result: Mapping[str, Any], place: Place) -> str | None:
+    """The file beside the certificate in which a synthesised metric was kept, None if there is none."""
+    if place.is_stdout or "synthesis" not in result or result.get("metric", {}).get("verdict") != "certified":
+        return None
+    from tubecert.pipeline import metric_file
+
+    name = Path(place.target).name.removesuffix(".json").removesuffix(".certificate")
+    target = str(Path(place.target).with_name(f"{name}.metric.json"))
+    content = metric_file(result["safe_set"], result["metric"], result["synthesis"]["solver"])
+    certificate.write(target, content)
+    return target
+
+
 def _record(started: datetime, seconds: float) -> dict[str, Any]:
     """How the certificate was made; no part of what is hashed."""
     return {
@@ -114,7 +128,7 @@ def _record(started: datetime, seconds: float) -> dict[str, Any]:
     }
 
 
-def _report(sealed: Mapping[str, Any], place: Place, pages: Sequence[str], output: Output) -> None:
+def _report(sealed: Mapping[str, Any], place: Place, files: Mapping[str, Any], output: Output) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
@@ -129,5 +143,5 @@ def _report(sealed: Mapping[str, Any], place: Place, pages: Sequence[str], outpu
         text = terminal.text(console.verdict_line(sealed["result"]))
     else:
         verbose = output.verbose
-        text = terminal.text(console.report(sealed, target=place.target, verbose=verbose, pages=pages))
+        text = terminal.text(console.report(sealed, target=place.target, verbose=verbose, **files))
     write_stdout(text)

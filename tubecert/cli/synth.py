@@ -43,8 +43,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert import pipeline
     from tubecert.report import progress
 
-    radii = {name: values[name] for name in ("rho_a", "epsilon") if values[name] is not None}
-    options = pipeline.Options(**radii, **({} if budget is None else {"budget": budget}))
+    options = pipeline.Options(rho_a=values["rho_a"], epsilon=values["epsilon"])
+    if budget is not None:
+        options = replace(options, budget=budget)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         found = pipeline.synthesise(

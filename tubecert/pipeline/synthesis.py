@@ -19,7 +19,7 @@ from tubecert.certificate.sections import decimal_data, metric_data
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
-from tubecert.metric.synthesis.diagnose import uncontrollable_mode
+from tubecert.metric.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.metric.synthesis.family import suggested
 from tubecert.metric.synthesis.ladder import Ladder, Request, digits_below
 from tubecert.metric.synthesis.problem import Floor
@@ -74,6 +74,9 @@ class SynthesisRun:
             return self._failed(
                 "B could not be proven to have full rank on the safe set", "shrink the safe set"
             )
+        if (mode := self._excluding_mode()) is not None:
+            lower = f"ask for a rate below {mode.bound:.6g}"
+            return self._failed(mode.words(self.spec.states), lower, verdict="refuted")
         try:
             best = self._best()
         except ValueError as error:  # what C3 forbids
@@ -224,13 +227,9 @@ class SynthesisRun:
         )
 
     def _explained(self) -> Synthesised:
-        """Why there is no metric: a mode that excludes the rate, the condition number, the degree, the box."""
+        """Why there is no metric, where no mode excludes the rate: the condition number, the degree, the rate, the box."""
         rate = self.wanted.rate
         if rate is not None:
-            mode = uncontrollable_mode(self.model, self._equilibria(), rate)
-            if mode is not None:
-                lower = f"ask for a rate below {mode.bound:.6g}"
-                return self._failed(mode.words(self.spec.states), lower, verdict="refuted")
             found = self.ladder.metric(rate)
             if found is not None:
                 number = found.condition_number.above
@@ -239,6 +238,11 @@ class SynthesisRun:
                     f"raise condition_number to {number:.4g}, or lower the rate",
                 )
         return self._failed(f"no metric was found{self._tried()}", self._remedies(rate))
+
+    def _excluding_mode(self) -> UncontrollableMode | None:
+        """The mode that excludes the rate, if one is asked for."""
+        rate = self.wanted.rate
+        return None if rate is None else uncontrollable_mode(self.model, self._equilibria(), rate)
 
     def _tried(self) -> str:
         attempts = self.ladder.attempts

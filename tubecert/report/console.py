@@ -19,14 +19,24 @@ STYLES = {"certified": "bold green", "refuted": "bold red", "undecided": "bold y
 
 
 def report(
-    certificate: Mapping[str, Any], *, target: str, verbose: bool, pages: Sequence[str] = ()
+    certificate: Mapping[str, Any],
+    *,
+    target: str,
+    verbose: bool,
+    pages: Sequence[str] = (),
+    metric: str | None = None,
 ) -> list[RenderableType]:
-    """The whole report as renderables; `target` is the file of the certificate, `pages` are those about it."""
+    """The whole report as renderables.
+
+    `target` is the file of the certificate, `pages` are those about it, `metric` that of a metric found for it.
+    """
     result = certificate["result"]
     parts: list[RenderableType] = [verdict_line(result), _indented(meaning(result))]
     for title, body in sections.of(result, verbose=verbose):
         parts += [Text(), Text(title, style="bold"), *(_indented(item) for item in body)]
     parts += [Text(), *_closing(certificate, target, pages)]
+    if metric is not None:
+        parts.append(_file("metric found for it", metric))
     return parts
 
 

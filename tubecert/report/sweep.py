@@ -26,7 +26,7 @@ def draw(rows: Sequence[Mapping[str, Any]]) -> str:
     panels = [(key, label) for key, label in _PANELS if any(row.get(key) is not None for row in rows)]
     with mpl.rc_context({"svg.hashsalt": "tubecert", "svg.fonttype": "none", "font.size": 9}):
         figure = Figure(figsize=(5.5, 0.6 + 2.0 * len(panels)), layout="constrained")
-        FigureCanvasSVG(figure)  # type: ignore[no-untyped-call]
+        FigureCanvasSVG(figure)
         for index, (key, label) in enumerate(panels, start=1):
             axes = figure.add_subplot(len(panels), 1, index)
             for floor, (words, color, marker) in _FLOORS.items():

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import floor, isfinite, log10, sqrt
+from math import floor, inf, isfinite, log10, sqrt
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.metric.synthesis.family import MetricFamily, metric_family, suggested
@@ -22,6 +22,7 @@ _DEGREES = (0, 1, 2, 3, 4)
 _BACK_OFF = (1e-3, 1e-4, 1e-5)  # relative to the rate: what the proof may need
 _RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again with so much more
 _LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
+_PAYS = 0.9  # a higher degree must lower the condition number to this share
 _SHARP = 1.01  # a searched rate is settled to this factor
 
 Route = Callable[[SynthesisProblem], Proposal]
@@ -68,15 +69,18 @@ class Ladder:
         self.request = request
         self.attempts: list[Attempt] = []
         self._families: dict[int, MetricFamily] = {}
-        self._found: dict[tuple[Fraction, Floor], VerifiedMetric | None] = {}
+        self._found: dict[tuple[Fraction, Floor, float], VerifiedMetric | None] = {}
         self._least_degree = 0  # below it nothing worked at a rate that was asked for before
         self._hardest: float = 0.0
 
-    def metric(self, rate: Fraction, floor: Floor = "identity") -> VerifiedMetric | None:
-        """A proven metric at a rate, of nearly the least condition number (or input gain); None if none was found."""
-        key = rate, floor
+    def metric(self, rate: Fraction, floor: Floor = "identity", enough: float = 0.0) -> VerifiedMetric | None:
+        """A proven metric at a rate, of nearly the least condition number (or input gain); None if none was found.
+
+        The degree is raised as long as that pays, or until the condition number is `enough`.
+        """
+        key = rate, floor, enough
         if key not in self._found:
-            self._found[key] = self._searched(rate, floor)
+            self._found[key] = self._searched(rate, floor, enough)
         return self._found[key]
 
     def largest_rate(self, limit: float | None, least: Fraction | None = None) -> VerifiedMetric | None:
@@ -106,7 +110,7 @@ class Ladder:
         for _ in range(6):
             factor = 0.5 * (low + high)
             inner = Ladder(replace(self.request, safe_set=shrunk(self.request.safe_set, Fraction(factor))))
-            found = inner.metric(rate)
+            found = inner.metric(rate, enough=inf)
             if found:
                 low, works = factor, (factor, found)
             else:
@@ -127,19 +131,29 @@ class Ladder:
         return None
 
     def _within(self, rate: Fraction, limit: float | None) -> VerifiedMetric | None:
-        found = self.metric(rate)
+        found = self.metric(rate, enough=inf if limit is None else limit)
         if found is None or (limit is not None and found.condition_number.above > limit):
             return None
         return found
 
-    def _searched(self, rate: Fraction, floor: Floor) -> VerifiedMetric | None:
+    def _searched(self, rate: Fraction, floor: Floor, enough: float) -> VerifiedMetric | None:
+        best: VerifiedMetric | None = None
         for degree in self._degrees(rate):
-            for name, route in self.request.routes:
-                found = self._route(rate, floor, degree, name, route)
-                if found is not None:
-                    if rate >= self._hardest:
-                        self._least_degree, self._hardest = degree, float(rate)
-                    return found
+            found = self._at_degree(rate, floor, degree)
+            if best is None and found is not None and rate >= self._hardest:
+                self._least_degree, self._hardest = degree, float(rate)
+            if best is not None and (found is None or _kappa(found) > _PAYS * _kappa(best)):
+                return best if found is None else min(best, found, key=_kappa)
+            best = found
+            if found is not None and _kappa(found) <= enough:
+                return found
+        return best
+
+    def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
+        for name, route in self.request.routes:
+            found = self._route(rate, floor, degree, name, route)
+            if found is not None:
+                return found
         return None
 
     def _degrees(self, rate: Fraction) -> Iterator[int]:
@@ -216,6 +230,11 @@ class Ladder:
             number = attempt.condition_number
             words = attempt.outcome if number is None else f"proven, condition number {number:.4g}"
             self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+
+
+def _kappa(metric: VerifiedMetric) -> float:
+    """What a problem minimises, as it came out."""
+    return metric.condition_number.above if metric.floor == "identity" else metric.proposal.kappa
 
 
 def _guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:

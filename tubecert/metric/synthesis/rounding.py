@@ -17,7 +17,7 @@ from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.synthesis.family import MetricFamily
-from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
+from tubecert.metric.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import ControlAffineModel
 
@@ -35,6 +35,7 @@ class VerifiedMetric:
     """
 
     rate: Fraction
+    floor: Floor
     dual_metric: Matrix = field(repr=False)
     proof: MetricProof = field(repr=False)
     condition_number: Constant
@@ -109,6 +110,7 @@ def _proven(
         return Rejected(reason=f"{proposal.route}: the condition number could not be bounded")
     return VerifiedMetric(
         rate=rate,
+        floor=problem.floor,
         dual_metric=dual,
         proof=proof,
         condition_number=condition,
