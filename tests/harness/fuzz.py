@@ -31,6 +31,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))  # the checkout that this file is a part of
 CORPUS = sorted(
     path
     for folder in ("configs", "tests/specs/ok", "tests/specs/bad", "tubecert/templates")
@@ -483,9 +484,12 @@ class Report:
         ]
         lines[0] += f"; largest worker {self.peak:.0f} MB"
         lines += [f"  {count:7d}  {said}" for said, count in self.outcomes.most_common()]
-        return "\n".join(
-            [*lines, *(f"case {number_}: {said}" for number_, said in sorted(self.failures)[:50])]
-        )
+        kinds: dict[str, list[int]] = {}
+        for number_, said in sorted(self.failures):
+            kinds.setdefault(said, []).append(number_)
+        for said, numbers in sorted(kinds.items(), key=lambda item: -len(item[1]))[:40]:
+            lines.append(f"{said}: cases {numbers[:5]}{'...' if len(numbers) > 5 else ''} ({len(numbers)})")
+        return "\n".join(lines)
 
 
 def chunks(first: int, cases: int, size: int) -> Iterator[tuple[int, int]]:
