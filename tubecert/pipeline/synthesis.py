@@ -227,7 +227,7 @@ class SynthesisRun:
         )
 
     def _explained(self) -> Synthesised:
-        """Why there is no metric, where no mode excludes the rate: the condition number, the degree, the rate, the box."""
+        """Why there is no metric, where no mode excludes the rate: condition number, degree, rate, box."""
         rate = self.wanted.rate
         if rate is not None:
             found = self.ladder.metric(rate)

@@ -41,20 +41,18 @@ def report(
     if rows := data.get("table"):
         parts += [Text(), Text("Metrics compared", style="bold"), _indented(_compared(rows))]
     if file is None:
-        if relax := data.get("relax"):
-            parts.append(_indented(Text.assemble(("help: ", "green"), relax)))
-        parts += [
-            Text(),
-            Text("Tried", style="bold"),
-            *(_indented(line) for line in _tried(data["attempts"])),
-        ]
-    else:
-        words = f"Metric: {target}"
-        parts += [
-            Text(),
-            Text(words),
-            Text(f"certify with it: tubecert certify SPEC --metric {target}", style="dim"),
-        ]
+        return [*parts, *_failure(data)]
+    certify = f"certify with it: tubecert certify SPEC --metric {target}"
+    return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
+
+
+def _failure(data: Mapping[str, Any]) -> list[RenderableType]:
+    """What would help, and what was tried."""
+    parts: list[RenderableType] = []
+    if relax := data.get("relax"):
+        parts.append(_indented(Text.assemble(("help: ", "green"), relax)))
+    if attempts := data["attempts"]:
+        parts += [Text(), Text("Tried", style="bold"), *(_indented(line) for line in _tried(attempts))]
     return parts
 
 
