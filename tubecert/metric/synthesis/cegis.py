@@ -9,6 +9,7 @@ Untrusted: what it proposes is rounded and proven by its caller again.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,21 +22,35 @@ from tubecert.metric.synthesis.counterexample import Judgement, counterexample
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns
 from tubecert.metric.synthesis.parity import canonical, invariant_entries
 from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
-from tubecert.metric.synthesis.program import PointProgram, contraction_points, finite, metric_points
+from tubecert.metric.synthesis.program import (
+    PointProgram,
+    Points,
+    contraction_points,
+    finite,
+    metric_points,
+)
 from tubecert.metric.synthesis.sampling import Region, floats, worst
 
 ROUTE = "cegis"
-_ROUNDS = 40
+_ROUNDS = 60
 _GAP = 0.01  # between kappa and its bound
+_FINE = 1e-3  # the same, where it is cheap
+_CHEAP = 40  # unknowns
 _HOPELESS = 1e7  # a larger kappa is no metric
 _SAMPLES = 4000
+_LOOSE = 0.5  # conditions that hold by so much, relatively, are dropped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attack:
-    """What sampling found about given coefficients: the worst points, the rate that holds there, kappa."""
+    """What sampling found about given coefficients.
 
-    metric: Array
+    Points (N, n) at which they fail, by condition; by how much the rate falls short; kappa and the scale that makes W
+    exceed the floor.
+    """
+
+    low: Array
+    high: Array
     contraction: Array
     shortfall: float
     kappa: float
@@ -44,7 +59,8 @@ class Attack:
 
 def propose(problem: SynthesisProblem) -> Proposal:
     """The member of the family with nearly the least kappa at the rate asked for, or why there is none."""
-    return _Synthesis(problem).run()
+    with np.errstate(all="ignore"):
+        return _Synthesis(problem).run()
 
 
 class _Synthesis:
@@ -59,17 +75,16 @@ class _Synthesis:
             problem.model, problem.family, np.stack([lo, hi], axis=1), self.forms
         )
         self.unknowns = Unknowns(free)
-        some = np.random.default_rng(13).uniform(lo, hi, (20 * len(problem.family.functions) + 20, len(lo)))
-        self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in symmetries)]))
-        affine = self.forms.affine_variables(lo, hi)
-        self.contracting = Region(
-            lo=lo, hi=hi, variables=self.forms.variables, at_ends=affine, symmetries=symmetries
-        )
-        own = self.forms.metric_variables
-        if problem.floor == "input":
-            own = tuple(sorted({*own, *self.forms.input_variables}))
-        self.bounded = Region(lo=lo, hi=hi, variables=own, symmetries=symmetries)
         self.generator = np.random.default_rng(11)
+        some = self.generator.uniform(lo, hi, (20 * len(problem.family.functions) + 20, len(lo)))
+        self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in symmetries)]))
+        own = set(self.forms.metric_variables)
+        own |= set(self.forms.input_variables) if problem.floor == "input" else set()
+        self.bounded = Region(lo=lo, hi=hi, variables=tuple(sorted(own)), symmetries=symmetries)
+        self.contracting = replace(
+            self.bounded, variables=self.forms.variables, at_ends=self.forms.affine_variables(lo, hi)
+        )
+        self.gap = _FINE if self.unknowns.count <= _CHEAP else _GAP
         self.bound, self.solver_seconds, self.rounds = 0.0, 0.0, 0
         self.program = self._start()
 
@@ -77,113 +92,123 @@ class _Synthesis:
         """Rounds of solving and attacking until the metric holds within the gap."""
         best: tuple[float, Array] | None = None
         limit = min(self.problem.limit or _HOPELESS, _HOPELESS)
+        extreme: Array | None = None  # the unknowns of least kappa
         for self.rounds in range(1, _ROUNDS + 1):
-            least = self._count(self.program.least_kappa())
-            if least.values is None or least.feasible is False:
-                return self._answer(best, least.feasible, least.status)
-            kappa = float(least.values[-1])
-            if not np.isfinite(kappa) or kappa <= 0:
-                return self._answer(best, None, "the solver's kappa is no positive number")
-            if least.feasible and np.isfinite(least.bound):
+            central = None
+            if extreme is not None:
+                central = self._central(extreme)
+            if central is None:
+                least = self._count(self.program.least_kappa())
+                if least.values is None or not least.feasible:
+                    return self._answer(best, least.feasible, least.status)
+                kappa = float(least.values[-1])
+                if not 0 < kappa < np.inf:
+                    return self._answer(best, None, "the solver's kappa is no positive number")
                 self.bound = max(self.bound, min(kappa, least.bound))
-            if self.bound > limit:
-                return self._answer(best, False, f"kappa is at least {self.bound:.4g}, above the limit")
-            central = self._count(self.program.central(kappa * (1 + _GAP), _GAP / 4, least.values[:-1]))
-            y = least.values if central.values is None else central.values
-            coefficients = self.unknowns.matrices(y[:-1])
-            attack = self._attack(coefficients, kappa)
-            if self.problem.progress:
-                self.problem.progress(
-                    f"round {self.rounds}: kappa >= {self.bound:.5g}, this metric {attack.kappa:.5g}, "
-                    f"rate short by {attack.shortfall:.3g} at {len(attack.contraction)} points; "
-                    f"{least.status} {least.iterations}, {central.status} {central.iterations}"
-                    f"{len(self.program.metric.at)} + {len(self.program.contraction.at)} conditions"
-                )
+                if self.bound > limit:
+                    return self._answer(best, False, f"kappa is at least {self.bound:.4g}, above the limit")
+                extreme = least.values[:-1]
+                central = self._central(extreme)
+            y = extreme if central is None else central
+            coefficients = self.unknowns.matrices(y)
+            attack = self._attack(coefficients)
+            self._tell(attack)
             if attack.shortfall <= 0 and np.isfinite(attack.kappa):
-                if best is None or attack.kappa < best[0]:
-                    best = attack.kappa, self.forms.coefficients(coefficients) * attack.scale
-                if attack.kappa <= self.bound * (1 + 1.1 * _GAP):
-                    found = counterexample(self.problem, best[1])
-                    if found.proven:
-                        return self._answer(best, True, "no counterexample, by branch and bound")
-                    attack = self._with_witness(attack, found)
-                    best = None
-            if not self._add(attack):
+                found = attack.kappa, self.forms.coefficients(coefficients) * attack.scale
+                best = min(best or found, found, key=lambda pair: pair[0])
+                if attack.kappa <= self.bound * (1 + 1.1 * self.gap):
+                    judged = counterexample(
+                        self.problem, found[1], self.bounded.symmetries, self.contracting.order
+                    )
+                    if judged.verdict != "refuted":
+                        words = "no counterexample" if judged.verdict == "proven" else "no counterexample found"
+                        return self._answer(found, True, words)
+                    attack, best = self._with_witness(attack, judged), None
+            if not self._add(attack, y):
                 return self._answer(best, None, "no further points to add")
         return self._answer(best, None, f"gave up after {_ROUNDS} rounds")
+
+    def _central(self, reference: Array) -> Array | None:
+        """The unknowns in the middle of what is feasible slightly above the bound; None if nothing is."""
+        kappa = self.bound * (1 + self.gap)
+        found = self._count(self.program.central(kappa, self.gap / 4, reference))
+        if found.values is None or not found.feasible or not found.values[-1] > 0:
+            return None
+        return found.values[:-1]
 
     # -- points ------------------------------------------------------------------------------------------------
 
     def _start(self) -> PointProgram:
-        inner = len(self.contracting.inner)
-        c2 = [
-            self.contracting.corners(64, self.generator),
-            self.contracting.random(12 * (1 + inner), self.generator),
-        ]
-        c1 = [
-            self.bounded.corners(32, self.generator),
-            self.bounded.random(8 * len(self.bounded.variables) + 1, self.generator),
-        ]
-        metric, contraction = (
-            np.unique(canonical(np.concatenate(points), self.bounded.symmetries), axis=0)
-            for points in (c1, c2)
+        """A few points to begin with: corners and random ones."""
+        c1, c2 = (
+            np.concatenate([region.corners(64, self.generator), region.random(count, self.generator)])
+            for region, count in (
+                (self.bounded, 10 * len(self.bounded.variables) + 1),
+                (self.contracting, 20 * len(self.contracting.inner) + 10),
+            )
         )
+        c1, c2 = (np.unique(canonical(points, self.bounded.symmetries), axis=0) for points in (c1, c2))
+        metric = self._metric_points(c1)
         return PointProgram(
             unknowns=self.unknowns,
-            metric=finite(metric_points(self.forms, self.unknowns, metric, self.problem.floor)),
-            contraction=finite(contraction_points(self.forms, self.unknowns, contraction, self.rate)),
+            low=metric,
+            high=metric,
+            contraction=self._contraction_points(c2),
             floor=self.problem.floor,
             solver=self.problem.solver,
         )
 
-    def _add(self, attack: Attack) -> bool:
-        """Take new points into the program; False if there are none."""
-        program = self.program
-        c1 = metric_points(self.forms, self.unknowns, attack.metric, self.problem.floor)
-        c2 = contraction_points(self.forms, self.unknowns, attack.contraction, self.rate)
-        c1, c2 = (
-            _new(finite(points), old) for points, old in ((c1, program.metric), (c2, program.contraction))
-        )
-        self.program = replace(
-            program, metric=program.metric.joined(c1), contraction=program.contraction.joined(c2)
-        )
-        return bool(len(c1.at) or len(c2.at))
+    def _metric_points(self, at: Array) -> Points:
+        return finite(metric_points(self.forms, self.unknowns, at, self.problem.floor))
 
-    def _attack(self, coefficients: Array, kappa: float) -> Attack:
+    def _contraction_points(self, at: Array) -> Points:
+        return finite(contraction_points(self.forms, self.unknowns, at, self.rate))
+
+    def _add(self, attack: Attack, y: Array) -> bool:
+        """Take new points into the program; False if there are none."""
+        program = self._without_loose(y)
+        fresh = (
+            _new(self._metric_points(attack.low), program.low),
+            _new(self._metric_points(attack.high), program.high),
+            _new(self._contraction_points(attack.contraction), program.contraction),
+        )
+        old = (program.low, program.high, program.contraction)
+        low, high, contraction = (a.joined(b) for a, b in zip(old, fresh, strict=True))
+        self.program = replace(program, low=low, high=high, contraction=contraction)
+        return any(len(points.at) for points in fresh)
+
+    def _without_loose(self, y: Array) -> PointProgram:
+        """The program without conditions that hold by far at the unknowns y: they come back if they are needed."""
+        program, V = self.program, self.unknowns.matrices(y)
+        rates = supported_rate(self.forms, V, program.contraction.at)
+        top = largest(self.forms(program.high.at).metric(V))
+        return replace(
+            program,
+            low=program.low.kept(self._floor_margin(V, program.low.at) < 1 + _LOOSE),
+            high=program.high.kept(top > (1 - _LOOSE) * self.bound),
+            contraction=program.contraction.kept(rates < (1 + _LOOSE) * self.rate),
+        )
+
+    def _attack(self, coefficients: Array) -> Attack:
         """The worst points for these coefficients, by sampling."""
-        c2, short = worst(
-            lambda x: self.rate - supported_rate(self.forms, coefficients, x),
-            self.contracting,
-            self.generator,
-            samples=_SAMPLES,
-            climbers=24,
-            keep=12,
+        c2, short = self._worst(
+            self.contracting, lambda x: self.rate - supported_rate(self.forms, coefficients, x), 16
         )
-        low, least = worst(
-            lambda x: -self._floor_margin(coefficients, x),
-            self.bounded,
-            self.generator,
-            samples=_SAMPLES // 4,
-            climbers=12,
-            keep=4,
-        )
-        high, most = worst(
-            lambda x: largest(self.forms(x).metric(coefficients)),
-            self.bounded,
-            self.generator,
-            samples=_SAMPLES // 4,
-            climbers=12,
-            keep=4,
-        )
+        low, least = self._worst(self.bounded, lambda x: -self._floor_margin(coefficients, x), 6)
+        high, most = self._worst(self.bounded, lambda x: largest(self.forms(x).metric(coefficients)), 6)
         floor, ceiling = -float(least[0]), float(most[0])
-        ratio = ceiling / floor if floor > 0 else np.inf
         return Attack(
-            metric=np.concatenate([low[least > -1], high[most > kappa]]),
+            low=low[least > -1],
+            high=high[most > self.bound * (1 + self.gap)],
             contraction=c2[short > 0],
-            shortfall=float(short[0]) if len(short) else -np.inf,
-            kappa=ratio,
+            shortfall=float(short[0]),
+            kappa=ceiling / floor if floor > 0 else np.inf,
             scale=1 / floor if floor > 0 else 1.0,
         )
+
+    def _worst(self, region: Region, score: Callable[[Array], Array], keep: int) -> tuple[Array, Array]:
+        samples = 800 * (1 + len(region.inner))
+        return worst(score, region, self.generator, samples=samples, climbers=2 * keep, keep=keep)
 
     def _floor_margin(self, coefficients: Array, points: Array) -> Array:
         """The largest multiple of the floor below W."""
@@ -195,14 +220,21 @@ class _Synthesis:
         reached = largest(t @ here.input @ np.swapaxes(t, -1, -2))
         return np.where(largest(-W) < 0, 1 / reached, -1.0)
 
-    # -- proof and answer --------------------------------------------------------------------------------------
+    def _tell(self, attack: Attack) -> None:
+        if self.problem.progress:
+            self.problem.progress(
+                f"round {self.rounds}: kappa >= {self.bound:.5g}; this metric {attack.kappa:.5g}, short of the rate "
+                f"by {attack.shortfall:.2g}; {self.program.size} conditions"
+            )
+
+    # -- answer ------------------------------------------------------------------------------------------------
 
     def _with_witness(self, attack: Attack, found: Judgement) -> Attack:
         if found.at is None:
             return attack
         at = canonical(found.at[None], self.bounded.symmetries)
         if found.condition == "C1":
-            return replace(attack, metric=np.concatenate([attack.metric, at]))
+            return replace(attack, low=np.concatenate([attack.low, at]))
         return replace(attack, contraction=np.concatenate([attack.contraction, at]))
 
     def _count(self, solution: ConicSolution) -> ConicSolution:
@@ -240,7 +272,7 @@ def largest(matrices: Array) -> Array:
     return np.where(known, np.linalg.eigvalsh(safe)[:, -1], np.inf)
 
 
-def _new(points, old):
+def _new(points: Points, old: Points) -> Points:
     """The points that are not there yet."""
     known = np.array([bool((np.abs(old.at - x).max(axis=1) > 1e-7).all()) for x in points.at], dtype=bool)
     return points.kept(known)

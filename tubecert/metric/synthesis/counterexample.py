@@ -7,6 +7,7 @@ Implements: (CCM_1), (CCM_2). Untrusted use of trusted parts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
@@ -23,32 +24,39 @@ from tubecert.metric.synthesis.problem import SynthesisProblem
 from tubecert.model import ControlAffineModel
 
 _DIGITS = 12
-_EFFORT = Effort(budget=100_000)
+_EFFORT = Effort(budget=6_000)
+Box = Sequence[tuple[Fraction, Fraction]]
 _ALLOWED = 2.5e-4  # of the rate: less than any back-off, and much easier to decide than the rate itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """`proven`: C1 and C2 hold; else what was not proven, and the point (n,) that looked worst, if there is one."""
+    """Whether C1 and C2 hold; if not, which of them failed and the point (n,) at which it was seen to."""
 
-    proven: bool
+    verdict: Literal["proven", "refuted", "undecided"]
     condition: Literal["", "C1", "C2"] = ""
     at: Array | None = None
 
 
-def counterexample(problem: SynthesisProblem, coefficients: Array) -> Judgement:
-    """Decide C1 and C2, at a rate that is smaller by a hair, for the coefficients V_k (K, n, n) in decimals."""
+def counterexample(
+    problem: SynthesisProblem, coefficients: Array, symmetries: Array, order: Sequence[int]
+) -> Judgement:
+    """Decide C1 and C2, at a rate that is smaller by a hair, for the coefficients V_k (K, n, n) in decimals.
+
+    Only one of the mirror images under the `symmetries` (S, n) is looked at: the box is halved along states, those
+    that come first in `order` before others.
+    """
     W = problem.family.dual_metric(_decimals(coefficients))
     model = replace(problem.model, W=W, rate=Fraction(problem.rate))
-    domain = BoxDomain(dict(zip(model.states, problem.safe_set, strict=True)))
+    domain = BoxDomain(dict(zip(model.states, _one_image(problem.safe_set, symmetries, order), strict=True)))
     negative = tuple(tuple(-e for e in row) for row in W)
     found = decide(Pencil(negative, [identity(len(W))]), domain, 0.0, _EFFORT)
     if found.verdict != "proven":
         return _failed("C1", found, problem)
     if len(model.inputs) == len(model.states):
-        return Judgement(proven=True)
+        return Judgement(verdict="proven")
     found = decide(_contraction(model), domain, -2 * problem.rate * (1 - _ALLOWED), _EFFORT)
-    return Judgement(proven=True) if found.verdict == "proven" else _failed("C2", found, problem)
+    return Judgement(verdict="proven") if found.verdict == "proven" else _failed("C2", found, problem)
 
 
 def _contraction(model: ControlAffineModel) -> Objective:
@@ -63,7 +71,17 @@ def _contraction(model: ControlAffineModel) -> Objective:
 def _failed(condition: Literal["C1", "C2"], found: Decision, problem: SynthesisProblem) -> Judgement:
     middle = [float((lo + hi) / 2) for lo, hi in problem.safe_set]
     at = np.array([found.at.get(v, m) for v, m in zip(problem.model.states, middle, strict=True)])
-    return Judgement(proven=False, condition=condition, at=at)
+    return Judgement(verdict=found.verdict, condition=condition, at=at)
+
+
+def _one_image(safe_set: Box, symmetries: Array, order: Sequence[int]) -> list[tuple[Fraction, Fraction]]:
+    """A part of the box that has a mirror image of every point."""
+    box, signs = list(safe_set), symmetries
+    for i in order:
+        if (signs[:, i] < 0).any():
+            box[i] = (Fraction(0), box[i][1])
+            signs = signs[signs[:, i] > 0]
+    return box
 
 
 def _decimals(coefficients: Array) -> list[list[list[Fraction]]]:

@@ -1,6 +1,7 @@
 """The conditions at finitely many points as a semidefinite program in the coefficients and kappa.
 
-At points of the first kind W <= kappa I and floor <= W, at points of the second -N'(F_0 + 2 rate W)N >= 0. Fewer points
+At the `low` points floor <= W, at the `high` ones W <= kappa I, at the `contraction` points
+-N'(F_0 + 2 rate W)N >= 0. Fewer points
 are fewer conditions: the least kappa is a bound from below for every member of the family, as far as the solver may be
 trusted. The blocks of a point are made once and kept.
 Untrusted. Implements: (CCM_1), (CCM_2) at points.
@@ -18,8 +19,8 @@ from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution,
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns, upper
 from tubecert.metric.synthesis.problem import Floor
 
-_TOLERANCE, _ROUGH = 1e-7, 1e-5
-LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
+_TOLERANCE, _ROUGH = 1e-7, 1e-4
+_LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,10 +44,11 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointProgram:
-    """The conditions at `metric` points (C1) and `contraction` points (C2)."""
+    """The conditions at `low` and `high` points (C1) and `contraction` points (C2)."""
 
     unknowns: Unknowns
-    metric: Points
+    low: Points
+    high: Points
     contraction: Points
     floor: Floor
     solver: Solver
@@ -69,21 +71,21 @@ class PointProgram:
         blocks = [*self._between(slack, kappa), *self._contracting(reference)]
         return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=_ROUGH)
 
+    @property
+    def size(self) -> int:
+        """The number of conditions."""
+        return len(self.low.at) + len(self.high.at) + len(self.contraction.at)
+
     def _between(self, slack: float, kappa: float | None) -> list[Semidefinite]:
-        """W - floor >= 0 and kappa I - W >= 0 at the metric points."""
+        """W - floor >= 0 at the low, kappa I - W >= 0 at the high points; kappa may be the last unknown."""
         n = self.unknowns.mask.shape[1]
         eye = upper(np.eye(n))
-        blocks = []
-        for rows, floor in zip(self.metric.rows, self.metric.floor, strict=True):
-            if kappa is None:
-                above, ceiling = _block(n, 0.0 * eye, -rows, eye), 0.0 * eye
-            else:
-                ceiling = kappa * (1 - slack) * eye
-                above = _block(n, ceiling, -rows, 0.0 * eye)
-            blocks += [above, _block(n, -(1 + slack) * floor, rows, 0.0 * eye)]
+        unknown, known = (eye, 0.0 * eye) if kappa is None else (0.0 * eye, kappa * eye)
+        blocks = [_block(n, (1 - slack) * known, -rows, unknown) for rows in self.high.rows]
+        for rows, floor in zip(self.low.rows, self.low.floor, strict=True):
+            blocks.append(_block(n, -(1 + slack) * floor, rows, 0.0 * eye))
             if self.floor == "input":
-                fixed = -LEAST * (kappa or 0.0) * eye
-                blocks.append(_block(n, fixed, rows, -LEAST * eye if kappa is None else 0.0 * eye))
+                blocks.append(_block(n, -_LEAST * known, rows, -_LEAST * unknown))
         return blocks
 
     def _contracting(self, reference: Array | None) -> list[Semidefinite]:

@@ -34,6 +34,12 @@ class Region:
         """The variables that vary freely."""
         return tuple(i for i in self.variables if i not in self.at_ends)
 
+    @property
+    def order(self) -> tuple[int, ...]:
+        """All states, those first that vary freely, then those at ends."""
+        rest = (i for i in range(len(self.lo)) if i not in self.variables)
+        return (*self.inner, *self.at_ends, *rest)
+
     def random(self, count: int, generator: np.random.Generator) -> Array:
         """Points (count, n): uniform, a third of them pushed to the boundary of the free variables."""
         points = np.tile(0.5 * (self.lo + self.hi), (count, 1))
