@@ -10,8 +10,9 @@ from typing import Any
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
+from tubecert.cli.places import OptionPlace
 from tubecert.errors import ExitCode, SpecError, TargetError
-from tubecert.findings import Finding, Location
+from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 
@@ -102,7 +103,7 @@ def _names(system: Spec, text: str) -> tuple[str, ...]:
 
 
 def _refuse(option: str, text: str, message: str) -> None:
-    place = Location(file=option, line=1, column=1, source=text, width=len(text))
+    place = OptionPlace(file=option, line=1, column=1, source=text, width=len(text))
     raise SpecError([Finding(code="TC112", message=message, location=place)])
 
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 from math import floor, inf, isfinite, log10, sqrt
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.metric.synthesis.family import MetricFamily, metric_family, suggested
+from tubecert.metric.synthesis.family import MetricFamily, metric_family
 from tubecert.metric.synthesis.problem import Floor, Proposal, Solver, SynthesisProblem
 from tubecert.metric.synthesis.rounding import VerifiedMetric, shortest_proven
 from tubecert.model import ControlAffineModel
@@ -268,15 +268,13 @@ def digits_below(value: float | Fraction, digits: int) -> Fraction:
     """The largest decimal of so many digits that does not exceed a positive value."""
     assert isfinite(value)
     assert value > 0
-    unit = Fraction(10) ** (floor(log10(value)) - digits + 1)
+    exponent = floor(log10(value))
+    if Fraction(10) ** exponent > value:  # the logarithm was rounded up
+        exponent -= 1
+    unit = Fraction(10) ** (exponent - digits + 1)
     return (Fraction(value) // unit) * unit
 
 
 def two_digits(value: Fraction) -> Fraction:
     """Two digits, rounded down."""
     return digits_below(value, 2)
-
-
-def constant_is_all(model: ControlAffineModel) -> bool:
-    """Whether no variable promises anything: then only degree 0 is worth trying."""
-    return not suggested(model)
