@@ -16,6 +16,7 @@ ROOMS = [
     "errors",
     "findings",
     "expression",
+    "recheck",
     "spec",
     "enclosure",
     "model",
@@ -97,6 +98,25 @@ def test_a_room_imports_only_from_earlier_rooms(path):
             if name.startswith("tubecert.") and name != "tubecert.__version__":
                 other = name.split(".")[1]
                 assert ROOMS.index(other) <= ROOMS.index(own), f"line {node.lineno}: {own} imports {other}"
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in MODULES if room_of(path) == "recheck"], ids=lambda p: p.name
+)
+def test_recheck_shares_nothing_with_the_producer(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    rooms = {name.split(".")[1] for name in imported(tree) if name.startswith("tubecert.")}
+    assert rooms <= {"errors", "findings", "expression", "recheck"}
+    shared = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "tubecert.expression"
+        for alias in node.names
+    }
+    # the parser and the node types, never the derivative rules or the zero test
+    assert shared <= {"Expression", "ExpressionError", "parse", "parse_number", "symbol", "topological"}
+    assert not any(name.startswith("tubecert.expression.") for name in imported(tree))
+    assert not {name.split(".")[0] for name in imported(tree)} & {"numpy", "scipy", "cvxpy", "sympy"}
 
 
 @pytest.mark.parametrize("path", modules())

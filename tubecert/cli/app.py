@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from tubecert.cli import everyday, simulating, synthesising
+from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
 from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
 
@@ -194,6 +194,7 @@ def make_report(
 
 synthesising.register(app)
 simulating.register(app)
+rechecking.register(app)
 everyday.register(app)
 
 

@@ -1,0 +1,145 @@
+"""`recheck`: a certificate in; every claim examined in a second arithmetic; a verdict and an exit code out."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Numbers, Output
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.findings import Finding
+from tubecert.recheck.document import MOST_BYTES, read, wrong
+from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
+
+_WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
+
+
+def run(given: Mapping[str, Any], output: Output) -> ExitCode:
+    """Recheck a certificate; with a specification, also whether it belongs to it."""
+    numbers = Numbers()
+    budget = numbers.count("--budget", given["budget"])
+    numbers.check()
+    name = str(given["certificate"])
+    text = _text(name)
+    note = _belongs(text, name, str(given["spec"])) if given["spec"] is not None else ""
+    with _progress(output) as report:
+        found = recheck(text, name, BUDGET if budget is None else budget, report)
+    shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
+    write_stdout(shown)
+    return found.exit_code
+
+
+def _text(name: str) -> str:
+    try:
+        data = sys.stdin.buffer.read(MOST_BYTES + 1) if name == "-" else Path(name).read_bytes()
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise wrong("TC600", f"{name} is not UTF-8") from None
+    except OSError as error:
+        raise wrong("TC600", f"cannot read {name}: {error.strerror or error}") from None
+
+
+def _as_json(found: Recheck, name: str, note: str) -> str:
+    failing = found.failing
+    data: dict[str, Any] = {
+        "certificate": name,
+        "verdict": found.verdict,
+        "stated": found.stated,
+        "hash": found.hash,
+        "claims": [
+            {
+                "claim": item.name,
+                "verdict": item.outcome.verdict,
+                "why": item.outcome.why,
+                "boxes": item.outcome.boxes,
+            }
+            for item in found.claims
+        ],
+        "first_failing": None if failing is None else failing.name,
+        "not_examined": list(found.unread),
+    }
+    if note:
+        data["specification"] = note
+    return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+
+
+def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
+    failing = found.failing
+    lines = [f"{_WORDS[found.verdict]} {name}: the certificate says {found.stated}"]
+    if failing is not None:
+        lines.append(f"  first failing claim: {failing.name}: {failing.outcome.why}")
+    elif found.stated != "certified":
+        lines.append("  what can be examined of it agrees; it certifies nothing")
+    if note:
+        lines.append(f"  {note}")
+    if not output.quiet:
+        lines.append("")
+        lines += [_line(item.name, item.outcome, verbose=output.verbose) for item in found.claims]
+        lines += ["", f"  {found.hash}"]
+        if found.unread:
+            lines.append(f"  for orientation, not examined: {', '.join(found.unread)}")
+    return "\n".join(lines) + "\n"
+
+
+def _line(name: str, outcome: Any, *, verbose: bool) -> str:
+    work = f"  ({outcome.boxes} boxes)" if verbose and outcome.boxes else ""
+    why = "" if outcome.holds else f": {outcome.why}"
+    return f"  {outcome.verdict:<12}  {name}{work}{why}"
+
+
+def _belongs(text: str, name: str, path: str) -> str:
+    """Whether the certificate is of the specification at `path`; raises `TubecertError` TC604 if not."""
+    from tubecert import spec as specification
+
+    shown = read(text, name)["result"]["spec"]
+    overrides = read(text, name)["result"]["overrides"].mapping()
+    canonical = specification.canonical(specification.load(path))
+    effective = dict(shown["effective"].mapping())
+    own, other = dict(canonical), dict(effective)
+    for key in ("epsilon", "rho_a"):
+        if key in overrides:
+            own["tube"] = {**own["tube"], key: effective["tube"].get(key)}
+    if "metric" in overrides:
+        own.pop("metric", None)
+        other.pop("metric", None)
+    different = sorted(key for key in {*own, *other} if own.get(key) != other.get(key))
+    if different:
+        raise _ForeignError(
+            [
+                Finding(
+                    code="TC604",
+                    message=f"{name} does not belong to {path}: {', '.join(different)} differ",
+                    help="certify again, or give the specification that was certified",
+                )
+            ]
+        )
+    digest = "sha256:" + hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    same = digest == shown["file_hash"].text()
+    return f"belongs to {path}" + ("" if same else " (the text of the file has changed, the system has not)")
+
+
+class _ForeignError(TubecertError):
+    """The certificate is of another specification (exit code 1)."""
+
+    exit_code = ExitCode.NOT_CERTIFIED
+
+
+@contextlib.contextmanager
+def _progress(output: Output) -> Iterator[Report | None]:
+    """The claim that is being examined, on one line of stderr, if that is a terminal."""
+    if output.quiet or output.no_progress or not sys.stderr.isatty():
+        yield None
+        return
+    yield lambda name: _status(name[:78])
+    _status("")
+
+
+def _status(text: str) -> None:
+    sys.stderr.write(f"\r\x1b[K{text}")
+    sys.stderr.flush()

@@ -1,0 +1,59 @@
+"""The command `recheck`: its options. `register` adds it to the app."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import guarded
+from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+
+_AFTER = """\b
+Examples:
+  tubecert recheck plant.certificate.json
+  tubecert recheck plant.certificate.json --spec plant.yaml
+  tubecert recheck plant.certificate.json --json | jq .first_failing
+
+\b
+Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, the certificate is of another
+specification, or it says refuted; 2 no certificate; 4 a claim could not be decided, or it says undecided.
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the app."""
+    app.command(epilog=_AFTER, short_help="Verify a certificate in a second arithmetic.")(recheck)
+
+
+def recheck(
+    context: typer.Context,
+    certificate: Annotated[
+        str,
+        typer.Argument(metavar="CERT", help="A certificate (JSON); - is stdin.", show_default=False),
+    ],
+    *,
+    spec: Annotated[
+        str | None,
+        typer.Option(metavar="SPEC", help="Also: that the certificate is of this specification."),
+    ] = None,
+    budget: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Boxes examined per claim before giving up.  [200000]"),
+    ] = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    json: Json = False,
+    color: Colored = None,
+    no_progress: NoProgress = False,
+    debug: Debug = False,
+    version: Version = False,
+) -> None:
+    """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
+    given = dict(locals())
+    how = Output.of(context, given)
+    with guarded(how):
+        from tubecert.cli.recheck import run
+
+        code = run(given, how)
+    raise typer.Exit(code)

@@ -1,0 +1,187 @@
+"""Ball arithmetic: exact numbers as balls, outward ends, norms and definiteness of small matrices.
+
+A ball that is not a number bounds nothing: every comparison with it is false, so it can never confirm a claim.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from flint import arb, arb_mat, fmpq
+
+Ball = arb
+Balls = list[list[arb]]  # a matrix
+
+_SQUARINGS = 7  # of a matrix, to propose its largest eigenvalue: its power of 2^7
+_INFLATIONS = (1e-13, 1e-10, 1e-7, 1e-4, 1e-2)
+
+
+def exact(q: Fraction | int) -> arb:
+    """A rational number as a ball around it."""
+    q = Fraction(q)
+    return arb(fmpq(q.numerator, q.denominator))
+
+
+def between(lo: arb | float, hi: arb | float) -> arb:
+    """A ball that contains everything between two numbers."""
+    return arb(lo).union(arb(hi))
+
+
+def floor(x: arb) -> float:
+    """A float at or below every number of the ball; -inf if nothing is known."""
+    value = float(x.lower())
+    return -math.inf if math.isnan(value) else math.nextafter(value, -math.inf)
+
+
+def ceiling(x: arb) -> float:
+    """A float at or above every number of the ball; inf if nothing is known."""
+    value = float(x.upper())
+    return math.inf if math.isnan(value) else math.nextafter(value, math.inf)
+
+
+def magnitude(x: arb) -> arb:
+    """The largest |x|, as an exact ball."""
+    return x.abs_upper()
+
+
+def square(x: arb) -> arb:
+    """x^2, never negative."""
+    if x.contains(0):
+        top = magnitude(x)
+        return between(0, top * top)
+    return x * x
+
+
+def power(x: arb, n: int) -> arb:
+    """x^n for an integer n by multiplication (flint's own power of a ball around 0 is not a number)."""
+    if n < 0:
+        return arb(1) / power(x, -n)
+    result, factor = arb(1), x
+    while n:
+        if n & 1:
+            result = result * factor
+        n >>= 1
+        if n:
+            factor = square(factor)
+    return result
+
+
+def root(x: arb) -> arb:
+    """The square root of what is known not to be negative: a ball that reaches below 0 is cut there."""
+    if x >= 0:
+        return x.sqrt()
+    top = x.upper()
+    return between(0, top.sqrt().upper()) if top >= 0 else arb("nan")
+
+
+def length(entries: Sequence[arb]) -> arb:
+    """The Euclidean norm."""
+    return root(sum((square(x) for x in entries), start=arb(0)))
+
+
+def larger(x: arb, y: arb) -> arb:
+    """The larger of two numbers."""
+    return x.max(y)
+
+
+def smaller(x: arb, y: arb) -> arb:
+    """The smaller of two numbers."""
+    return x.min(y)
+
+
+def pivots(a: Balls) -> list[arb]:
+    """The pivots of a symmetric matrix as far as they are positive, then the first that is not proven to be.
+
+    All positive: positive definite. The last one negative: not even semidefinite.
+    """
+    rows = [list(row) for row in a]
+    found: list[arb] = []
+    for k in range(len(rows)):
+        pivot = rows[k][k]
+        found.append(pivot)
+        if not pivot > 0:
+            break
+        for i in range(k + 1, len(rows)):
+            ratio = rows[i][k] / pivot
+            for j in range(k + 1, i + 1):
+                rows[i][j] = rows[i][j] - ratio * rows[j][k]
+    return found
+
+
+def is_positive(a: Balls) -> bool:
+    """Whether a symmetric matrix is proven to be positive definite (its lower triangle is read)."""
+    return all(pivot > 0 for pivot in pivots(a))
+
+
+def is_indefinite(a: Balls) -> bool:
+    """Whether a symmetric matrix is proven to have a negative eigenvalue."""
+    return bool(pivots(a)[-1] < 0)
+
+
+def spectral_norm(a: Balls) -> arb:
+    """An upper bound of the spectral norm, close to it where the entries are thin."""
+    if len(a) == 1 or len(a[0]) == 1:
+        return length([x for row in a for x in row]).upper()
+    tall = a if len(a) >= len(a[0]) else [list(column) for column in zip(*a, strict=True)]
+    m = arb_mat(tall)
+    gram = (m.transpose() * m).tolist()
+    n = len(gram)
+    guess = _largest([[float(x.mid()) for x in row] for row in gram])
+    if math.isfinite(guess):
+        for inflation in _INFLATIONS:
+            top = arb(guess) * (1 + inflation)
+            if is_positive([[(top if i == j else 0) - gram[i][j] for j in range(n)] for i in range(n)]):
+                return top.sqrt().upper()
+    return length([x for row in a for x in row]).upper()
+
+
+def least_eigenvalue(a: Balls) -> arb:
+    """A lower bound of the smallest eigenvalue of a symmetric matrix; not a number if none was found."""
+    n = len(a)
+    top = spectral_norm(a)
+    rest = _largest([[float(((top if i == j else 0) - a[i][j]).mid()) for j in range(n)] for i in range(n)])
+    guess = float(top) - rest
+    for inflation in _INFLATIONS:
+        low = arb(guess) - abs(float(top)) * inflation
+        if is_positive([[a[i][j] - (low if i == j else 0) for j in range(n)] for i in range(n)]):
+            return low.lower()
+    return arb("nan")
+
+
+def _largest(a: list[list[float]]) -> float:
+    """The largest eigenvalue of a positive semidefinite matrix, a proposal in floats."""
+    b = a
+    n = len(a)
+    for _ in range(_SQUARINGS):
+        size = max((abs(x) for row in b for x in row), default=0.0)
+        if not 0 < size < math.inf:
+            return 0.0 if size == 0 else math.inf
+        b = [[x / size for x in row] for row in b]
+        b = [[sum(b[i][k] * b[k][j] for k in range(n)) for j in range(n)] for i in range(n)]
+    v = max(b, key=lambda row: sum(x * x for x in row))
+    image = [sum(x * y for x, y in zip(row, v, strict=True)) for row in a]
+    total = sum(x * x for x in v)
+    return math.sqrt(sum(x * x for x in image) / total) if total > 0 else math.inf
+
+
+def whitening(a: list[list[float]]) -> list[list[float]]:
+    """T with T a T' near the identity, a proposal in floats; the identity where there is none."""
+    n = len(a)
+    lower = [[0.0] * n for _ in range(n)]
+    inverse = [[float(i == j) for j in range(n)] for i in range(n)]
+    for i in range(n):
+        for j in range(i + 1):
+            rest = a[i][j] - sum(lower[i][k] * lower[j][k] for k in range(j))
+            if i == j:
+                if not 0 < rest < math.inf:
+                    return [[float(p == q) for q in range(n)] for p in range(n)]
+                lower[i][i] = math.sqrt(rest)
+            else:
+                lower[i][j] = rest / lower[j][j]
+    for i in range(n):
+        for j in range(n):
+            rest = inverse[i][j] - sum(lower[i][k] * inverse[k][j] for k in range(i))
+            inverse[i][j] = rest / lower[i][i]
+    return inverse

@@ -1,0 +1,339 @@
+"""Theorems A, B and C at printed numbers, on balls: every inequality of the theory, evaluated on the safe side.
+
+Implements: theory (3.1)-(3.5), (26a)-(26c), (4.1)-(4.4), (4.6)-(4.9). Nothing here searches, but for Y: any Y that
+passes serves, and one is found by raising it to what it has to exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from fractions import Fraction
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, exact, larger, least_eigenvalue, root, smaller, spectral_norm
+from tubecert.recheck.filtering import Distance, paper_kernel, tight_kernel
+from tubecert.recheck.system import System
+
+_RISES = 100
+_INFLATION = 1 + Fraction(1, 10**30)  # far above the rounding of the balls that it is used with
+_SETTLED = Fraction(1, 10**29)
+_ABOVE = Fraction(1, 10**24)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers:
+    """The constants that the conditions use, as balls; names are those of the certificate."""
+
+    lower: Ball
+    upper: Ball
+    f_x: Ball
+    B: Ball
+    B_x: Ball
+    b_x: Ball
+    B_pinv: Ball
+    B_pinv_x: Ball
+    M_x: Ball
+    u_star: Ball
+    h: Ball
+    h_x: Ball
+    h_t: Ball
+    h_initial: Ball
+    feedback_gain: Ball
+    metric_input_gain: Ball
+    drift_on_plan: Ball
+    initial_distance: Ball
+    plan_defect_metric: Ball
+
+
+USED = tuple(item.name for item in fields(Numbers))
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Constants, radii and options of one certificate."""
+
+    system: System
+    n: Numbers
+    rho: Fraction
+
+    @property
+    def rate(self) -> Ball:
+        """Lambda."""
+        return exact(self.system.rate)
+
+    @property
+    def reach(self) -> Ball:
+        """dbar = sqrt(a) rho."""
+        return root(self.n.lower) * exact(self.rho)
+
+    @property
+    def horizon(self) -> Ball | None:
+        """T, None for ever."""
+        return None if self.system.horizon is None else exact(self.system.horizon)
+
+    def radius_serves(self, R_H: Fraction, *, clipped: bool = False) -> bool:
+        """R_H >= sqrt(1 + nu) Dh; R_H >= Dh where the estimate is clipped."""
+        layer = Fraction(0) if clipped or self.system.smooth is None else self.system.smooth
+        return R_H > 0 and bool(exact(R_H * R_H) >= exact(1 + layer) * self.n.h * self.n.h)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """The gains of A and B: omega, Gamma, the g of A_m = -g I (None: the matrix of the specification), R_H."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+    projection_radius: Fraction
+
+    @property
+    def sensible(self) -> bool:
+        """Whether all are positive."""
+        return min(self.bandwidth, self.adaptation_rate, self.projection_radius, self.predictor_gain or 1) > 0
+
+
+@dataclass(frozen=True, slots=True)
+class Predictor:
+    """|A_m|, |A_m + omega I| and lmin(Q), Q = -(A_m + A_m')."""
+
+    norm: Ball
+    shifted: Ball
+    q: Ball
+
+
+def predictor(s: System, gains: Gains) -> Predictor:
+    """The predictor of the loop; not numbers if the gains name another one than the specification."""
+    omega, given, g = exact(gains.bandwidth), s.A_m, gains.predictor_gain
+    if g is not None:
+        same = given is None or all(
+            e == (-g if i == j else 0) for i, row in enumerate(given) for j, e in enumerate(row)
+        )
+        nothing = arb("nan")
+        return (
+            Predictor(exact(g), abs(omega - exact(g)), exact(2 * g))
+            if same
+            else Predictor(nothing, nothing, nothing)
+        )
+    if given is None:
+        raise ValueError("an automatic predictor needs its gain")
+    A = [[exact(e) for e in row] for row in given]
+    n = len(A)
+    moved = [[e + (omega if i == j else 0) for j, e in enumerate(row)] for i, row in enumerate(A)]
+    Q = [[-(A[i][j] + A[j][i]) for j in range(n)] for i in range(n)]
+    return Predictor(spectral_norm(A), spectral_norm(moved), least_eigenvalue(Q))
+
+
+def prediction_error(n: Numbers, R: Ball, s1: Ball, q: Ball) -> Ball:
+    """Dxt of (2.11), for q > 0."""
+    both = n.h + R
+    return root(2 * both * s1 / q + both * both) if q > 0 else arb("nan")
+
+
+def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
+    """Everything in (3.1)-(3.5) that the certificate prints, and what (26a)-(26c) need."""
+    s, n = setting.system, setting.n
+    lam, rho, omega, R = (
+        setting.rate,
+        exact(setting.rho),
+        exact(gains.bandwidth),
+        exact(gains.projection_radius),
+    )
+    a, A, DB = n.lower, n.upper, n.B
+    p = predictor(s, gains)
+    kmax = setting.reach * n.feedback_gain
+    Dxdot = n.drift_on_plan + DB * (n.h + R + kmax)
+    s1 = n.h_t + n.h_x * Dxdot
+    Dxt = prediction_error(n, R, s1, p.q)
+    Deta = (n.B_pinv_x * Dxdot + n.B_pinv * (2 * omega + p.norm)) * Dxt
+    Dtheta = DB * A * Deta / lam
+    DPsix = 2 * n.B_x + DB * n.M_x / a
+    Dgs = (
+        root(A / a) * (n.f_x + (n.h + R + n.u_star + kmax) * n.b_x + n.h_x * DB)
+        + root(A) * n.feedback_gain * DB
+    )
+    DPsidot = A * (DB * Dgs + DB * n.M_x * Dxdot / root(A * a) + n.B_x * Dxdot)
+    kernel = paper_kernel if s.kernel == "paper" else tight_kernel
+    k = kernel(2 * lam, omega, n.h, s1)
+    return {
+        "speed": Dxdot,
+        "uncertainty_rate": s1,
+        "prediction_error": Dxt,
+        "filter_error": Deta,
+        "theta": Dtheta,
+        "Psi_x": DPsix,
+        "geodesic_rate": Dgs,
+        "Psi_rate": DPsidot,
+        "zeta_1": 2 * rho * DB * (A / a) * k,
+        "zeta_2": A * DPsix * k,
+        "zeta_3": n.h_x * (4 * lam * A * DB + DPsidot) / (lam * omega),
+    }
+
+
+def margins_26(setting: Setting, gains: Gains) -> dict[str, Ball]:
+    """The margins of (26a), (26b), (26c); not numbers where the projection or the gains do not serve."""
+    nothing = dict.fromkeys(("26a", "26b", "26c"), arb("nan"))
+    if not gains.sensible or not setting.radius_serves(gains.projection_radius):
+        return nothing
+    n, s = setting.n, setting.system
+    d, a = derived(setting, gains), n.lower
+    rho_r, rho_a = exact(setting.rho - s.rho_a), exact(s.rho_a)
+    zeta_p = exact(setting.rho) * n.plan_defect_metric / (setting.rate * root(a))
+    first = 1 - (n.initial_distance * n.initial_distance / a + d["zeta_1"] + zeta_p) / (rho_r * rho_r)
+    rest = a - d["zeta_2"] - d["zeta_3"]
+    third = 1 - d["theta"] / (rho_a * rest) / root(exact(gains.adaptation_rate)) if rest > 0 else arb("nan")
+    return {"26a": first, "26b": rest / a, "26c": third}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceProof:
+    """Y, e and S of theorem B."""
+
+    speed: Ball
+    prediction_error: Ball
+    uncertainty: Ball
+
+
+def _error(setting: Setting, gains: Gains, Y: Ball) -> Ball:
+    """Deta(Y)/sqrt(Gamma) of (2.12)."""
+    n, p = setting.n, predictor(setting.system, gains)
+    Dxt = prediction_error(n, exact(gains.projection_radius), n.h_t + n.h_x * Y, p.q)
+    gain = n.B_pinv_x * Y + n.B_pinv * (exact(gains.bandwidth) + p.shifted)
+    return gain * Dxt / root(exact(gains.adaptation_rate))
+
+
+def _speed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
+    """phi + DB [du dbar + min(Dh + R_H, error)]."""
+    n = setting.n
+    return n.drift_on_plan + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
+
+
+def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Distance | None:
+    """D(t) of theorem B if (4.1)-(4.3) hold for the proof, else None."""
+    n, omega = setting.n, exact(gains.bandwidth)
+    if not gains.sensible or not setting.radius_serves(gains.projection_radius):
+        return None
+    Y, e, S = proof.speed, proof.prediction_error, proof.uncertainty
+    if not (
+        (n.h_t + n.h_x * Y) / omega <= S
+        and _error(setting, gains, Y) <= e
+        and _speed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y
+    ):
+        return None
+    return Distance(
+        d0=n.initial_distance,
+        beta=n.metric_input_gain,
+        H0=n.h_initial,
+        S=S,
+        e=e,
+        delta=n.plan_defect_metric,
+        rate=setting.rate,
+        omega=omega,
+        horizon=setting.horizon,
+    )
+
+
+def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
+    """The least Y that serves, with its S and e, a little larger: a proposal."""
+    n, omega = setting.n, exact(gains.bandwidth)
+
+    def needed(Y: Ball) -> Ball:
+        S, e = (n.h_t + n.h_x * Y) / omega, _error(setting, gains, Y)
+        return _speed(setting, gains.projection_radius, larger(n.h_initial, S) + e)
+
+    Y = _risen(needed)
+    more = exact(_INFLATION)
+    return DistanceProof(
+        speed=Y,
+        prediction_error=(_error(setting, gains, Y) * more).upper(),
+        uncertainty=((n.h_t + n.h_x * Y) / omega * more).upper(),
+    )
+
+
+def _risen(needed: Callable[[Ball], Ball]) -> Ball:
+    """A number just above the least fixed point of a rising function: iterated, extrapolated, inflated; a proposal."""
+    Y = arb(0)
+    for _ in range(_RISES):
+        first = needed(Y).mid()
+        second = needed(first).mid()
+        if not second.is_finite() or second - Y <= second * exact(_SETTLED):
+            break
+        steps = first - Y, second - first
+        ahead = second + steps[1] * steps[1] / (steps[0] - steps[1]) if steps[0] > steps[1] > 0 else second
+        Y = (
+            ahead.mid()
+            if ahead.is_finite() and needed(ahead.mid()) >= ahead.mid() * exact(1 - _SETTLED)
+            else second
+        )
+    return (Y * exact(1 + _ABOVE)).upper()
+
+
+def margin(setting: Setting, supremum: Ball) -> Ball:
+    """(dbar - sup)/dbar."""
+    return 1 - supremum / setting.reach
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledGains:
+    """The gains of C: Ts, omega, g, R_H."""
+
+    sample_time: Fraction
+    bandwidth: Fraction
+    predictor_gain: Fraction
+    projection_radius: Fraction
+
+    @property
+    def sensible(self) -> bool:
+        """Whether all are positive."""
+        return min(self.sample_time, self.bandwidth, self.predictor_gain, self.projection_radius) > 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Sampled:
+    H1: Ball
+    S_T: Ball
+    d1: Ball
+
+
+def _sampled(setting: Setting, gains: SampledGains, Y: Ball) -> _Sampled:
+    """H1, S_T, d1 of (4.6)-(4.9) at one Y."""
+    n, lam = setting.n, setting.rate
+    Ts, omega, g = exact(gains.sample_time), exact(gains.bandwidth), exact(gains.predictor_gain)
+    s1 = n.h_t + n.h_x * Y
+    b = smaller(n.B_pinv * n.B_x, n.B_pinv_x * n.B) * n.h
+    m = smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
+    H1 = smaller(n.h, n.h_initial + s1 * Ts)
+    S_T = s1 * Ts / (-(-omega * Ts).expm1()) + m * (s1 + b * Y)
+    share = -(-lam * Ts).expm1()
+    d1 = n.initial_distance * (1 - share) + (n.metric_input_gain * H1 + n.plan_defect_metric) * share / lam
+    return _Sampled(H1, S_T, d1)
+
+
+def sampled_margin(setting: Setting, gains: SampledGains, speed: Ball | None) -> tuple[Ball, Ball]:
+    """The margin of theorem C at Y = `speed` (None: the least one), and the ultimate radius; not numbers if Y fails."""
+    n, nothing = setting.n, (arb("nan"), arb("nan"))
+    if not gains.sensible or not setting.radius_serves(gains.projection_radius, clipped=True):
+        return nothing
+
+    def needed(Y: Ball) -> Ball:
+        state = _sampled(setting, gains, Y)
+        return _speed(setting, gains.projection_radius, larger(state.H1, state.S_T))
+
+    Y = _risen(needed) if speed is None else speed
+    if not needed(Y) < Y:
+        return nothing
+    state = _sampled(setting, gains, Y)
+    bound = Distance(
+        d0=state.d1,
+        beta=n.metric_input_gain,
+        H0=state.H1,
+        S=state.S_T,
+        e=arb(0),
+        delta=n.plan_defect_metric,
+        rate=setting.rate,
+        omega=exact(gains.bandwidth),
+        horizon=setting.horizon,
+    )
+    top = larger(larger(n.initial_distance, state.d1), bound.supremum())
+    return margin(setting, top), bound.ultimate() / root(n.lower)

@@ -1,0 +1,162 @@
+"""A statement about every point of a domain: boxes that cover it are split until each one is proven.
+
+What is split first is heuristic; a box is left only when the statement is proven on it, or when it is proven to
+contain no point of the domain. A point of the domain at which the statement is proven false contradicts it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal, Protocol
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, ceiling, exact, floor
+from tubecert.recheck.boxes import Test
+
+_TRIES = 4  # every so many boxes a point is tried
+_UNKNOWN = 1e300
+
+State = tuple[list[tuple[float, float]], Any]  # a box, and what the domain remembers about it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of a claim; `why` says more where it is not confirmed, `boxes` counts the work."""
+
+    verdict: Literal["confirmed", "contradicted", "undecided"]
+    why: str = ""
+    boxes: int = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the claim is confirmed."""
+        return self.verdict == "confirmed"
+
+
+class Domain(Protocol):
+    """A set of points, known through boxes."""
+
+    def needed(self, variables: tuple[str, ...]) -> tuple[str, ...]:
+        """The variables to split: those given, then the domain's own."""
+        ...
+
+    def start(self, variables: tuple[str, ...]) -> list[State]:
+        """Boxes that cover it."""
+        ...
+
+    def cut(self, variables: tuple[str, ...], state: State) -> State | None:
+        """A smaller box with the same points of the domain; None if there are none."""
+        ...
+
+    def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
+        """A point of the domain in or near the box; None if none is known."""
+        ...
+
+    def pull(
+        self, variables: tuple[str, ...], state: State, caused: list[float], spread: list[float]
+    ) -> list[float]:
+        """How much splitting each variable promises."""
+        ...
+
+
+def prove(test: Test, domain: Domain, budget: int) -> Outcome:
+    """Decide whether a test holds on all of a domain."""
+    variables = domain.needed(test.variables)
+    own, count = len(test.variables), 0
+    waiting = domain.start(variables)
+    while waiting:
+        state = domain.cut(variables, waiting.pop())
+        if state is None:
+            continue
+        count += 1
+        box = state[0]
+        found = test.over(box[:own])
+        if found.proven:
+            continue
+        if count % _TRIES == 1:
+            at = domain.point(variables, state)
+            if at is not None and test.broken(at[:own]):
+                return Outcome(verdict="contradicted", why=f"false at {_shown(variables, at)}", boxes=count)
+        halves = _halves(state, _priorities(variables, state, found.caused, found.spread, domain))
+        if halves is None or count >= budget:
+            why = f"not proven near {_shown(variables, [arb(0.5 * lo + 0.5 * hi) for lo, hi in box])}"
+            return Outcome(verdict="undecided", why=f"{why} within {count} boxes", boxes=count)
+        waiting += halves
+    return Outcome(verdict="confirmed", boxes=count)
+
+
+def _priorities(
+    variables: tuple[str, ...], state: State, caused: list[float], spread: list[float], domain: Domain
+) -> list[float]:
+    extra = [0.0] * (len(variables) - len(caused))
+    if all(x < _UNKNOWN for x in (*caused, *spread)):
+        pull = domain.pull(variables, state, caused + extra, spread + extra)
+        if any(x > 0 for x in pull):
+            return pull
+    return [hi - lo for lo, hi in state[0]]
+
+
+def _halves(state: State, priority: list[float]) -> list[State] | None:
+    """The box cut in two where that promises most; None if it cannot be cut."""
+    box, memory = state
+    for i in sorted(range(len(box)), key=lambda i: -priority[i]):
+        lo, hi = box[i]
+        middle = math.sqrt(lo) * math.sqrt(hi) if lo > 0 and hi > 4 * lo else 0.5 * lo + 0.5 * hi
+        if lo < middle < hi:
+            return [([*box[:i], side, *box[i + 1 :]], memory) for side in ((lo, middle), (middle, hi))]
+    return None
+
+
+def _shown(variables: Sequence[str], at: Sequence[Ball]) -> str:
+    return (
+        ", ".join(f"{v} = {float(x.mid()):.6g}" for v, x in zip(variables, at, strict=True)) or "every point"
+    )
+
+
+Range = tuple[Fraction | Ball, Fraction | Ball]
+
+
+class Boxed:
+    """A product of closed ranges; `needed` ones only are split."""
+
+    def __init__(self, ranges: Mapping[str, Range]) -> None:
+        self._ranges = {v: (as_ball(lo), as_ball(hi)) for v, (lo, hi) in ranges.items()}
+
+    def needed(self, variables: tuple[str, ...]) -> tuple[str, ...]:
+        """Nothing beside what is given."""
+        return variables
+
+    def start(self, variables: tuple[str, ...]) -> list[State]:
+        """The box itself, rounded outward."""
+        return [([(floor(self._ranges[v][0]), ceiling(self._ranges[v][1])) for v in variables], None)]
+
+    def cut(self, variables: tuple[str, ...], state: State) -> State | None:
+        """Boxes never leave the domain."""
+        del variables
+        return state
+
+    def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
+        """The centre, moved inside."""
+        found = []
+        for v, (lo, hi) in zip(variables, state[0], strict=True):
+            low, high = ceiling(self._ranges[v][0]), floor(self._ranges[v][1])
+            if low > high:
+                return None
+            found.append(arb(min(max(0.5 * lo + 0.5 * hi, low), high)))
+        return found
+
+    def pull(
+        self, variables: tuple[str, ...], state: State, caused: list[float], spread: list[float]
+    ) -> list[float]:
+        """What causes the width of the bound."""
+        del variables, state, spread
+        return caused
+
+
+def as_ball(x: Fraction | Ball) -> Ball:
+    """An end of a range as a ball."""
+    return exact(x) if isinstance(x, Fraction) else x

@@ -1,0 +1,194 @@
+"""The plan as a curve of segments: for every part of time a box that contains x* and one that contains u*.
+
+A plan is a list of parts, each with x* and u* as terms of one variable s and numbers of its own: one part for a plan
+given by expressions of t, one cubic Hermite piece for every pair of knots. Segments are halved where that is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, ceiling, exact, floor
+from tubecert.recheck.boxes import Field
+from tubecert.recheck.terms import Program, Term, names, number, replaced, slopes, variable
+
+CLOCK = "s#"  # no state can have this name
+Ends = list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Part:
+    """x* and u* as terms of s and of named `values`, for s in [0, length] at time start + s."""
+
+    start: Ball
+    length: Ball
+    values: dict[str, Ball]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """x*(s), u*(s) over parts; `horizon` None is for ever."""
+
+    x: tuple[Term, ...]
+    u: tuple[Term, ...]
+    parts: tuple[Part, ...]
+    horizon: Fraction | None
+    start: tuple[Term, ...]  # x*(0), free of variables
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether it is more than a point."""
+        return CLOCK in names([*self.x, *self.u])
+
+    @cached_property
+    def slope(self) -> list[Term]:
+        """x*'."""
+        return slopes(self.x, CLOCK)
+
+    @cached_property
+    def field(self) -> Field:
+        """x* and u* on ranges of s."""
+        return Field([*self.x, *self.u], self.parts[0].values)
+
+    @cached_property
+    def root(self) -> Segment:
+        """The whole curve."""
+        level: list[Segment] = [Piece(self, part, 0.0, ceiling(part.length)) for part in self.parts]
+        while len(level) > 1:
+            level = [Bundle(level[i : i + 2]) for i in range(0, len(level), 2)]
+        return level[0]
+
+
+class Segment:
+    """A part of the curve: x* and u* lie in boxes, `when` is its time."""
+
+    when: tuple[float, float]
+    x: Ends
+    u: Ends
+
+    @property
+    def halves(self) -> Sequence[Segment]:
+        """Segments that cover this one; none if it cannot be halved."""
+        raise NotImplementedError
+
+    def middle(self) -> tuple[Ball, list[Ball], list[Ball]]:
+        """A time of it, with x* and u* there."""
+        raise NotImplementedError
+
+
+class Piece(Segment):
+    """A range of s in one part."""
+
+    def __init__(self, curve: Curve, part: Part, lo: float, hi: float) -> None:
+        self._curve, self._part, self._lo, self._hi = curve, part, lo, hi
+        field = curve.field.with_values(part.values)
+        found = field.hull([(lo, hi)] if field.variables else [])
+        ends = [(floor(value), ceiling(value)) for value in found]
+        n = len(curve.x)
+        self.x, self.u = ends[:n], ends[n:]
+        self.when = floor(part.start + arb(lo)), ceiling(part.start + arb(hi))
+
+    @cached_property
+    def halves(self) -> Sequence[Segment]:
+        """Two ranges of s."""
+        middle = 0.5 * self._lo + 0.5 * self._hi
+        if not self._lo < middle < self._hi or not self._curve.moves:
+            return ()
+        return tuple(
+            Piece(self._curve, self._part, *ends) for ends in ((self._lo, middle), (middle, self._hi))
+        )
+
+    def middle(self) -> tuple[Ball, list[Ball], list[Ball]]:
+        """The middle of the range, or the end of the part if that comes first."""
+        s = arb(min(0.5 * self._lo + 0.5 * self._hi, max(0.0, floor(self._part.length))))
+        field = self._curve.field.with_values(self._part.values)
+        found = field.at([s] if field.variables else [])
+        n = len(self._curve.x)
+        return self._part.start + s, found[:n], found[n:]
+
+
+class Bundle(Segment):
+    """Neighbouring segments together."""
+
+    def __init__(self, parts: Sequence[Segment]) -> None:
+        self._parts = tuple(parts)
+        self.when = parts[0].when[0], parts[-1].when[1]
+        self.x, self.u = _hull([part.x for part in parts]), _hull([part.u for part in parts])
+
+    @property
+    def halves(self) -> Sequence[Segment]:
+        """What it consists of."""
+        return self._parts
+
+    def middle(self) -> tuple[Ball, list[Ball], list[Ball]]:
+        """A point of the first one."""
+        return self._parts[0].middle()
+
+
+def _hull(boxes: Sequence[Ends]) -> Ends:
+    return [(min(lo for lo, _ in side), max(hi for _, hi in side)) for side in zip(*boxes, strict=True)]
+
+
+def expressed(x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction | None) -> Curve:
+    """A curve given by terms of `time`; without a horizon it stays at a point."""
+    clock = {time: variable(CLOCK)}
+    part = Part(exact(0), exact(horizon or 0), {})
+    start = tuple(replaced(x, {time: number(0)}))
+    return Curve(tuple(replaced(x, clock)), tuple(replaced(u, clock)), (part,), horizon, start)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knots:
+    """Exact knots of a plan: times, states, inputs (row by row), and whether inputs are held or linear between."""
+
+    t: list[Fraction]
+    x: list[list[Fraction]]
+    u: list[list[Fraction]]
+    held: bool
+
+
+def hermite(
+    knots: Knots, drift: Sequence[Term], states: Sequence[str], inputs: Sequence[str], horizon: Fraction
+) -> Curve:
+    """The cubics with the knots as ends and the slopes f + B u there, on the right side of each jump of u*.
+
+    `drift` is f + B u in the states and inputs. The last piece ends at the horizon.
+    """
+    s = variable(CLOCK)
+    x = [_polynomial([variable(f"x{i}#{k}") for k in range(4)], s) for i in range(len(states))]
+    u = [_polynomial([variable(f"u{j}#{k}") for k in range(2)], s) for j in range(len(inputs))]
+    rate = Program(drift, (*states, *inputs))
+    parts = []
+    for k, (begin, end) in enumerate(pairwise(knots.t)):
+        if begin >= horizon:
+            break
+        h, left = end - begin, knots.u[k]
+        right = left if knots.held else knots.u[k + 1]
+        m0 = rate.run([*map(exact, knots.x[k]), *map(exact, left)])
+        m1 = rate.run([*map(exact, knots.x[k + 1]), *map(exact, right)])
+        values: dict[str, Ball] = {}
+        for i, (a, b) in enumerate(zip(knots.x[k], knots.x[k + 1], strict=True)):
+            secant, width = exact((b - a) / h), exact(h)
+            values |= {
+                f"x{i}#0": exact(a),
+                f"x{i}#1": m0[i],
+                f"x{i}#2": (3 * secant - 2 * m0[i] - m1[i]) / width,
+                f"x{i}#3": (m0[i] + m1[i] - 2 * secant) / (width * width),
+            }
+        for j, (p, q) in enumerate(zip(left, right, strict=True)):
+            values |= {f"u{j}#0": exact(p), f"u{j}#1": exact((q - p) / h)}
+        parts.append(Part(exact(begin), exact(min(end, horizon) - begin), values))
+    return Curve(tuple(x), tuple(u), tuple(parts), horizon, tuple(map(number, knots.x[0])))
+
+
+def _polynomial(coefficients: Sequence[Term], s: Term) -> Term:
+    value = number(0)
+    for c in reversed(coefficients):
+        value = c + s * value
+    return value

@@ -1,0 +1,90 @@
+"""What filtering does: the kernels and the supremum of the distance bound D(t), on balls.
+
+Implements: theory (2.15)-(2.19). Where a ball cannot decide a case, a bound that holds in every case is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, larger, smaller
+
+
+def log_ratio(x: Ball) -> Ball:
+    """log(1 + x)/x, 1 at 0."""
+    return arb(1) if x.is_zero() else x.log1p() / x
+
+
+def kappa(c: Ball, w: Ball) -> Ball:
+    """sup_t |e^(-wt) - e^(-ct)|/|c - w| (2.17)."""
+    return (-(w / c) * log_ratio((w - c) / c)).exp() / c
+
+
+def tight_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
+    """J(c, w, s0, s1) (2.19), an upper bound."""
+    slow = s1 / (c * w)
+    if smaller(c, w) * s0 <= s1:
+        return slow
+    always = slow + s0 * kappa(c, w)
+    q = c * s0 - s1
+    if smaller(c, w) * s0 > s1:
+        exact = (s1 + q * (-(c * s0 / q) * log_ratio((w - c) * s0 / q)).exp()) / (c * w)
+        return exact if exact.is_finite() else always
+    return always
+
+
+def paper_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
+    """K(c) (2.18); not a number at w = c."""
+    return s0 / abs(c - w) + s1 / (c * w)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distance:
+    """D(t) of (2.15); `horizon` None is for ever."""
+
+    d0: Ball
+    beta: Ball
+    H0: Ball
+    S: Ball
+    e: Ball
+    delta: Ball
+    rate: Ball
+    omega: Ball
+    horizon: Ball | None
+
+    def ultimate(self) -> Ball:
+        """A1."""
+        return (self.beta * (self.S + self.e) + self.delta) / self.rate
+
+    def supremum(self) -> Ball:
+        """sup D (2.16), an upper bound."""
+        A1, C1 = self.ultimate(), self.beta * (self.H0 - self.S)
+        start = self.d0 - A1
+        D1 = self.omega - self.rate
+        last = A1 if self.horizon is None else self.at(self.horizon)
+        ends = larger(self.d0, last)
+        if C1 <= 0 or self.rate * start >= C1:
+            return ends
+        z = start / C1
+        inside = 1 + z * D1
+        if inside <= 0:
+            return ends
+        weak = larger(self.d0, A1) + larger(C1, arb(0)) * kappa(self.rate, self.omega)
+        if not (inside > 0 and C1 > 0 and self.rate * start < C1):
+            return larger(ends, weak)
+        t1 = log_ratio(D1 / self.rate) / self.rate - z * log_ratio(z * D1)
+        if self.horizon is None:
+            peak = A1 + (-self.rate * t1).exp() * (C1 + start * D1) / self.omega
+        else:
+            peak = self.at(larger(arb(0), smaller(t1, self.horizon)))
+        return larger(ends, peak) if peak.is_finite() else larger(ends, weak)
+
+    def at(self, t: Ball) -> Ball:
+        """D(t)."""
+        A1, C1 = self.ultimate(), self.beta * (self.H0 - self.S)
+        slow, fast = (-self.rate * t).exp(), (-self.omega * t).exp()
+        D1 = self.omega - self.rate
+        K = t * slow if D1.is_zero() else (slow - fast) / D1
+        return A1 + (self.d0 - A1) * slow + C1 * K

@@ -1,0 +1,156 @@
+"""Unique geodesics: G rho + L_G rho^2/8 stays below what the certificate states. Implements: theory (5.1), (5.2).
+
+With eta = M v: Gamma(v, v) = -W_v eta + W (eta'W_l eta)_l/2, and dM/dx_m = -M W_m M. A multilinear norm is at most the
+spectral norm of any unfolding of the tensor into a matrix; the least of several is taken on each box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import product
+
+from flint import arb, arb_mat
+
+from tubecert.recheck.balls import Ball, exact, spectral_norm
+from tubecert.recheck.boxes import Box, Field, Found
+from tubecert.recheck.constants import Place
+from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.metric import stated, together
+from tubecert.recheck.system import System
+from tubecert.recheck.terms import all_zero, matrix_slopes
+
+_SAMPLES = 9  # per moving state, to propose how the bound is shared by G and L
+Tensor = dict[tuple[int, ...], Ball]
+
+
+def unique(place: Place, limit: Fraction) -> Outcome:
+    """G rho + L rho^2/8 <= limit over the tube."""
+    s, rho = place.system, place.rho
+    if s.flat:
+        return stated(limit >= 0, "it is negative")
+    symbols, slopes = (SymbolsBelow(s, order, Fraction(0)) for order in (0, 1))
+    found = [_sampled(test, place) for test in (symbols, slopes)]
+    weights = float(rho), float(rho) ** 2 / 8
+    slack = float(limit) - sum(w * x for w, x in zip(weights, found, strict=True))
+    if not slack > 0:
+        return Outcome(verdict="undecided", why="samples leave no room below the stated value")
+    shares = [Fraction(x + 0.499 * slack / w) for w, x in zip(weights, found, strict=True)]
+    if shares[0] * rho + shares[1] * rho**2 / 8 > limit:
+        return Outcome(verdict="undecided", why="no split of the stated value was found")
+    outcomes = []
+    for order, share in enumerate(shares):
+        outcomes.append(prove(SymbolsBelow(s, order, share), place.tube(), place.budget))
+        if not outcomes[-1].holds:
+            break
+    return together(outcomes)
+
+
+def _sampled(test: SymbolsBelow, place: Place) -> float:
+    """The largest value at points of a grid: a proposal."""
+    if not test.variables:
+        return float(test.bound([]).mid())
+    tube = place.tube()
+    ((box, memory),) = tube.start(test.variables)
+    best = 0.0
+    for shares in product(range(_SAMPLES), repeat=len(test.variables)):
+        point = [lo + (hi - lo) * k / (_SAMPLES - 1) for k, (lo, hi) in zip(shares, box, strict=True)]
+        at = tube.point(test.variables, ([(x, x) for x in point], memory))
+        if at is not None:
+            best = max(best, float(test.bound(at).mid()))
+    return best
+
+
+class SymbolsBelow:
+    """|Gamma| (order 0) or |dGamma| (order 1) is at most `limit`."""
+
+    def __init__(self, s: System, order: int, limit: Fraction) -> None:
+        self._n, self._order, self._limit = len(s.states), order, exact(limit)
+        self._moving = [i for i, slope in enumerate(s.W_x) if not all_zero(slope)]
+        first = [s.W_x[i] for i in self._moving]
+        second = [matrix_slopes(w, s.states[m]) for m in self._moving for w in first] if order else []
+        self._field = Field([e for matrix in (s.W, *first, *second) for row in matrix for e in row])
+        self.variables = self._field.variables
+
+    def over(self, box: Box) -> Found:
+        """The tensors over the box, as balls."""
+        wide = [hi - lo for lo, hi in box]
+        return Found(bool(self._of(self._field.hull(box)) <= self._limit), wide, wide)
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """An upper bound that is too large refutes nothing."""
+        del point
+        return False
+
+    def bound(self, point: Sequence[Ball]) -> Ball:
+        """The bound at a point."""
+        return self._of(self._field.at(point))
+
+    def _of(self, entries: Sequence[Ball]) -> Ball:
+        n, count = self._n, len(self._moving)
+        matrices = [arb_mat(n, n, entries[k : k + n * n]) for k in range(0, len(entries), n * n)]
+        try:
+            tensor = self._symbols(matrices[: count + 1]) if not self._order else self._slopes(matrices)
+        except ZeroDivisionError:
+            return arb("nan")
+        unfoldings = ((0,), (2,), (3,), (0, 3), (0, 2)) if self._order else ((0,), (2,))
+        norms = [spectral_norm(_unfolded(tensor, rows)) for rows in unfoldings]
+        best = norms[0]
+        for value in norms[1:]:
+            best = best if best <= value else value
+        return best
+
+    def _symbols(self, matrices: Sequence[arb_mat]) -> Tensor:
+        """Gamma^k_ij as [k, i, j]."""
+        W, first = matrices[0], matrices[1:]
+        M = W.inv()
+        D = {i: w * M for i, w in zip(self._moving, first, strict=True)}
+        S = {i: M * d for i, d in D.items()}
+        return self._assembled(D, self._forms(W, S))
+
+    def _forms(self, W: arb_mat, S: dict[int, arb_mat]) -> Tensor:
+        """sum_l W_kl (S_l)_ij."""
+        return {
+            (k, i, j): sum((W[k, l] * S[l][i, j] for l in S), start=arb(0))
+            for k, i, j in product(range(self._n), repeat=3)
+        }
+
+    def _assembled(self, D: dict[int, arb_mat], forms: Tensor) -> Tensor:
+        nothing = arb(0)
+        return {
+            (k, i, j): (value - (D[i][k, j] if i in D else nothing) - (D[j][k, i] if j in D else nothing)) / 2
+            for (k, i, j), value in forms.items()
+        }
+
+    def _slopes(self, matrices: Sequence[arb_mat]) -> Tensor:
+        """dGamma^k_ij/dx_m as [k, i, j, m]."""
+        count, moving = len(self._moving), self._moving
+        W, first, second = matrices[0], matrices[1 : count + 1], matrices[count + 1 :]
+        M = W.inv()
+        D = {i: w * M for i, w in zip(moving, first, strict=True)}
+        S = {i: M * d for i, d in D.items()}
+        found: Tensor = {}
+        for place, m in enumerate(moving):
+            bent = dict(zip(moving, second[place * count : (place + 1) * count], strict=True))
+            D_m = {i: bent[i] * M - D[i] * D[m] for i in moving}
+            S_m = {i: M * bent[i] * M - S[m] * D[i] - (S[m] * D[i]).transpose() for i in moving}
+            one, two = self._forms(first[place], S), self._forms(W, S_m)
+            part = self._assembled(D_m, {key: one[key] + two[key] for key in one})
+            found |= {(*key, place): value for key, value in part.items()}
+        return found
+
+
+def _unfolded(tensor: Tensor, rows: tuple[int, ...]) -> list[list[Ball]]:
+    """The tensor as a matrix, the axes `rows` against all others."""
+    size = [1 + max(key[axis] for key in tensor) for axis in range(len(next(iter(tensor))))]
+    others = tuple(axis for axis in range(len(size)) if axis not in rows)
+    matrix = []
+    for row in product(*(range(size[a]) for a in rows)):
+        line = []
+        for column in product(*(range(size[a]) for a in others)):
+            key = [0] * len(size)
+            for axis, index in zip((*rows, *others), (*row, *column), strict=True):
+                key[axis] = index
+            line.append(tensor[tuple(key)])
+        matrix.append(line)
+    return matrix

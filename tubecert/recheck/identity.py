@@ -1,0 +1,102 @@
+"""Terms that vanish identically: quotients of polynomials over the rationals, exact.
+
+Variables and transcendental terms are indeterminates; sin^2 = 1 - cos^2 is the only relation used. A term whose
+numerator reduces to 0 vanishes wherever it is defined; nothing is concluded from one that does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
+
+from tubecert.recheck.terms import Term, in_order
+
+Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
+
+
+@dataclass(frozen=True, slots=True)
+class _Quotient:
+    top: Polynomial
+    bottom: Polynomial
+
+
+def vanish(terms: Sequence[Term]) -> bool:
+    """Whether every term is proven to be zero wherever it is defined."""
+    order = in_order(terms)
+    waves = [term for term in order if term.op in ("sin", "cos", "tan")]
+    others = [term for term in order if term.op in ("symbol", "pi", "sqrt", "exp", "norm", "direction")]
+    labels = [f"v{k}" for k in range(2 * len(waves) + len(others))] or ["v0"]
+    ring = fmpq_mpoly_ctx.get(labels, Ordering.lex)
+    field = _Field(ring, ring.gens())
+    value: dict[Term, _Quotient] = {}
+    for term in order:
+        value[term] = field.of(term, [value[arg] for arg in term.args])
+    return all(value[term].top == 0 for term in terms)
+
+
+class _Field:
+    """Quotients over a ring in which every second indeterminate of a wave is its cosine."""
+
+    def __init__(self, ring: Any, generators: Sequence[Polynomial]) -> None:
+        self._one, self._zero = ring.constant(1), ring.constant(0)
+        self._free = list(generators)
+        self._atoms: dict[tuple[object, ...], Polynomial] = {}
+        self._waves: list[tuple[tuple[str, str], Polynomial, Polynomial]] = []
+        self._relations: list[Polynomial] = []
+
+    def of(self, term: Term, args: list[_Quotient]) -> _Quotient:
+        """A term, given its arguments."""
+        match term.op:
+            case "const":
+                q = term.value
+                return self._whole(self._one * fmpq(q.numerator, q.denominator))  # type: ignore[union-attr]
+            case "add":
+                a, b = args
+                return self._reduced(a.top * b.bottom + b.top * a.bottom, a.bottom * b.bottom)
+            case "mul":
+                a, b = args
+                return self._reduced(a.top * b.top, a.bottom * b.bottom)
+            case "div":
+                a, b = args
+                return self._reduced(a.top * b.bottom, a.bottom * b.top)
+            case "pow":
+                return self._power(args[0], int(str(term.value)))
+            case "sin" | "cos" | "tan":
+                sine, cosine = self._wave(args[0])
+                if term.op == "tan":
+                    return _Quotient(sine, cosine)
+                return self._whole(sine if term.op == "sin" else cosine)
+        key = (term.op, str(term.value), *((str(a.top), str(a.bottom)) for a in args))
+        if key not in self._atoms:
+            self._atoms[key] = self._free.pop(0)
+        return self._whole(self._atoms[key])
+
+    def _wave(self, argument: _Quotient) -> tuple[Polynomial, Polynomial]:
+        """The sine and the cosine of an argument; both are the same for every term with that argument."""
+        key = str(argument.top), str(argument.bottom)
+        for known, sine, cosine in self._waves:
+            if known == key:
+                return sine, cosine
+        sine, cosine = self._free.pop(0), self._free.pop(0)  # sine before cosine in the order of the ring
+        self._waves.append((key, sine, cosine))
+        self._relations.append(sine * sine + cosine * cosine - self._one)
+        return sine, cosine
+
+    def _power(self, base: _Quotient, exponent: int) -> _Quotient:
+        if exponent < 0:
+            base, exponent = _Quotient(base.bottom, base.top), -exponent
+        result = self._whole(self._one)
+        for _ in range(exponent):
+            result = self._reduced(result.top * base.top, result.bottom * base.bottom)
+        return result
+
+    def _whole(self, p: Polynomial) -> _Quotient:
+        return _Quotient(p, self._one)
+
+    def _reduced(self, top: Polynomial, bottom: Polynomial) -> _Quotient:
+        for relation in self._relations:
+            top, bottom = divmod(top, relation)[1], divmod(bottom, relation)[1]
+        return _Quotient(top, bottom)

@@ -1,0 +1,89 @@
+"""The verdict on a certificate: every claim examined, the first that fails named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from tubecert.errors import ExitCode
+from tubecert.recheck import refuted
+from tubecert.recheck.claims import Case, Claim, Memory, of_certified
+from tubecert.recheck.consistency import unread
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Node, digest, read, wrong
+from tubecert.recheck.metric import stated
+
+BUDGET = 200_000
+Report = Callable[[str], None]  # the name of the claim that is being examined
+
+_CODES = {
+    "confirmed": ExitCode.CERTIFIED,
+    "contradicted": ExitCode.NOT_CERTIFIED,
+    "undecided": ExitCode.UNDECIDED,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A claim by name, and its outcome."""
+
+    name: str
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recheck:
+    """What was found. `stated` is the verdict of the certificate, `hash` its hash, `unread` what is for orientation."""
+
+    stated: str
+    hash: str
+    claims: tuple[Examined, ...]
+    unread: tuple[str, ...]
+
+    @property
+    def failing(self) -> Examined | None:
+        """The first claim that is contradicted, else the first that is undecided."""
+        for verdict in ("contradicted", "undecided"):
+            for claim in self.claims:
+                if claim.outcome.verdict == verdict:
+                    return claim
+        return None
+
+    @property
+    def verdict(self) -> str:
+        """`confirmed`, `contradicted` or `undecided`."""
+        return "confirmed" if self.failing is None else self.failing.outcome.verdict
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """0 only for a certificate that says `certified` and is confirmed."""
+        if self.stated == "certified" or self.verdict == "contradicted":
+            return _CODES[self.verdict]
+        return ExitCode.NOT_CERTIFIED if self.stated == "refuted" else ExitCode.UNDECIDED
+
+
+def recheck(
+    text: str, file: str, budget: int = BUDGET, report: Report | None = None, memory: Memory | None = None
+) -> Recheck:
+    """Examine every claim of the certificate `text`; raises `CertificateError` for what is no certificate."""
+    document = read(text, file)
+    result = document["result"]
+    document["run"].mapping()
+    verdict = result["verdict"].text()
+    if verdict not in ("certified", "refuted", "undecided"):
+        raise wrong("TC603", f"{result.path}.verdict is {verdict!r}, which is not known")
+    found = []
+    for claim in _claims(document, result, verdict, budget):
+        if report is not None:
+            report(claim.name)
+        found.append(Examined(claim.name, claim.outcome(memory)))
+    return Recheck(
+        stated=verdict, hash=document["hash"].text(), claims=tuple(found), unread=tuple(unread(result))
+    )
+
+
+def _claims(document: Node, result: Node, verdict: str, budget: int) -> Iterator[Claim]:
+    same = document["hash"].text() == digest(result.value)
+    yield Claim("the hash is that of the result", (same,), lambda: stated(same, "something was changed"))
+    case = Case(result, budget)
+    yield from of_certified(case) if verdict == "certified" else refuted.of_others(case)

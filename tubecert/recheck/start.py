@@ -1,0 +1,121 @@
+"""Claims about the start: the radius of the tube, d0, H0.
+
+Implements: theory (2.6), 2.11. The segment from x*(0) to x0 is cut into pieces; on each, sqrt is concave, so that its
+length is at most width times the root of the mean of g(s) = delta'M delta; that is at most g(mid) + w^2 sup|g''|/24.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from flint import arb, arb_mat
+
+from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root
+from tubecert.recheck.boxes import NormsBelow
+from tubecert.recheck.constants import Place
+from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.curve import Curve, Part
+from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.system import TIME, System
+from tubecert.recheck.terms import NOUGHT, Program, Term, matrix_replaced, matrix_slopes, number, variable
+from tubecert.recheck.tube import Tube
+
+_PIECES = (1, 16, 128, 1024, 4096)
+_ALONG = "r#"  # no state can have this name
+
+
+def offset(s: System, curve: Curve) -> Ball:
+    """|x0 - x*(0)|, an upper bound."""
+    if s.within is not None:
+        return exact(s.within)
+    return length(Program(_delta(s, curve), ()).run(()))
+
+
+def _delta(s: System, curve: Curve) -> list[Term]:
+    """x0 - x*(0), exact."""
+    assert s.x0 is not None
+    return [number(q) - x for q, x in zip(s.x0, curve.start, strict=True)]
+
+
+def radius(s: System, curve: Curve, rho: Fraction, lower: Fraction, upper: Fraction) -> Outcome:
+    """rho >= sqrt(A/a)|x0 - x*(0)| + eps + rho_a."""
+    if lower <= 0 or rho <= 0:
+        return stated(False, "the radius or the lower bound of the metric is not positive")
+    room, needed = exact(rho - s.epsilon - s.rho_a), root(exact(upper / lower)) * offset(s, curve)
+    if room >= needed:
+        return CONFIRMED
+    why = f"{float(needed.mid()) + float(s.epsilon + s.rho_a):.9g} is needed"
+    return Outcome(verdict="contradicted" if room < needed else "undecided", why=why)
+
+
+def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
+    """The segment from x*(0) to x0 is at most `limit` long."""
+    s = place.system
+    if s.within is not None:
+        needed = root(exact(upper)) * exact(s.within)
+        return stated(bool(exact(limit) >= needed), f"sqrt(A) r is {float(needed.mid()):.9g}")
+    delta = _delta(s, place.curve)
+    if all(d is NOUGHT for d in delta):
+        return stated(limit >= 0, "it is negative")
+    speed = _Speed(s, place.curve, delta)
+    for count in _PIECES[:1] if s.flat else _PIECES:
+        low, high = speed.over_pieces(count)
+        if high <= exact(limit):
+            return CONFIRMED
+        if low > exact(limit):
+            return Outcome(verdict="contradicted", why=f"the segment is longer than {float(low.lower()):.9g}")
+    return Outcome(verdict="undecided", why=f"the segment's length lies below {float(high.upper()):.9g}")
+
+
+class _Speed:
+    """g(s) = delta'M(x*(0) + s delta) delta and its second derivative."""
+
+    def __init__(self, s: System, curve: Curve, delta: list[Term]) -> None:
+        self._n = len(delta)
+        clock = variable(_ALONG)
+        line = {name: a + clock * d for name, a, d in zip(s.states, curve.start, delta, strict=True)}
+        W = matrix_replaced(s.W, line)
+        slope = matrix_slopes(W, _ALONG)
+        bend = matrix_slopes(slope, _ALONG)
+        self._program = Program([e for m in (W, slope, bend) for row in m for e in row], [_ALONG])
+        self._delta = arb_mat([[d] for d in Program(delta, ()).run(())])
+
+    def over_pieces(self, count: int) -> tuple[Ball, Ball]:
+        """The length of the segment from below and above."""
+        low, high, width = arb(0), arb(0), arb(1) / count
+        for k in range(count):
+            ends = arb(k) / count, arb(k + 1) / count
+            try:
+                middle, _ = self._at((ends[0] + ends[1]) / 2)
+                whole, bend = self._at(between(ends[0].lower(), ends[1].upper()))
+            except ZeroDivisionError:
+                return arb(0), arb("nan")
+            low = low + width * root(whole.lower())
+            high = high + width * root(middle + magnitude(bend) * width * width / 24)
+        return low, high
+
+    def _at(self, s: Ball) -> tuple[Ball, Ball]:
+        n, out = self._n, self._program.run([s])
+        W, slope, bend = (arb_mat(n, n, out[k * n * n : (k + 1) * n * n]) for k in range(3))
+        eta = W.solve(self._delta)
+        turned = slope * eta
+        back = W.solve(turned)
+        g = (self._delta.transpose() * eta)[0, 0]
+        second = 2 * (turned.transpose() * back)[0, 0] - (eta.transpose() * bend * eta)[0, 0]
+        return g, second
+
+
+def uncertainty(place: Place, limit: Fraction) -> Outcome:
+    """|h(0, x(0))| <= limit; where a bound of |h| is declared, that bound."""
+    s = place.system
+    if "h" in s.declared:
+        return stated(limit == s.declared["h"], "it is not the declared bound of |h|")
+    assert s.h is not None
+    at_start = matrix_replaced(s.h, {TIME: NOUGHT})
+    if s.x0 is not None:
+        fixed = matrix_replaced(at_start, dict(zip(s.states, map(number, s.x0), strict=True)))
+        return prove(NormsBelow([fixed], limit), Boxed({}), 1)
+    assert s.within is not None
+    curve = place.curve
+    still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
+    return prove(NormsBelow([at_start], limit), Tube(still, s.within, s.states, ()), place.budget)

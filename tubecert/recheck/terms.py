@@ -1,0 +1,311 @@
+"""Expressions of this room: hash-consed terms with derivative rules of their own, evaluated on balls.
+
+A term is built from a parsed expression node by node. Derivatives are sums over the arguments of a node of its partial
+derivative times theirs; the partial derivatives stand in one table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from itertools import count
+from weakref import WeakValueDictionary
+
+from flint import arb
+
+from tubecert.expression import Expression, topological
+from tubecert.recheck.balls import Ball, between, exact, length, power
+
+Rows = Sequence[Sequence["Term"]]
+Matrix = list[list["Term"]]
+
+_known: WeakValueDictionary[tuple[object, ...], Term] = WeakValueDictionary()
+_serial = count()
+
+
+class Term:
+    """An operation `op` on other terms; `value` is a number, a name, an exponent or an index.
+
+    The operations are those of `tubecert.expression.Expression`.
+    """
+
+    __slots__ = ("__weakref__", "args", "op", "serial", "value")
+
+    op: str
+    args: tuple[Term, ...]
+    value: Fraction | str | int | None
+    serial: int
+
+    def __add__(self, other: Term) -> Term:
+        if self.op == other.op == "const":
+            return number(_number(self) + _number(other))
+        if self is NOUGHT:
+            return other
+        if other is NOUGHT:
+            return self
+        return _make("add", *sorted((self, other), key=_age))
+
+    def __mul__(self, other: Term) -> Term:
+        if self.op == other.op == "const":
+            return number(_number(self) * _number(other))
+        if NOUGHT in (self, other):
+            return NOUGHT
+        if self is UNIT:
+            return other
+        if other is UNIT:
+            return self
+        return _make("mul", *sorted((self, other), key=_age))
+
+    def __neg__(self) -> Term:
+        return number(-1) * self
+
+    def __sub__(self, other: Term) -> Term:
+        return NOUGHT if self is other else self + (-other)
+
+    def __truediv__(self, other: Term) -> Term:
+        if other.op == "const" and _number(other) != 0:
+            return self * number(1 / _number(other))
+        return NOUGHT if self is NOUGHT else _make("div", self, other)
+
+    def raised(self, exponent: int) -> Term:
+        """An integer power."""
+        if exponent in (0, 1):
+            return self if exponent else UNIT
+        if self.op == "const" and (exponent > 0 or self is not NOUGHT):
+            return number(_number(self) ** exponent)
+        return _make("pow", self, value=exponent)
+
+
+def _age(term: Term) -> int:
+    return term.serial
+
+
+def _number(term: Term) -> Fraction:
+    assert isinstance(term.value, Fraction)
+    return term.value
+
+
+def _make(op: str, *args: Term, value: Fraction | str | int | None = None) -> Term:
+    key = (op, value, *(id(arg) for arg in args))
+    found = _known.get(key)
+    if found is None:
+        found = Term()
+        found.op, found.args, found.value, found.serial = op, args, value, next(_serial)
+        _known[key] = found
+    return found
+
+
+def number(q: Fraction | int) -> Term:
+    """A rational constant."""
+    return _make("const", value=Fraction(q))
+
+
+def variable(name: str) -> Term:
+    """A variable."""
+    return _make("symbol", value=name)
+
+
+NOUGHT = number(0)
+UNIT = number(1)
+
+
+def function(op: str, *args: Term, value: int | None = None) -> Term:
+    """`sqrt`, `sin`, `cos`, `tan`, `exp`, `norm` or `direction` of terms."""
+    return _make(op, *args, value=value)
+
+
+def remade(term: Term, args: tuple[Term, ...]) -> Term:
+    """The operation of a term on other arguments."""
+    match term.op:
+        case "add":
+            return args[0] + args[1]
+        case "mul":
+            return args[0] * args[1]
+        case "div":
+            return args[0] / args[1]
+        case "pow":
+            return args[0].raised(int(str(term.value)))
+    if args and args[0] is NOUGHT and term.op in _AT_ZERO:
+        return number(_AT_ZERO[term.op])
+    return _make(term.op, *args, value=term.value) if args else term
+
+
+_AT_ZERO = {"sin": 0, "tan": 0, "cos": 1, "exp": 1}
+
+
+def from_expressions(expressions: Iterable[Expression]) -> list[Term]:
+    """Parsed expressions as terms."""
+    expressions = list(expressions)
+    found: dict[Expression, Term] = {}
+    for node in topological(expressions):
+        leaf = _make(node.op, value=node.value)
+        found[node] = remade(leaf, tuple(found[arg] for arg in node.args)) if node.args else leaf
+        if node.args and found[node].op not in _PARTIAL and found[node].op not in ("const", "symbol", "pi"):
+            raise ValueError(f"{node.op} is not an operation that is known here")
+    return [found[e] for e in expressions]
+
+
+def in_order(roots: Iterable[Term]) -> list[Term]:
+    """Every term that the roots need, arguments first."""
+    order: dict[Term, None] = {}
+    stack = list(roots)
+    while stack:
+        term = stack[-1]
+        waiting = [arg for arg in term.args if arg not in order]
+        if waiting:
+            stack.extend(waiting)
+        else:
+            order.setdefault(stack.pop())
+    return list(order)
+
+
+def names(roots: Iterable[Term]) -> set[str]:
+    """The variables that occur."""
+    return {str(term.value) for term in in_order(roots) if term.op == "symbol"}
+
+
+def replaced(roots: Sequence[Term], values: Mapping[str, Term]) -> list[Term]:
+    """The terms with variables replaced by terms, all at once."""
+    new: dict[Term, Term] = {}
+    for term in in_order(roots):
+        if term.op == "symbol":
+            new[term] = values.get(str(term.value), term)
+        else:
+            new[term] = remade(term, tuple(new[arg] for arg in term.args)) if term.args else term
+    return [new[root] for root in roots]
+
+
+_PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
+    "add": lambda e, i: UNIT,
+    "mul": lambda e, i: e.args[1 - i],
+    "div": lambda e, i: UNIT / e.args[1] if i == 0 else -(e.args[0] / e.args[1].raised(2)),
+    "pow": lambda e, i: number(int(str(e.value))) * e.args[0].raised(int(str(e.value)) - 1),
+    "sqrt": lambda e, i: number(Fraction(1, 2)) / e,
+    "sin": lambda e, i: function("cos", e.args[0]),
+    "cos": lambda e, i: -function("sin", e.args[0]),
+    "tan": lambda e, i: UNIT / function("cos", e.args[0]).raised(2),
+    "exp": lambda e, i: e,
+    "norm": lambda e, i: function("direction", *e.args, value=i),
+}
+"""The derivative of an operation by its i-th argument (of a norm: an element of its generalised gradient)."""
+
+
+def slopes(roots: Sequence[Term], name: str) -> list[Term]:
+    """d(root)/d(name) for every root; raises `ValueError` where there is no derivative."""
+    slope: dict[Term, Term] = {}
+    for term in in_order(roots):
+        total = UNIT if term.op == "symbol" and term.value == name else NOUGHT
+        for i, arg in enumerate(term.args):
+            if slope[arg] is not NOUGHT:
+                if term.op not in _PARTIAL:
+                    raise ValueError(f"{term.op} has no derivative")
+                total = total + _PARTIAL[term.op](term, i) * slope[arg]
+        slope[term] = total
+    return [slope[root] for root in roots]
+
+
+def matrix_slopes(a: Rows, name: str) -> Matrix:
+    """Da/d(name), entry by entry."""
+    flat = iter(slopes([e for row in a for e in row], name))
+    return [[next(flat) for _ in row] for row in a]
+
+
+def matrix_replaced(a: Rows, values: Mapping[str, Term]) -> Matrix:
+    """A matrix with variables replaced."""
+    flat = iter(replaced([e for row in a for e in row], values))
+    return [[next(flat) for _ in row] for row in a]
+
+
+def times(a: Rows, b: Rows) -> Matrix:
+    """A b."""
+    columns = list(zip(*b, strict=True))
+    return [
+        [sum((x * y for x, y in zip(row, column, strict=True)), start=NOUGHT) for column in columns]
+        for row in a
+    ]
+
+
+def plus(a: Rows, b: Rows, scale: Fraction | int = 1) -> Matrix:
+    """A + scale b."""
+    q = number(scale)
+    return [[x + q * y for x, y in zip(r, s, strict=True)] for r, s in zip(a, b, strict=True)]
+
+
+def turned(a: Rows) -> Matrix:
+    """A'."""
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def scaled(q: Fraction | int, a: Rows) -> Matrix:
+    """A matrix q times another."""
+    return [[number(q) * x for x in row] for row in a]
+
+
+def unit_matrix(n: int) -> Matrix:
+    """The identity."""
+    return [[UNIT if i == j else NOUGHT for j in range(n)] for i in range(n)]
+
+
+def all_zero(a: Rows) -> bool:
+    """Whether every entry is the constant 0."""
+    return all(e is NOUGHT for row in a for e in row)
+
+
+class Program:
+    """Terms as a straight line of steps, run on balls."""
+
+    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
+        order = in_order(outputs)
+        place = {term: k for k, term in enumerate(order)}
+        column = {name: k for k, name in enumerate(inputs)}
+        self._start: list[arb] = [arb(0)] * len(order)
+        self._inputs: list[tuple[int, int]] = []
+        self._steps: list[tuple[int, Callable[[list[arb], int], arb] | str, list[int], int]] = []
+        for k, term in enumerate(order):
+            if term.op == "const":
+                self._start[k] = exact(_number(term))
+            elif term.op == "pi":
+                self._start[k] = arb.pi()
+            elif term.op == "symbol":
+                self._inputs.append((k, column[str(term.value)]))
+            else:
+                index = term.value if isinstance(term.value, int) else 0
+                kernel = term.op if term.op in ("add", "mul") else _KERNELS[term.op]
+                self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
+        self._outputs = [place[term] for term in outputs]
+
+    def run(self, values: Sequence[Ball]) -> list[Ball]:
+        """Enclosures of the outputs."""
+        memory = self._start.copy()
+        for k, column in self._inputs:
+            memory[k] = values[column]
+        for k, kernel, args, index in self._steps:
+            if kernel == "mul":
+                memory[k] = memory[args[0]] * memory[args[1]]
+            elif kernel == "add":
+                memory[k] = memory[args[0]] + memory[args[1]]
+            else:
+                assert not isinstance(kernel, str)
+                memory[k] = kernel([memory[i] for i in args], index)
+        return [memory[k] for k in self._outputs]
+
+
+def _direction(args: list[Ball], index: int) -> Ball:
+    size = length(args)
+    if not size > 0:
+        return between(-1, 1)
+    value = args[index] / size
+    return value.intersection(between(-1, 1)) if value.overlaps(between(-1, 1)) else value
+
+
+_KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
+    "div": lambda a, _: a[0] / a[1],
+    "pow": lambda a, n: power(a[0], n),
+    "sqrt": lambda a, _: a[0].sqrt(),
+    "sin": lambda a, _: a[0].sin(),
+    "cos": lambda a, _: a[0].cos(),
+    "tan": lambda a, _: a[0].tan(),
+    "exp": lambda a, _: a[0].exp(),
+    "norm": lambda a, _: length(a),
+    "direction": _direction,
+}

@@ -1,0 +1,189 @@
+"""The tube: all states within rho of the plan, as a domain that cuts boxes and tells which lie outside.
+
+A box of states is compared with segments of the plan: with the gaps between box and segment in all other coordinates,
+a point of the tube is at most sqrt(rho^2 - gaps^2) from the segment in each one. Segments are halved while they are
+long against the box. Where a test depends on t or on u*, time is a coordinate and selects the segments.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, ceiling, exact, floor, length
+from tubecert.recheck.cover import Range, State, as_ball
+from tubecert.recheck.curve import Curve, Segment
+
+TIME = "t"
+
+# floats are correctly rounded: what they lose over a few operations is far below these factors
+_LESS, _MORE = 1 - 1e-14, 1 + 1e-14
+_COARSE = 0.25  # a segment may be so long against the box
+
+
+class Tube:
+    """O(rho) over states, inputs (standing for u*), time, and ranges that do not depend on the plan."""
+
+    def __init__(
+        self,
+        curve: Curve,
+        rho: Fraction,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        free: Mapping[str, Range] | None = None,
+    ) -> None:
+        self._curve, self._rho = curve, exact(rho)
+        self._square = math.nextafter(float(rho * rho), math.inf)
+        self._states = {name: i for i, name in enumerate(states)}
+        self._inputs = {name: j for j, name in enumerate(inputs)}
+        self._free = {v: (as_ball(lo), as_ball(hi)) for v, (lo, hi) in (free or {}).items()}
+
+    def needed(self, variables: tuple[str, ...]) -> tuple[str, ...]:
+        """Time beside what is given, where an input moves with the plan."""
+        tied = any(v in self._inputs for v in variables) and self._curve.moves
+        return (*variables, TIME) if tied and TIME not in variables else variables
+
+    def start(self, variables: tuple[str, ...]) -> list[State]:
+        """One box around everything."""
+        root, rho = self._curve.root, ceiling(self._rho)
+        box = []
+        for v in variables:
+            if v in self._states:
+                lo, hi = root.x[self._states[v]]
+                box.append((math.nextafter(lo - rho, -math.inf), math.nextafter(hi + rho, math.inf)))
+            elif v in self._inputs:
+                box.append(root.u[self._inputs[v]])
+            elif v == TIME and self._curve.moves:
+                box.append(root.when)
+            else:
+                box.append((floor(self._free[v][0]), ceiling(self._free[v][1])))
+        return [(box, [root])]
+
+    def cut(self, variables: tuple[str, ...], state: State) -> State | None:
+        """The box cut to what the tube can reach, with the segments that matter for it."""
+        box, segments = state
+        columns = [(i, self._states[v]) for i, v in enumerate(variables) if v in self._states]
+        tied = [(i, self._inputs[v]) for i, v in enumerate(variables) if v in self._inputs]
+        window = box[variables.index(TIME)] if TIME in variables and self._curve.moves else None
+        if not columns and not tied:
+            return state
+        width = max((box[i][1] - box[i][0] for i, _ in columns), default=math.inf)
+        kept: list[Segment] = []
+        reach: dict[int, tuple[float, float]] = {}
+        waiting = list(segments)
+        while waiting:
+            segment = waiting.pop()
+            if window and (segment.when[1] < window[0] or segment.when[0] > window[1]):
+                continue
+            near = self._near(segment, columns, box)
+            if near is None:
+                continue
+            if self._is_long(segment, columns, width, window) and segment.halves:
+                waiting.extend(segment.halves)
+                continue
+            kept.append(segment)
+            for i, j in tied:
+                near[i] = segment.u[j]
+            reach = {i: _joined(reach.get(i), ends) for i, ends in near.items()}
+            if not window and all(lo <= box[i][0] and hi >= box[i][1] for i, (lo, hi) in reach.items()):
+                return box, kept + waiting  # nothing can be cut: look no closer
+        if not kept:
+            return None
+        new = list(box)
+        for i, (lo, hi) in reach.items():
+            new[i] = max(box[i][0], lo), min(box[i][1], hi)
+            if new[i][0] > new[i][1]:
+                return None
+        return new, kept
+
+    def _near(
+        self, segment: Segment, columns: list[tuple[int, int]], box: list[tuple[float, float]]
+    ) -> dict[int, tuple[float, float]] | None:
+        """Where the tube around a segment can meet the box; None if nowhere."""
+        squares = []
+        for i, k in columns:
+            gap = max(0.0, box[i][0] - segment.x[k][1], segment.x[k][0] - box[i][1]) * _LESS
+            squares.append(gap * gap * _LESS)
+        if sum(squares) * _LESS > self._square:
+            return None
+        found = {}
+        for place, (i, k) in enumerate(columns):
+            others = sum(squares[:place]) + sum(squares[place + 1 :])
+            room = max(0.0, self._square - others * _LESS)
+            half = math.sqrt(room) * _MORE
+            lo, hi = segment.x[k]
+            found[i] = math.nextafter(lo - half, -math.inf), math.nextafter(hi + half, math.inf)
+        return found
+
+    @staticmethod
+    def _is_long(
+        segment: Segment,
+        columns: list[tuple[int, int]],
+        width: float,
+        window: tuple[float, float] | None,
+    ) -> bool:
+        if window is not None:
+            return segment.when[1] - segment.when[0] > max(window[1] - window[0], 1e-12)
+        motion = max(segment.x[k][1] - segment.x[k][0] for _, k in columns)
+        return motion > _COARSE * width
+
+    def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
+        """The centre of the box, moved towards the plan into the tube."""
+        box, segments = state
+        t, x, u = segments[len(segments) // 2].middle()
+        inside = [0.5 * lo + 0.5 * hi for lo, hi in box]
+        columns = [(i, self._states[v]) for i, v in enumerate(variables) if v in self._states]
+        offset = [arb(inside[i]) - x[k] for i, k in columns]
+        size = length(offset)
+        scale = 1.0
+        if not size <= self._rho:
+            scale = float((self._rho / size.upper()).lower()) * (1 - 1e-9) if size > 0 else 0.0
+        at = [arb(value) for value in inside]
+        moved = [z * scale for z in offset]
+        if not length(moved) <= self._rho:
+            return None
+        for (i, k), z in zip(columns, moved, strict=True):
+            at[i] = x[k] + z
+        for i, v in enumerate(variables):
+            if v in self._inputs:
+                at[i] = u[self._inputs[v]]
+            elif v == TIME and self._curve.moves:
+                at[i] = t
+            elif v not in self._states:
+                low, high = ceiling(self._free[v][0]), floor(self._free[v][1])
+                if low > high:
+                    return None
+                at[i] = arb(min(max(inside[i], low), high))
+        return at
+
+    def pull(
+        self, variables: tuple[str, ...], state: State, caused: list[float], spread: list[float]
+    ) -> list[float]:
+        """The width of the bound; where the tube cuts the box, also what varies in it, and the motion of the plan."""
+        box, segments = state
+        columns = [(i, self._states[v]) for i, v in enumerate(variables) if v in self._states]
+        tied = [i for i, v in enumerate(variables) if v in self._inputs]
+        hull = [(min(s.x[k][0] for s in segments), max(s.x[k][1] for s in segments)) for _, k in columns]
+        far = [
+            max(box[i][1] - lo, hi - box[i][0], 0.0) for (i, _), (lo, hi) in zip(columns, hull, strict=True)
+        ]
+        found = list(caused)
+        if sum(x * x for x in far) > self._square:
+            for i, _ in columns:
+                found[i] += spread[i]
+        if TIME in variables and self._curve.moves:
+            place = variables.index(TIME)
+            for (i, _), (lo, hi) in zip(columns, hull, strict=True):
+                width = max(box[i][1] - box[i][0], 1e-300)
+                found[place] += spread[i] * min(1e9, (hi - lo) / width)
+            found[place] += sum(spread[i] + caused[i] for i in tied)
+        for i in tied:
+            found[i] = 0.0
+        return found
+
+
+def _joined(a: tuple[float, float] | None, b: tuple[float, float]) -> tuple[float, float]:
+    return b if a is None else (min(a[0], b[0]), max(a[1], b[1]))
