@@ -136,13 +136,12 @@ def _plane(campaign: Campaign) -> Figure | None:
         return None
     from matplotlib.collections import PolyCollection
 
-    figure = _figure(6.4, 5.2)
+    figure = _figure(6.4, 5.6)
     axis = figure.subplots()
     i, j = (setting.spec.states.index(name) for name in names)
-    t, plan = _fine_plan(setting)
+    plan = _fine_plan(setting)
     section = _section(setting, i, j)
-    every = max(1, len(t) // _SHAPES)
-    shapes = [section + point for point in plan[::every][:, [i, j]]]
+    shapes = [section + point for point in _spread(plan[:, [i, j]])]
     # drawn opaque: overlapping shapes must not darken each other
     axis.add_collection(PolyCollection(shapes, facecolors="#FBE3B5", edgecolors="none", zorder=1))
     _obstacles(axis, setting, names)
@@ -151,8 +150,6 @@ def _plane(campaign: Campaign) -> Figure | None:
     axis.plot(plan[:, i], plan[:, j], color="black", lw=1.0, ls="--", zorder=5, label="plan")
     axis.plot(*plan[0, [i, j]], marker="o", ms=4, color="black", ls="none", zorder=6)
     axis.plot(*plan[-1, [i, j]], marker="s", ms=4, color="black", ls="none", zorder=6)
-    if len(t) > 1 and np.ptp(plan[:, [i, j]]) == 0:
-        axis.plot([], [], lw=0)
     _window(axis, np.vstack(shapes), [item.runs.x[0][:, [i, j]] for item in campaign.drawn])
     axis.set_aspect("equal")
     axis.set_xlabel(_labelled(setting, names[0]))
@@ -161,7 +158,8 @@ def _plane(campaign: Campaign) -> Figure | None:
     handles, labels = axis.get_legend_handles_labels()
     from matplotlib.patches import Patch
 
-    axis.legend([*handles, Patch(facecolor="#FBE3B5")], [*labels, "tube"], loc="best")
+    tube = Patch(facecolor="#FBE3B5")
+    figure.legend([tube, *handles], ["tube", *labels], loc="outside lower center", ncols=5)
     return figure
 
 
@@ -175,11 +173,20 @@ def plane_of(setting: Setting) -> tuple[str, str] | None:
     return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
 
 
-def _fine_plan(setting: Setting) -> tuple[Array, Array]:
-    """Times and the plan's states (K, n) for drawing."""
-    t = np.linspace(0.0, setting.horizon, 1001)
+def _fine_plan(setting: Setting) -> Array:
+    """The plan's states (K, n) for drawing."""
+    t = np.linspace(0.0, setting.horizon, 2001)
     x, _ = setting.plan.enclose(t, t)
-    return t, x.mid
+    return x.mid
+
+
+def _spread(curve: Array) -> Array:
+    """Points (K, 2) of a curve at equal distances along it."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    if length[-1] == 0:
+        return curve[:1]
+    wanted = np.linspace(0.0, length[-1], _SHAPES)
+    return np.stack([np.interp(wanted, length, curve[:, i]) for i in range(2)], axis=1)
 
 
 def _section(setting: Setting, i: int, j: int) -> Array:
@@ -252,7 +259,9 @@ def _inputs(campaign: Campaign) -> Figure:
                 axis.set_ylabel(_labelled(setting, name))
         axes[0, column].set_title(NAMES[item.loop.controller], fontsize=9, loc="left")
         axes[-1, column].set_xlabel("t [s]")
-    axes[0, -1].legend(loc="best")
+        axes[-1, column].set_xlim(0, setting.horizon)
+    fullest = max(range(len(loops)), key=lambda column: len(axes[0, column].lines))
+    figure.legend(*axes[0, fullest].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -320,6 +329,7 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
         axis.set_title(title, fontsize=9, loc="left")
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes[-1].set_xlabel("t [s]")
+    axes[-1].set_xlim(0, setting.horizon)
     return figure
 
 
