@@ -62,7 +62,7 @@ def load(path: str) -> dict[str, Any]:
     Raises `TargetError` (TC121) for anything else. What the result says is not examined here.
     """
     try:
-        certificate = json.loads(Path(path).read_text(encoding="utf-8"))
+        certificate = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_no_number)
         if not isinstance(certificate, dict) or not isinstance(certificate.get("result"), dict):
             raise ValueError("it is JSON, but no certificate")
         if certificate.get("format") != FORMAT:
@@ -80,6 +80,10 @@ def load(path: str) -> dict[str, Any]:
     except ValueError as error:
         raise unreadable(path, str(error)) from error
     return certificate
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"it holds {word}, which is no number of JSON")
 
 
 def unreadable(path: str, why: str) -> TargetError:

@@ -17,7 +17,7 @@ from tubecert.report.numbers import short
 
 Point = tuple[float, float]
 WIDTH, HEIGHT = 400, 270
-LEFT, RIGHT, TOP, BOTTOM = 54, 14, 12, 42
+LEFT, RIGHT, TOP, BOTTOM = 60, 14, 12, 42
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

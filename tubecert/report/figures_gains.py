@@ -173,7 +173,7 @@ def _elasticities(result: Mapping[str, Any]) -> Figure | None:
     text(
         svg,
         ((left + right) / 2, height - 10),
-        "change of the least Γ in % per 1 % of the constant",
+        "% of the least Γ per 1 % of the constant",
         "axis middle",
     )
     legend = tuple((f"{STYLES[s]} bar", NAMES[s]) for s in sorted(slopes))
