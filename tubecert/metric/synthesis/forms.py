@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
@@ -37,7 +38,7 @@ class PointForms:
 
     def inner(self, coefficients: Array) -> Array:
         """sum_k g_k V_k, (N, n, n)."""
-        return np.einsum("pk,kij->pij", self.values, coefficients)
+        return np.asarray(np.einsum("pk,kij->pij", self.values, coefficients))
 
     def metric(self, coefficients: Array) -> Array:
         """W, (N, n, n)."""
@@ -71,7 +72,7 @@ class PointForms:
 class Unknowns:
     """Which entries of the V_k are unknown: mask (K, n, n), upper triangle only; the others are 0."""
 
-    mask: Array
+    mask: NDArray[np.bool_]
 
     @property
     def count(self) -> int:
@@ -79,10 +80,10 @@ class Unknowns:
         return len(self.places[0])
 
     @property
-    def places(self) -> tuple[Array, Array, Array]:
+    def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
         """(k, i, j) of each, i <= j."""
         k, i, j = np.nonzero(self.mask)
-        return k, i, j
+        return np.asarray(k), np.asarray(i), np.asarray(j)
 
     def matrices(self, y: Array) -> Array:
         """V_k from the unknowns, (K, n, n)."""
@@ -122,14 +123,15 @@ class FormsTape:
         Points that are closed under the sign symmetries keep even and odd functions apart.
         """
         values = self(points).values
-        r = np.linalg.qr(values[np.isfinite(values).all(axis=1)] / np.sqrt(len(points)), mode="r")
+        finite = values[np.isfinite(values).all(axis=1)]
+        r = np.asarray(np.linalg.qr(finite / np.sqrt(len(points)), mode="r"))
         if r.shape[0] == r.shape[1] and np.abs(np.diag(r)).min() > 1e-9 * np.abs(r).max():
             r = np.where(np.abs(r) > 1e-12 * np.abs(r).max(), r, 0.0)
             self._basis = self._basis @ np.linalg.inv(r)
 
     def coefficients(self, inner: Array) -> Array:
         """The V_k of the family (K, n, n) from those of the changed functions."""
-        return np.einsum("kj,jab->kab", self._basis, inner)
+        return np.asarray(np.einsum("kj,jab->kab", self._basis, inner))
 
     def __call__(self, points: Array, annihilator: Array | None = None) -> PointForms:
         """The forms at points (N, n), with the given N (N, n, r) if there is one."""
@@ -199,7 +201,7 @@ def _pairs(left: Array, right: Array, unknowns: Unknowns) -> Array:
     unit = outer + outer.swapaxes(1, 2)
     unit[:, range(n), range(n)] *= 0.5
     both = 0.5 * (unit + unit.swapaxes(3, 4))
-    return both.reshape(len(left), n * n, left.shape[1], left.shape[1])
+    return np.asarray(both.reshape(len(left), n * n, left.shape[1], left.shape[1]))
 
 
 def _flat(forms: PointForms) -> Array:

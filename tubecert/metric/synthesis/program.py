@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from tubecert.enclosure.interval import Array
@@ -19,7 +20,7 @@ from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution,
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns, upper
 from tubecert.metric.synthesis.problem import Floor
 
-_TOLERANCE, _ROUGH = 1e-7, 1e-4
+_TOLERANCE, _ROUGH = 1e-7, 1e-5
 _LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
 
 
@@ -31,7 +32,7 @@ class Points:
     rows: Array
     floor: Array
 
-    def kept(self, chosen: Array) -> Points:
+    def kept(self, chosen: NDArray[np.bool_]) -> Points:
         """Those with a True in `chosen` (N,)."""
         return Points(at=self.at[chosen], rows=self.rows[chosen], floor=self.floor[chosen])
 
@@ -90,7 +91,9 @@ class PointProgram:
 
     def _contracting(self, reference: Array | None) -> list[Semidefinite]:
         """The C2 blocks; with a reference, less 2 mu N'W_r N."""
-        blocks = []
+        blocks: list[Semidefinite] = []
+        if not self.contraction.rows.shape[1]:
+            return blocks  # as many inputs as states: C2 is void
         for rows, weight in zip(self.contraction.rows, self.contraction.floor, strict=True):
             order = round((np.sqrt(8 * len(rows) + 1) - 1) / 2)
             last = np.zeros(len(rows)) if reference is None else -2 * weight.reshape(rows.shape) @ reference
@@ -121,4 +124,5 @@ def contraction_points(forms: FormsTape, unknowns: Unknowns, at: Array, rate: fl
 
 def finite(points: Points) -> Points:
     """Without those at which something is not finite."""
-    return points.kept(np.isfinite(points.rows).all(axis=(1, 2)) & np.isfinite(points.floor).all(axis=1))
+    known = np.isfinite(points.rows).all(axis=(1, 2)) & np.isfinite(points.floor).all(axis=1)
+    return points.kept(np.asarray(known))
