@@ -1,9 +1,9 @@
 """What a computer does at its samples: the adaptation of certificate C, and with a control rate the whole controller.
 
-Adaptation of C at t = i Ts: s_hat = -g/(e^{g Ts} - 1) xtilde, sigma_hat = the projection of e^{g Ts} B^+ s_hat to the ball.
-Controller at a rate: u = u* + k + u_a is held; the filter is exact for a held sigma_hat; the predictor is stepped by Euler,
-xhat+ = xhat + dt (f + B(u + sigma_hat) + A_m xtilde), and then sigma_hat+ = clip(sigma_hat + dt Gamma Proj(-B'xtilde)) uses
-the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2.
+Adaptation of C at t = i Ts: s_hat = -g/(e^{g Ts} - 1) xtilde, sigma_hat = the projection of e^{g Ts} B^+ s_hat to
+the ball. Controller at a rate: u = u* + k + u_a is held; the filter is exact for a held sigma_hat; the predictor is
+stepped by Euler, xhat+ = xhat + dt (f + B(u + sigma_hat) + A_m xtilde), and then sigma_hat+ = clip(sigma_hat + dt
+Gamma Proj(-B'xtilde)) uses the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
 
 @compiled
 def control(
-    fast: Any, computer: Any, count: int, x: Any, u_plan: Any, point: Any, y: Any, held: Any, gram: Any
+    fast: Any, computer: Any, count: int, x: Any, plan: Any, point: Any, y: Any, held: Any, gram: Any
 ) -> None:
     """One sample of the whole controller: `held` becomes u; the last n entries of y hold the predicted xhat."""
     n, m = fast.n, fast.m
@@ -68,17 +68,17 @@ def control(
         for j in range(m):
             u_a[j] = computer.decay * u_a[j] - (1.0 - computer.decay) * sigma[j]
     if fast.kind == REFERENCE:
-        sigma[:] = point.h
+        sigma[:] = point.inputs[0]
     elif fast.kind == ADAPTIVE:
         _integrate(fast, computer.dt, point.B, y)
     elif fast.kind == SAMPLED and count % computer.every == 0:
         adapt(fast, computer, point.B, y, gram)
     for j in range(m):
-        held[j] = u_plan[j] + point.k[j] + u_a[j]
+        held[j] = plan[2 * n + j] + point.inputs[1, j] + u_a[j]
     for i in range(n):
-        speed = point.f[i]
-        for j in range(m):
-            speed += point.B[i, j] * (held[j] + (sigma[j] if fast.kind == ADAPTIVE else 0.0))
+        speed = point.f[i] + dot(point.B[i], held)
+        if fast.kind == ADAPTIVE:
+            speed += dot(point.B[i], sigma)
         if fast.kind == SAMPLED:
             speed += y[n + 2 * m + i]
         xhat[i] += computer.dt * (speed + dot(fast.A[i], y[:n]))

@@ -1,10 +1,12 @@
 """The fast part of a loop over one step, under a disturbance that is a polynomial of time.
 
-y = (xtilde (n), sigma_hat (m), u_a (m), s_hat (n), v (n)) with v = int B u_a, all that the slow part needs of it. With a
-constant B and the projection idle y' is linear: the flow is a matrix, exact however fast (xtilde, sigma_hat) oscillates.
-Otherwise RK4 resolves the oscillation, and finds the moments at which the hard projection sets in and lets go.
+y = (xtilde (n), sigma_hat (m), u_a (m), s_hat (n), v (n)) with v = int B u_a, all that the slow part needs of it.
+With a constant B and the projection idle y' is linear: the flow is a matrix, exact however fast (xtilde, sigma_hat)
+oscillates. Otherwise RK4 resolves the oscillation, and finds the moments at which the hard projection sets in and
+lets go.
 
-Whether the projection stays idle is known beforehand: |sigma_hat - h|^2 + Gamma |xtilde|^2 decays but for the drift of h.
+Whether the projection stays idle is known beforehand: |sigma_hat - h|^2 + Gamma |xtilde|^2 decays but for the
+drift of h.
 """
 
 from __future__ import annotations
@@ -19,16 +21,17 @@ from tubecert.simulate.small import clip, dot
 
 NONE, REFERENCE, ADAPTIVE, SAMPLED = range(4)
 KINDS = {"nominal": NONE, "ccm": NONE, "reference": REFERENCE, "l1": ADAPTIVE, "sampled": SAMPLED}
-_FREE, _SLIDING = 0, 1
 _ON_BOUNDARY = 1e-12
-_CROSSINGS = 60  # bisections of one step at a crossing
+_CROSSINGS = 40  # bisections of one step at a crossing
+_CLOSE = 1e-7  # of a step: how near a crossing is found
 
 
 class Fast(NamedTuple):
     """Gains of the fast part; `layer` 0 is the hard projection.
 
-    `exact` says that B is constant: then `flow` (Q, 2, Y, Y) and `forced` (Q, 2, 3, Y, m) are the exact flows over half
-    and whole steps of Q lengths, for y and for the coefficients of h. `turn` is the angle in rad that RK4 may step over.
+    `exact` says that B is constant: then `flow` (2 Q, Y, Y) and `forced` (2 Q, 3, Y, m) are the exact flows over half
+    and whole steps of Q lengths, for y and for the coefficients of h. `turn` is the angle in rad that RK4 may step
+    over.
     """
 
     kind: int
@@ -46,14 +49,15 @@ class Fast(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """Coefficients of h (3, m) and B (3, n, m) by powers of the time over the step's length, and working memory."""
+    """h and B while the fast part flows, and working memory.
+
+    `h` (4, m), `B` (4, n, m): the coefficients by powers of the time over the step's length, then the values at a
+    time. `stages` (6, Y): four rates, where they are taken, and the end of a step.
+    """
 
     h: Array
     B: Array
-    h_now: Array
-    B_now: Array
     stages: Array
-    y: Array
 
 
 def size(n: int, m: int) -> int:
@@ -63,10 +67,7 @@ def size(n: int, m: int) -> int:
 
 def inner(n: int, m: int) -> Inner:
     """Fresh working memory."""
-    Y = size(n, m)
-    return Inner(
-        np.zeros((3, m)), np.zeros((3, n, m)), np.zeros(m), np.zeros((n, m)), np.zeros((5, Y)), np.zeros(Y)
-    )
+    return Inner(np.zeros((4, m)), np.zeros((4, n, m)), np.zeros((6, size(n, m))))
 
 
 def generator(kind: int, A: Array, Gamma: float, omega: float, B: Array) -> tuple[Array, Array]:
@@ -101,8 +102,8 @@ def exact_flows(fast: Fast, B: Array, lengths: Array) -> Fast:
     Y, m = E.shape
     block = np.zeros((Y + 3 * m, Y + 3 * m))
     block[:Y, :Y], block[:Y, Y : Y + m] = scale[:, None] * L / scale, scale[:, None] * E
-    halves = np.stack([lengths / 2, lengths], axis=1)
-    stack = np.tile(block, (*halves.shape, 1, 1)) * halves[..., None, None]
+    halves = np.stack([lengths / 2, lengths], axis=1).ravel()
+    stack = np.tile(block, (len(halves), 1, 1)) * halves[:, None, None]
     stack[..., Y : Y + 2 * m, Y + m :] = np.eye(2 * m)
     whole = expm(stack)
     flow = whole[..., :Y, :Y] / scale[:, None] * scale
@@ -112,205 +113,161 @@ def exact_flows(fast: Fast, B: Array, lengths: Array) -> Fast:
 
 
 @compiled
-def advance(
-    fast: Any, length: float, which: int, half: int, y: Any, inner: Any, first: int, out: Any
-) -> None:
-    """y after a half or whole step (`half` 0 or 1) of a length; only the entries from `first` on are needed."""
-    if fast.exact and (fast.kind != ADAPTIVE or _idle(fast, y, inner)):
-        _exact(fast, which, half, y, inner, first, out)
+def advance(fast: Any, length: float, index: int, y: Any, inner: Any, first: int, out: Any) -> None:
+    """y after a length; of an exact flow, whose number is `index`, only the entries from `first` on."""
+    if fast.exact and (fast.kind != ADAPTIVE or _idle(fast, y, inner.h)):
+        _exact(fast.flow[index], fast.forced[index], y, inner.h, first, fast.n, out)
     else:
         out[:] = y
         _resolved(fast, length, out, inner)
 
 
 @compiled
-def _exact(fast: Any, which: int, half: int, y: Any, inner: Any, first: int, out: Any) -> None:
-    Y, m = y.shape[0], fast.m
-    flow, forced = fast.flow[which, half], fast.forced[which, half]
-    for i in range(first, Y):
+def _exact(flow: Any, forced: Any, y: Any, h: Any, first: int, n: int, out: Any) -> None:
+    for i in range(first, y.shape[0]):
         total = 0.0
-        for j in range(Y - fast.n):  # v is 0 at the start of a step
+        for j in range(y.shape[0] - n):  # v is 0 at the start of a step
             total += flow[i, j] * y[j]
         for p in range(3):
-            for j in range(m):
-                total += forced[p, i, j] * inner.h[p, j]
+            total += dot(forced[p, i], h[p])
         out[i] = total
 
 
 @compiled
-def _idle(fast: Any, y: Any, inner: Any) -> bool:
+def _idle(fast: Any, y: Any, h: Any) -> bool:
     """Whether sigma_hat provably stays where the projection does nothing, up to the rounding."""
-    n, m = fast.n, fast.m
-    amplitude, size, drift = 0.0, 0.0, 0.0
-    for i in range(n):
+    amplitude, reach = 0.0, 0.0
+    for i in range(fast.n):
         amplitude += fast.Gamma * y[i] * y[i]
-    for j in range(m):
-        amplitude += (y[n + j] - inner.h[0, j]) ** 2
-    for p in range(3):
-        length = np.sqrt(dot(inner.h[p], inner.h[p]))
-        size += length
-        drift += p * length
-    return bool(np.sqrt(amplitude) + drift + size <= fast.radius / np.sqrt(1.0 + fast.layer))
+    for j in range(fast.m):
+        amplitude += (y[fast.n + j] - h[0, j]) ** 2
+    for p in range(3):  # |h| and its drift
+        reach += (1 + p) * np.sqrt(dot(h[p], h[p]))
+    return bool(np.sqrt(amplitude) + reach <= fast.radius / np.sqrt(1.0 + fast.layer))
 
 
 @compiled
-def _interpolate(inner: Any, s: float) -> None:
+def _at(inner: Any, s: float) -> None:
     """h and B at the share s of the step."""
-    for j in range(inner.h_now.shape[0]):
-        inner.h_now[j] = inner.h[0, j] + s * (inner.h[1, j] + s * inner.h[2, j])
-        for i in range(inner.B_now.shape[0]):
-            inner.B_now[i, j] = inner.B[0, i, j] + s * (inner.B[1, i, j] + s * inner.B[2, i, j])
+    h, B = inner.h, inner.B
+    for j in range(h.shape[1]):
+        h[3, j] = h[0, j] + s * (h[1, j] + s * h[2, j])
+        for i in range(B.shape[1]):
+            B[3, i, j] = B[0, i, j] + s * (B[1, i, j] + s * B[2, i, j])
 
 
 @compiled
-def _outward(fast: Any, y: Any, inner: Any) -> float:
+def _outward(fast: Any, y: Any, B: Any) -> float:
     """-sigma_hat'B'xtilde: positive while the adaptation pushes sigma_hat outward."""
     total = 0.0
-    for j in range(fast.m):
-        for i in range(fast.n):
-            total -= y[fast.n + j] * inner.B_now[i, j] * y[i]
+    for i in range(fast.n):
+        total -= y[i] * dot(B[i], y[fast.n : fast.n + fast.m])
     return total
 
 
 @compiled
-def _rate(fast: Any, mode: int, y: Any, inner: Any, dy: Any) -> None:
-    """y' with h and B as interpolated."""
+def _rate(fast: Any, sliding: bool, y: Any, h: Any, B: Any, dy: Any) -> None:
+    """y' for given h and B."""
     n, m = fast.n, fast.m
     u, held, v = n + m, n + 2 * m, 2 * n + 2 * m
-    for i in range(n):
-        dy[i] = dy[held + i] = dy[v + i] = 0.0
-        for j in range(m):
-            dy[v + i] += inner.B_now[i, j] * y[u + j]
+    dy[:] = 0.0
     for j in range(m):
-        drive = inner.h_now[j] if fast.kind == REFERENCE else y[n + j]
+        drive = h[j] if fast.kind == REFERENCE else y[n + j]
         dy[u + j] = -fast.omega * (y[u + j] + drive)
-        dy[n + j] = 0.0
-    if fast.kind == REFERENCE:
-        return
     for i in range(n):
-        for j in range(n):
-            dy[i] += fast.A[i, j] * y[j]
-        for j in range(m):
-            dy[i] -= inner.B_now[i, j] * inner.h_now[j]
+        dy[v + i] = dot(B[i], y[u : u + m])
+        if fast.kind != REFERENCE:
+            dy[i] = dot(fast.A[i], y[:n]) - dot(B[i], h)
         if fast.kind == SAMPLED:
             dy[i] += y[held + i]
-        else:
+        if fast.kind == ADAPTIVE:
+            dy[i] += dot(B[i], y[n:u])
             for j in range(m):
-                dy[i] += inner.B_now[i, j] * y[n + j]
-                dy[n + j] -= fast.Gamma * inner.B_now[i, j] * y[i]
+                dy[n + j] -= fast.Gamma * B[i, j] * y[i]
     if fast.kind == ADAPTIVE:
-        _project(fast, mode, y, inner, dy)
+        _project(fast, sliding, y[n:u], dy[n:u])
 
 
 @compiled
-def _project(fast: Any, mode: int, y: Any, inner: Any, dy: Any) -> None:
+def _project(fast: Any, sliding: bool, sigma: Any, rate: Any) -> None:
     """Takes out of sigma_hat' what the projection does not let pass."""
-    n, m = fast.n, fast.m
-    square = dot(y[n : n + m], y[n : n + m])
-    share = 1.0 if mode == _SLIDING else 0.0
+    square, outward = dot(sigma, sigma), dot(sigma, rate)
+    share = 1.0 if sliding else 0.0
     if fast.layer > 0.0:
         limit = fast.radius * fast.radius
         share = max(0.0, ((1.0 + fast.layer) * square - limit) / (fast.layer * limit))
-    if share == 0.0 or square == 0.0:
-        return
-    outward = dot(y[n : n + m], dy[n : n + m])
-    if outward > 0.0 or mode == _SLIDING:
-        for j in range(m):
-            dy[n + j] -= share * outward * y[n + j] / square
+    if share > 0.0 and (sliding or outward > 0.0):
+        for j in range(fast.m):
+            rate[j] -= share * outward * sigma[j] / square
 
 
 @compiled
-def _leap(fast: Any, mode: int, s: float, ds: float, length: float, y: Any, inner: Any, out: Any) -> None:
-    """One RK4 step from the share s of the step to s + ds; h and B are left at its end."""
-    Y = y.shape[0]
-    k, at = inner.stages, inner.stages[4]
-    step = ds * length
-    _interpolate(inner, s)
-    _rate(fast, mode, y, inner, k[0])
-    for i in range(Y):
-        at[i] = y[i] + 0.5 * step * k[0, i]
-    _interpolate(inner, s + 0.5 * ds)
-    _rate(fast, mode, at, inner, k[1])
-    for i in range(Y):
-        at[i] = y[i] + 0.5 * step * k[1, i]
-    _rate(fast, mode, at, inner, k[2])
-    for i in range(Y):
-        at[i] = y[i] + step * k[2, i]
-    _interpolate(inner, s + ds)
-    _rate(fast, mode, at, inner, k[3])
-    for i in range(Y):
-        out[i] = y[i] + step / 6 * (k[0, i] + 2 * k[1, i] + 2 * k[2, i] + k[3, i])
-
-
-@compiled
-def _switched(fast: Any, mode: int, y: Any, inner: Any) -> bool:
-    """Whether the mode has ended: sigma_hat has left the ball, or is no longer pushed outward."""
-    if mode == _SLIDING:
-        return bool(_outward(fast, y, inner) < 0.0)
-    s = y[fast.n : fast.n + fast.m]
-    return bool(dot(s, s) > (fast.radius * (1 + _ON_BOUNDARY)) ** 2)
+def _leap(fast: Any, sliding: bool, s: float, ds: float, length: float, y: Any, inner: Any) -> None:
+    """One RK4 step from the share s of the whole step to s + ds; h and B are left at its end."""
+    stages = inner.stages
+    for stage in range(4):
+        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        _at(inner, s + share * ds)
+        for i in range(y.shape[0]):
+            stages[4, i] = y[i] + (share * ds * length * stages[stage - 1, i] if stage else 0.0)
+        _rate(fast, sliding, stages[4], inner.h[3], inner.B[3], stages[stage])
+    for i in range(y.shape[0]):
+        slope = stages[0, i] + 2 * stages[1, i] + 2 * stages[2, i] + stages[3, i]
+        stages[5, i] = y[i] + ds * length / 6 * slope
 
 
 @compiled
 def _resolved(fast: Any, length: float, y: Any, inner: Any) -> None:
-    """y over the whole step by RK4."""
+    """y over the whole step by RK4; a step in which the projection sets in or lets go ends there."""
+    n, u = fast.n, fast.n + fast.m
     hard = fast.kind == ADAPTIVE and fast.layer == 0.0
-    steps = _step_count(fast, length, inner)
-    _interpolate(inner, 0.0)
-    s_hat = y[fast.n : fast.n + fast.m]
-    mode, s = _FREE, 0.0
-    if (
-        hard
-        and dot(s_hat, s_hat) >= (fast.radius * (1 - _ON_BOUNDARY)) ** 2
-        and _outward(fast, y, inner) > 0.0
-    ):
-        mode = _SLIDING
+    count = _count(fast, length, inner)
+    _at(inner, 0.0)
+    edge = (fast.radius * (1 - _ON_BOUNDARY)) ** 2
+    sliding = hard and dot(y[n:u], y[n:u]) >= edge and _outward(fast, y, inner.B[3]) > 0.0
+    s = 0.0
     while s < 1.0:
-        ds = min(1.0 / steps, 1.0 - s)
-        if s + ds > 1.0 - 1e-9 / steps:
-            ds = 1.0 - s
-        _leap(fast, mode, s, ds, length, y, inner, inner.y)
-        if hard and _switched(fast, mode, inner.y, inner):
-            ds = _crossing(fast, mode, s, ds, length, y, inner)
-            mode = _FREE if mode == _SLIDING else _SLIDING
-        y[:] = inner.y
-        s += ds
+        ds = min(1.0 / count, 1.0 - s)
+        ds = 1.0 - s if s + ds > 1.0 - 1e-9 / count else ds
+        before, after, trial, ends = 0.0, ds, ds, False
+        for _ in range(_CROSSINGS):
+            _leap(fast, sliding, s, trial, length, y, inner)
+            over = hard and _over(fast, sliding, inner)
+            ends = ends or over
+            if not ends or (over and after - before <= _CLOSE * ds):
+                break
+            before, after = (before, trial) if over else (trial, after)
+            trial = 0.5 * (before + after) if after - before > _CLOSE * ds else after
+        y[:] = inner.stages[5]
+        s += trial
+        sliding = sliding != ends
         if hard:
-            clip(s_hat, fast.radius)
+            clip(y[n:u], fast.radius)
 
 
 @compiled
-def _crossing(fast: Any, mode: int, s: float, ds: float, length: float, y: Any, inner: Any) -> float:
-    """The part of the step after which the mode ends (at most by the rounding); its end goes into `inner.y`."""
-    before, after = 0.0, ds
-    for _ in range(_CROSSINGS):
-        middle = 0.5 * (before + after)
-        if middle == before or middle == after or after - before <= 1e-12 * ds:
-            break
-        _leap(fast, mode, s, middle, length, y, inner, inner.y)
-        if _switched(fast, mode, inner.y, inner):
-            after = middle
-        else:
-            before = middle
-    _leap(fast, mode, s, after, length, y, inner, inner.y)
-    return after
+def _over(fast: Any, sliding: bool, inner: Any) -> bool:
+    """Whether a step has ended beyond its mode: outside of the ball, or no longer pushed outward."""
+    y = inner.stages[5]
+    if sliding:
+        return bool(_outward(fast, y, inner.B[3]) < 0.0)
+    sigma = y[fast.n : fast.n + fast.m]
+    return bool(dot(sigma, sigma) > (fast.radius * (1 + _ON_BOUNDARY)) ** 2)
 
 
 @compiled
-def _step_count(fast: Any, length: float, inner: Any) -> int:
+def _count(fast: Any, length: float, inner: Any) -> int:
     """Steps such that none turns further than `turn`."""
-    n, m = fast.n, fast.m
     largest = 0.0
-    for s in range(3):  # B at both ends and in the middle
-        _interpolate(inner, 0.5 * s)
+    for k in range(3):  # B at both ends and in the middle
+        _at(inner, 0.5 * k)
         square = 0.0
-        for i in range(n):
-            square += dot(inner.B_now[i], inner.B_now[i])
+        for i in range(fast.n):
+            square += dot(inner.B[3, i], inner.B[3, i])
         largest = max(largest, square)
     speed = fast.omega
-    if fast.kind != REFERENCE:
-        for i in range(n):
-            speed = max(speed, np.sqrt(dot(fast.A[i], fast.A[i]) * n))
+    for i in range(fast.n):
+        speed = max(speed, np.sqrt(dot(fast.A[i], fast.A[i]) * fast.n))
     if fast.kind == ADAPTIVE:
         speed = max(speed, np.sqrt(fast.Gamma * largest))
         if fast.layer > 0.0:

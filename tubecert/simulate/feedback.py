@@ -14,9 +14,9 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.expression import ZERO, Expression
 from tubecert.model import TIME, ControlAffineModel
-from tubecert.simulate import geodesic
 from tubecert.simulate.compiled import compiled
-from tubecert.simulate.geodesic import Curve, Metric, connect
+from tubecert.simulate.geodesic import FOUND, Curve, Metric, connect, metric
+from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.program import Program, assemble, execute
 from tubecert.simulate.small import clip, dot
 
@@ -27,130 +27,114 @@ _ROUNDING = 1e-12
 class Field(NamedTuple):
     """f (n,), B (n, m) row by row and the base of h (m,) as one program of t and x; the metric and its rate."""
 
-    n: int
-    m: int
     program: Program
     metric: Metric
     rate: float
 
 
 class Force(NamedTuple):
-    """The arrays of a `Disturbance`."""
+    """Of every lane: waves (N, W, m + n + 2) of amplitude, wave vector, frequency, phase; push and radius (N, 2)."""
 
-    amplitude: Array
-    frequency: Array
-    wave: Array
-    phase: Array
-    push: Array
-    radius: Array
-    centre: Array
+    waves: Array
+    lanes: Array
     layer: float
 
 
 class Point(NamedTuple):
-    """Working memory and results of `evaluate`: f (n,), B (n, m), h, k and phi_1/2 (m,)."""
+    """Working memory and results of `evaluate`: f (n,), B (n, m); `inputs` (3, m): h, k, B'M gamma_s(1)."""
 
     memory: Array
     f: Array
     B: Array
-    h: Array
-    k: Array
-    push: Array
+    inputs: Array
     curve: Curve
 
 
-def field(model: ControlAffineModel, base: Sequence[Expression] | None, degree: int) -> Field:
-    """The slow part of a model's loops."""
+def field(model: ControlAffineModel, base: Sequence[Expression] | None, degree: int) -> tuple[Field, Point]:
+    """The slow part of a model's loops, and working memory for it."""
     n, m = len(model.states), len(model.inputs)
     h = [ZERO] * m if base is None else list(base)
-    program = assemble([*model.f, *(e for row in model.B for e in row), *h], (TIME, *model.states))
-    return Field(n, m, program, geodesic.metric(model, degree), float(model.rate))
+    outputs = [*model.f, *(e for row in model.B for e in row), *h]
+    program, memory = assemble(outputs, (TIME, *model.states))
+    space, curve = metric(model, degree)
+    work = Point(memory, np.zeros(n), np.zeros((n, m)), np.zeros((3, m)), curve)
+    return Field(program, space, float(model.rate)), work
 
 
-def point(field: Field) -> Point:
-    """Fresh working memory."""
-    n, m = field.n, field.m
-    return Point(
-        field.program.start.copy(),
-        np.zeros(n),
-        np.zeros((n, m)),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        geodesic.curve(field.metric),
-    )
+def force(d: Disturbance) -> Force:
+    """The arrays of a disturbance; its centre goes into the phases."""
+    phase = d.phase - d.wave @ d.centre
+    waves = np.concatenate([d.amplitude, d.wave, d.frequency[..., None], phase[..., None]], axis=2)
+    return Force(waves, np.stack([d.push, d.radius], axis=1).astype(float), float(d.layer))
 
 
 @compiled
 def evaluate(
-    field: Any, force: Any, lane: int, t: float, x: Any, plan: Any, index: int, side: int, point: Any
+    field: Any, force: Any, lane: int, t: float, x: Any, plan: Any, whole: bool, point: Any
 ) -> tuple[int, float]:
-    """(status, energy) at (t, x), with the plan's values at a step and side; f, B, k, h go into `point`."""
-    _drift(field, t, x, point)
-    status, energy = connect(field.metric, point.curve, plan.x[index, side], x)
-    if status == geodesic.FOUND:
-        status = _feedback(field, plan.u[index, side], plan.drift[index, side], energy, point)
-        _disturb(force, lane, t, x, point)
+    """(status, energy) at (t, x); `plan` holds x*, f(x*) + B(x*)u*, u*. f, B, h and k go into `point`.
+
+    Without `whole` the geodesic and k are left out unless the lane is pushed along it.
+    """
+    n = x.shape[0]
+    _drift(field.program, t, x, point)
+    status, energy = FOUND, 0.0
+    if whole or force.lanes[lane, 0] != 0.0:
+        status, energy = connect(field.metric, point.curve, plan[:n], x)
+        if status != FOUND:
+            return status, energy
+        status = _feedback(field.rate * energy, plan[2 * n :], plan[n : 2 * n], point)
+    _disturb(force.waves[lane], force.lanes[lane], force.layer, t, x, point.inputs)
     return status, energy
 
 
 @compiled
-def without_feedback(field: Any, force: Any, lane: int, t: float, x: Any, point: Any) -> None:
-    """f, B and h alone, for a lane that is not pushed along its geodesic."""
-    _drift(field, t, x, point)
-    _disturb(force, lane, t, x, point)
-
-
-@compiled
-def _drift(field: Any, t: float, x: Any, point: Any) -> None:
-    n, m, outputs = field.n, field.m, field.program.outputs
-    point.memory[0] = t
+def _drift(program: Any, t: float, x: Any, point: Any) -> None:
+    n, m = point.B.shape
+    memory = point.memory
+    memory[0] = t
     for i in range(n):
-        point.memory[1 + i] = x[i]
-    execute(field.program, point.memory)
+        memory[1 + i] = x[i]
+    execute(program.steps, program.steps.shape[0], memory)
     for i in range(n):
-        point.f[i] = point.memory[outputs[i]]
+        point.f[i] = memory[program.outputs[i]]
         for j in range(m):
-            point.B[i, j] = point.memory[outputs[n + i * m + j]]
+            point.B[i, j] = memory[program.outputs[n + i * m + j]]
     for j in range(m):
-        point.h[j] = point.memory[outputs[n + n * m + j]]
+        point.inputs[0, j] = memory[program.outputs[n + n * m + j]]
 
 
 @compiled
-def _feedback(field: Any, u: Any, drift: Any, energy: float, point: Any) -> int:
-    n, m = field.n, field.m
-    start, end = point.curve.start, point.curve.end
-    phi_0 = 2 * field.rate * energy - 2 * dot(start, drift)
+def _feedback(decay: float, u: Any, drift: Any, point: Any) -> int:
+    n, m = point.B.shape
+    start, end, k, push = point.curve.vectors[0], point.curve.vectors[1], point.inputs[1], point.inputs[2]
+    phi_0 = 2 * decay - 2 * dot(start, drift)
     size = abs(phi_0)
     for i in range(n):
-        total = point.f[i]
-        for j in range(m):
-            total += point.B[i, j] * u[j]
-        phi_0 += 2 * end[i] * total
-        size += abs(end[i] * total) + abs(start[i] * drift[i])
+        speed = point.f[i] + dot(point.B[i], u)
+        phi_0 += 2 * end[i] * speed
+        size += abs(end[i] * speed) + abs(start[i] * drift[i])
     for j in range(m):
-        point.push[j] = 0.0
+        push[j] = 0.0
         for i in range(n):
-            point.push[j] += point.B[i, j] * end[i]
-    reach = dot(point.push, point.push)
+            push[j] += point.B[i, j] * end[i]
+    reach = dot(push, push)
     for j in range(m):
-        point.k[j] = -phi_0 * point.push[j] / (2 * reach) if phi_0 > 0.0 and reach > 0.0 else 0.0
-    return INFEASIBLE if reach == 0.0 and phi_0 > _ROUNDING * size else geodesic.FOUND
+        k[j] = -phi_0 * push[j] / (2 * reach) if phi_0 > 0.0 and reach > 0.0 else 0.0
+    return INFEASIBLE if reach == 0.0 and phi_0 > _ROUNDING * size else FOUND
 
 
 @compiled
-def _disturb(force: Any, lane: int, t: float, x: Any, point: Any) -> None:
-    m = point.h.shape[0]
-    for w in range(force.frequency.shape[1]):
-        angle = force.frequency[lane, w] * t + force.phase[lane, w]
-        for i in range(x.shape[0]):
-            angle += force.wave[lane, w, i] * (x[i] - force.centre[i])
-        wave = np.sin(angle)
+def _disturb(waves: Any, lane: Any, layer: float, t: float, x: Any, inputs: Any) -> None:
+    n, m = x.shape[0], inputs.shape[1]
+    h, push = inputs[0], inputs[2]
+    for w in range(waves.shape[0]):
+        wave = waves[w]
+        value = np.sin(wave[m + n] * t + dot(x, wave[m : m + n]) + wave[m + n + 1])
         for j in range(m):
-            point.h[j] += force.amplitude[lane, w, j] * wave
-    push = force.push[lane]
-    if push != 0.0:
-        push /= np.sqrt(dot(point.push, point.push) + force.layer * force.layer)
+            h[j] += wave[j] * value
+    if lane[0] != 0.0:
+        share = lane[0] / np.sqrt(dot(push, push) + layer * layer)
         for j in range(m):
-            point.h[j] += push * point.push[j]
-    clip(point.h, force.radius[lane])
+            h[j] += share * push[j]
+    clip(h, lane[1])

@@ -1,10 +1,10 @@
 """Geodesics of a state-dependent metric: Chebyshev polynomials for the curve, Newton for the least energy.
 
-gamma(s) = (1 - s) p + s q + sum_k a_k phi_k(s) with phi_k = T_k less its values at the ends; the energy
-int gamma_s' M gamma_s ds is taken by Clenshaw-Curtis. Newton uses the exact Hessian; a step that does not lower the energy is
-halved, and the result is refused unless it is stationary and no longer than the straight segment. A warm start that is not
-finite or longer than the segment is forgotten. Source: K. Leung, I. R. Manchester, Nonlinear stabilization via control
-contraction metrics: a pseudospectral approach for computing geodesics, ACC 2017.
+gamma(s) = (1 - s) p + s q + sum_k a_k phi_k(s) with phi_k = T_k less its values at the ends; the energy int
+gamma_s' M gamma_s ds is taken by Clenshaw-Curtis. Newton uses the exact Hessian; a step that does not lower the
+energy is halved, and the result is refused unless it is stationary and no longer than the straight segment. A warm
+start that is not finite or longer than the segment is forgotten. Source: K. Leung, I. R. Manchester, Nonlinear
+stabilization via control contraction metrics: a pseudospectral approach for computing geodesics, ACC 2017.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.expression import free_symbols
 from tubecert.expression.matrix import Matrix, differentiate
 from tubecert.model import ControlAffineModel
-from tubecert.simulate.compiled import compiled
+from tubecert.simulate.compiled import compiled, entry
 from tubecert.simulate.program import Index, Program, assemble, execute
 from tubecert.simulate.small import dot, factor, solve
 
@@ -32,70 +32,63 @@ _EXTRA_NODES = 2
 _STATIONARY = 1e-20  # of the energy: what one more Newton step would gain
 _MOST_STEPS = 30
 _HALVINGS = 10
+_SHIFTS = 20
+_ROUNDING = 1e-12
 _UNEVEN = 0.05  # how far the squared speed may vary along the curve, of the energy
 
 
 class Metric(NamedTuple):
-    """W as programs: `values` gives the lower triangle of W, `slopes` also dW/dx_i and d2W/dx_i dx_j of the moving states.
+    """W as a program of x: the lower triangles of W, of dW/dx_i and of d2W/dx_i dx_j, of the `moving` states.
 
-    `constant` says that W is constant: then geodesics are segments. phi and phi_s (D - 1, Q) are the polynomials and
-    their slopes at the nodes s (Q,) in [0, 1], `weight` (Q,) those of the quadrature.
+    The first `short` steps give W alone. No moving states: W is constant, and geodesics are segments. The columns of
+    `table` (2 D, Q) belong to the nodes: s in [0, 1], weight, then phi_k and then their slopes for k = 2..D.
     """
 
-    n: int
-    constant: bool
     moving: Index
-    values: Program
-    slopes: Program
-    s: Array
-    weight: Array
-    phi: Array
-    phi_s: Array
+    program: Program
+    short: int
+    table: Array
 
 
 class Curve(NamedTuple):
-    """Working memory and results of one geodesic: `a` (D - 1, n), covectors M gamma_s at both ends (n,)."""
+    """Working memory and results of one geodesic.
 
-    a: Array
-    start: Array
-    end: Array
+    `a` (2, D - 1, n): the coefficients, and those before the step; `vectors` (6, n): the covectors M gamma_s at start
+    and end, then scratch; `squares` (2, n, n): a factor of W, and M; `large` (2, R, R): Hessian and a factor of it, R =
+    (D - 1) n; `columns` (2, R): gradient and step; `mixed` (2, n, n): rows W_i m and M W_i m; `second` (n, n): second
+    derivatives by x.
+    """
+
     memory: Array
-    memory_slopes: Array
-    L: Array
-    M: Array
-    Hessian: Array
-    Gauss: Array
-    factor: Array
-    gradient: Array
-    step: Array
-    trial: Array
+    a: Array
     vectors: Array
+    squares: Array
+    large: Array
+    columns: Array
     mixed: Array
     second: Array
 
 
-def metric(model: ControlAffineModel, degree: int = 5) -> Metric:
-    """The metric of a model for polynomials of a degree."""
-    moving = [
-        i for i, name in enumerate(model.states) if name in free_symbols(e for row in model.W for e in row)
-    ]
+def metric(model: ControlAffineModel, degree: int = 5) -> tuple[Metric, Curve]:
+    """The metric of a model for polynomials of a degree, and working memory for it."""
+    used = free_symbols(e for row in model.W for e in row)
+    moving = [i for i, name in enumerate(model.states) if name in used]
     first = [model.W_x[i] for i in moving]
     second = [differentiate(w, model.states[j]) for i, w in enumerate(first) for j in moving[: i + 1]]
-    return Metric(
-        len(model.states),
-        not moving,
-        np.array(moving, dtype=np.int64),
-        assemble(_lower([model.W]), model.states),
-        assemble(_lower([model.W, *first, *second]), model.states),
-        *_polynomials(degree),
-    )
+    short = len(assemble(_lower([model.W]), model.states)[0].steps)
+    program, memory = assemble(_lower([model.W, *first, *second]), model.states)
+    n, K = len(model.states), degree - 1
+    R = K * n
+    shapes = ((2, K, n), (6, n), (2, n, n), (2, R, R), (2, R), (2, n, n), (n, n))
+    space = Metric(np.array(moving, dtype=np.int64), program, short, _polynomials(degree))
+    return space, Curve(memory, *(np.zeros(shape) for shape in shapes))
 
 
 def _lower(matrices: list[Matrix]) -> list[Any]:
     return [row[j] for W in matrices for i, row in enumerate(W) for j in range(i + 1)]
 
 
-def _polynomials(degree: int) -> tuple[Array, Array, Array, Array]:
+def _polynomials(degree: int) -> Array:
     """Nodes, Clenshaw-Curtis weights, phi_k and phi_k' for k = 2..degree on [0, 1]."""
     from numpy.polynomial import chebyshev
 
@@ -103,214 +96,172 @@ def _polynomials(degree: int) -> tuple[Array, Array, Array, Array]:
     z = -np.cos(np.pi * np.arange(last + 1) / last)
     moments = np.array([0.0 if k % 2 else 2.0 / (1 - k * k) for k in range(last + 1)])
     weight = np.linalg.solve(chebyshev.chebvander(z, last).T, moments) / 2
-    phi, phi_s = np.empty((degree - 1, last + 1)), np.empty((degree - 1, last + 1))
-    for k in range(2, degree + 1):
-        T = chebyshev.Chebyshev.basis(k)
-        phi[k - 2] = T(z) - (z if k % 2 else 1.0)
-        phi_s[k - 2] = 2 * (T.deriv()(z) - k % 2)
-    return (z + 1) / 2, weight, phi, phi_s
-
-
-def curve(metric: Metric) -> Curve:
-    """Fresh working memory."""
-    n, K = metric.n, len(metric.phi)
-    size, moving = K * n, len(metric.moving)
-    return Curve(
-        np.zeros((K, n)),
-        np.zeros(n),
-        np.zeros(n),
-        metric.values.start.copy(),
-        metric.slopes.start.copy(),
-        np.zeros((n, n)),
-        np.zeros((n, n)),
-        np.zeros((size, size)),
-        np.zeros((size, size)),
-        np.zeros((size, size)),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros((K, n)),
-        np.zeros((4, n)),
-        np.zeros((2, max(moving, 1), n)),
-        np.zeros((n, n)),
-    )
+    basis = [chebyshev.Chebyshev.basis(k) for k in range(2, degree + 1)]
+    phi = [T(z) - (z if k % 2 else 1.0) for k, T in enumerate(basis, 2)]
+    slopes = [2 * (T.deriv()(z) - k % 2) for k, T in enumerate(basis, 2)]
+    return np.array([(z + 1) / 2, weight, *phi, *slopes])
 
 
 @compiled
 def connect(metric: Any, curve: Any, p: Any, q: Any) -> tuple[int, float]:
     """(status, energy) of the geodesic from p to q; `curve` then holds the covectors at its ends."""
-    if metric.constant:
-        return _segment(metric, curve, p, q)
-    straight = _energy(metric, curve, p, q, curve.trial, True)
-    if not straight > 0.0:  # nan where W is not positive definite
-        for i in range(metric.n):
-            curve.start[i] = curve.end[i] = 0.0
-        return (FOUND if straight == 0.0 else NOT_POSITIVE), 0.0
-    if not _energy(metric, curve, p, q, curve.a, False) <= straight:
-        curve.a[:] = 0.0
-    status, energy = _newton(metric, curve, p, q)
-    if status != FOUND or not energy <= straight * (1 + 1e-9):
-        curve.a[:] = 0.0
-        status, energy = _newton(metric, curve, p, q)
-    if status == FOUND and not energy <= straight * (1 + 1e-9):
-        status = NOT_FOUND
-    if status != FOUND:
-        curve.a[:] = 0.0  # nothing of a failure is kept
+    straight = _straight(metric, curve, p, q)
+    if not np.isfinite(straight):
+        return NOT_POSITIVE, straight
+    status, energy = FOUND, straight
+    if metric.moving.shape[0] == 0 or straight == 0.0:
+        return status, energy
+    for _ in range(2):
+        status, energy = _newton(metric, curve, p, q, straight)
+        if status == FOUND:
+            break
+        curve.a[:] = 0.0  # once more from the segment; nothing of a failure is kept
     return status, energy
 
 
 @compiled
-def _segment(metric: Any, curve: Any, p: Any, q: Any) -> tuple[int, float]:
-    n = metric.n
-    if not _weight(metric.values, curve.memory, p, curve.L):
-        return NOT_POSITIVE, 0.0
-    for i in range(n):
-        curve.step[i] = q[i] - p[i]
-    solve(curve.L, curve.step[:n], curve.end)
-    for i in range(n):
-        curve.start[i] = curve.end[i]
-    return FOUND, dot(curve.end, curve.step[:n])
-
-
-@compiled
-def _weight(program: Any, memory: Any, x: Any, L: Any) -> bool:
-    """The Cholesky factor of W(x) into L."""
-    n = x.shape[0]
+def _weight(metric: Any, curve: Any, steps: int, x: Any) -> bool:
+    """The Cholesky factor of W(x) after the first steps of the program."""
+    n, memory, L = x.shape[0], curve.memory, curve.squares[0]
     for i in range(n):
         memory[i] = x[i]
-    execute(program, memory)
+    execute(metric.program.steps, steps, memory)
     place = 0
     for i in range(n):
         for j in range(i + 1):
-            L[i, j] = memory[program.outputs[place]]
+            L[i, j] = memory[metric.program.outputs[place]]
             place += 1
     return bool(factor(L, L))
 
 
 @compiled
-def _point(metric: Any, a: Any, p: Any, q: Any, j: int, straight: bool, x: Any, v: Any) -> None:
-    """gamma and gamma_s at node j."""
-    for i in range(metric.n):
-        x[i] = p[i] + metric.s[j] * (q[i] - p[i])
+def _straight(metric: Any, curve: Any, p: Any, q: Any) -> float:
+    """The energy of the segment; nan where W is not positive definite."""
+    n, total = p.shape[0], 0.0
+    start, end, x, v = curve.vectors[0], curve.vectors[1], curve.vectors[2], curve.vectors[3]
+    count = metric.table.shape[1] if metric.moving.shape[0] else 1
+    for i in range(n):
         v[i] = q[i] - p[i]
-        if not straight:
-            for k in range(a.shape[0]):
-                x[i] += a[k, i] * metric.phi[k, j]
-                v[i] += a[k, i] * metric.phi_s[k, j]
-
-
-@compiled
-def _energy(metric: Any, curve: Any, p: Any, q: Any, a: Any, straight: bool) -> float:
-    """The energy of the curve with coefficients a, or of the segment; nan where W is not positive definite."""
-    total = 0.0
-    x, v, m = curve.vectors[0], curve.vectors[1], curve.vectors[2]
-    for j in range(metric.s.shape[0]):
-        _point(metric, a, p, q, j, straight, x, v)
-        if not _weight(metric.values, curve.memory, x, curve.L):
+    for j in range(count):
+        for i in range(n):
+            x[i] = p[i] + metric.table[0, j] * v[i]
+        if not _weight(metric, curve, metric.short, x):
             return np.nan
-        solve(curve.L, v, m)
-        total += metric.weight[j] * dot(v, m)
+        solve(curve.squares[0], v, end)
+        total += (metric.table[1, j] if count > 1 else 1.0) * dot(v, end)
+    for i in range(n):
+        start[i] = end[i]  # exact for a constant W, and for a segment of no length
     return total
 
 
 @compiled
-def _newton(metric: Any, curve: Any, p: Any, q: Any) -> tuple[int, float]:
-    size = curve.step.shape[0]
-    n = metric.n
-    energy, uneven = _expand(metric, curve, p, q)
-    for _ in range(_MOST_STEPS):
-        if not np.isfinite(energy):
-            return NOT_POSITIVE, energy
-        if not factor(curve.Hessian, curve.factor) and not factor(curve.Gauss, curve.factor):
+def _newton(metric: Any, curve: Any, p: Any, q: Any, most: float) -> tuple[int, float]:
+    """Newton from the coefficients of `curve`, never to an energy above `most`."""
+    a, before, step = curve.a[0], curve.a[1], curve.columns[1]
+    n = p.shape[0]
+    energy, share, halvings = most, 1.0, 0
+    for count in range(_MOST_STEPS):
+        reached, uneven = _expand(metric, curve, p, q)
+        if reached <= energy * (1 + _ROUNDING):
+            energy, share, halvings = reached, 1.0, 0
+            if not _definite(curve.large):
+                return NOT_FOUND, energy
+            solve(curve.large[1], curve.columns[0], step)
+            if dot(curve.columns[0], step) <= _STATIONARY * energy:
+                return (UNRESOLVED if uneven > _UNEVEN * energy else FOUND), energy
+            before[:] = a
+        elif count == 0 or halvings == _HALVINGS:
             return NOT_FOUND, energy
-        solve(curve.factor, curve.gradient, curve.step)
-        gain = dot(curve.gradient, curve.step)
-        if gain <= _STATIONARY * energy:
-            return (UNRESOLVED if uneven > _UNEVEN * energy else FOUND), energy
-        share, lowered = 1.0, False
-        for i in range(size):
-            curve.trial[i // n, i % n] = curve.a[i // n, i % n]
-        for _ in range(_HALVINGS):
-            for i in range(size):
-                curve.a[i // n, i % n] = curve.trial[i // n, i % n] - share * curve.step[i]
-            reached, uneven = _expand(metric, curve, p, q)
-            if reached <= energy * (1 + 1e-13):
-                lowered = True
-                break
-            share *= 0.5
-        if not lowered:
-            return NOT_FOUND, energy
-        energy = reached
+        else:
+            share, halvings = 0.5 * share, halvings + 1
+        for r in range(step.shape[0]):
+            a[r // n, r % n] = before[r // n, r % n] - share * step[r]
     return NOT_FOUND, energy
 
 
 @compiled
-def _expand(metric: Any, curve: Any, p: Any, q: Any) -> tuple[float, float]:
-    """Energy, and the variation of the squared speed; gradient and Hessian by the coefficients go into `curve`.
+def _largest(A: Any) -> float:
+    """The largest size of an entry."""
+    found = 0.0
+    for r in range(A.shape[0]):
+        for c in range(A.shape[1]):
+            found = max(found, abs(A[r, c]))
+    return found
 
-    `Gauss` is the part of the Hessian in M alone, which is positive definite wherever W is.
-    """
-    n, K, Q = metric.n, curve.a.shape[0], metric.s.shape[0]
-    size = K * n
-    for r in range(size):
-        curve.gradient[r] = 0.0
-        for c in range(size):
-            curve.Hessian[r, c] = 0.0
-            curve.Gauss[r, c] = 0.0
-    x, v, m = curve.vectors[0], curve.vectors[1], curve.vectors[2]
+
+@compiled
+def _definite(large: Any) -> bool:
+    """Factors the Hessian, shifted until it is positive definite; False if no shift serves."""
+    R, shift = large.shape[1], 0.0
+    for _ in range(_SHIFTS):
+        if factor(large[0], large[1]):
+            return True
+        more = max(shift, 1e-3 * _largest(large[0]))
+        for r in range(R):
+            large[0, r, r] += more
+        shift += more
+    return False
+
+
+@compiled
+def _expand(metric: Any, curve: Any, p: Any, q: Any) -> tuple[float, float]:
+    """Energy, and the variation of the squared speed; gradient and Hessian by the coefficients go into `curve`."""
+    n, K, Q, table, a = p.shape[0], curve.a.shape[1], metric.table.shape[1], metric.table, curve.a[0]
+    x, v, m = curve.vectors[2], curve.vectors[3], curve.vectors[4]
+    curve.columns[0] = 0.0
+    curve.large[0] = 0.0
     energy, least, largest = 0.0, np.inf, 0.0
     for j in range(Q):
-        _point(metric, curve.a, p, q, j, False, x, v)
-        if not _weight(metric.slopes, curve.memory_slopes, x, curve.L):
+        for i in range(n):
+            v[i] = q[i] - p[i]
+            x[i] = p[i] + table[0, j] * v[i]
+            for k in range(K):
+                x[i] += a[k, i] * table[2 + k, j]
+                v[i] += a[k, i] * table[2 + K + k, j]
+        if not _weight(metric, curve, metric.program.steps.shape[0], x):
             return np.nan, np.nan
-        solve(curve.L, v, m)
+        solve(curve.squares[0], v, m)
         if j == 0:
-            curve.start[:] = m
-        if j == Q - 1:
-            curve.end[:] = m
+            curve.vectors[0] = m
         density = dot(v, m)
         least, largest = min(least, density), max(largest, density)
-        energy += metric.weight[j] * density
+        energy += table[1, j] * density
         _local(metric, curve, m)
         _gather(metric, curve, j, m)
-    for r in range(size):
+    curve.vectors[1] = m
+    for r in range(K * n):
         for c in range(r):
-            curve.Hessian[c, r] = curve.Hessian[r, c]
-            curve.Gauss[c, r] = curve.Gauss[r, c]
+            curve.large[0, c, r] = curve.large[0, r, c]
     return energy, largest - least
 
 
 @compiled
 def _local(metric: Any, curve: Any, m: Any) -> None:
-    """Second derivatives of v'Mv at one node: M, mixed -2 M W_i m, and 2 m'W_i M W_j m - m'W_ij m by the moving states."""
-    n, moving = metric.n, metric.moving.shape[0]
-    memory, outputs = curve.memory_slopes, metric.slopes.outputs
-    triangle = n * (n + 1) // 2
-    unit = curve.vectors[3]
+    """Derivatives of v'Mv at one node: M, W_i m and M W_i m, and 2 m'W_i M W_j m - m'W_ij m by the moving states."""
+    n, moving = m.shape[0], metric.moving.shape[0]
+    L, M, unit = curve.squares[0], curve.squares[1], curve.vectors[5]
+    place, triangle = 0, n * (n + 1) // 2
     for i in range(n):
-        for k in range(n):
-            unit[k] = 1.0 if k == i else 0.0
-        solve(curve.L, unit, curve.M[i])
-    place = triangle
+        unit[:] = 0.0
+        unit[i] = 1.0
+        solve(L, unit, M[i])
     for i in range(moving):
-        w, Mw = curve.mixed[0, i], curve.mixed[1, i]
-        _times(memory, outputs, place, m, w)
-        solve(curve.L, w, Mw)
         place += triangle
+        _times(curve.memory, metric.program.outputs, place, m, curve.mixed[0, i])
+        solve(L, curve.mixed[0, i], curve.mixed[1, i])
     for i in range(moving):
         for j in range(i + 1):
-            _times(memory, outputs, place, m, unit)
+            place += triangle
+            _times(curve.memory, metric.program.outputs, place, m, unit)
             value = 2 * dot(curve.mixed[0, i], curve.mixed[1, j]) - dot(unit, m)
             curve.second[i, j] = curve.second[j, i] = value
-            place += triangle
 
 
 @compiled
 def _times(memory: Any, outputs: Any, place: int, m: Any, w: Any) -> None:
     """w = S m for the symmetric matrix S whose lower triangle begins at an output."""
-    n = m.shape[0]
-    for i in range(n):
-        w[i] = 0.0
-    for i in range(n):
+    w[:] = 0.0
+    for i in range(m.shape[0]):
         for j in range(i + 1):
             value = memory[outputs[place]]
             place += 1
@@ -320,38 +271,44 @@ def _times(memory: Any, outputs: Any, place: int, m: Any, w: Any) -> None:
 
 
 @compiled
-def _gather(metric: Any, curve: Any, j: int, m: Any) -> None:
-    """Adds the node's share to gradient and Hessian (lower triangles)."""
-    n, K, moving = metric.n, curve.a.shape[0], metric.moving.shape[0]
-    weight = metric.weight[j]
+def _gather(metric: Any, curve: Any, node: int, m: Any) -> None:
+    """Adds the node's share to the gradient, and to the block-lower triangle of the Hessian."""
+    n, K, moving, table = m.shape[0], curve.a.shape[1], metric.moving.shape[0], metric.table
+    gradient, Hessian = curve.columns[0], curve.large[0]
+    M, W_m, M_W_m = curve.squares[1], curve.mixed[0], curve.mixed[1]
     for k in range(K):
-        phi, slope = metric.phi[k, j], metric.phi_s[k, j]
+        phi, slope = table[1, node] * table[2 + k, node], table[1, node] * table[2 + K + k, node]
         for i in range(n):
-            curve.gradient[k * n + i] += weight * 2 * m[i] * slope
+            gradient[k * n + i] += 2 * m[i] * slope
         for a in range(moving):
-            curve.gradient[k * n + metric.moving[a]] -= weight * phi * dot(m, curve.mixed[0, a])
+            gradient[k * n + metric.moving[a]] -= phi * dot(m, W_m[a])
         for l in range(k + 1):
-            phi_l, slope_l = metric.phi[l, j], metric.phi_s[l, j]
-            common = weight * 2 * slope * slope_l
+            phi_l, slope_l = table[2 + l, node], table[2 + K + l, node]
             for r in range(n):
                 for c in range(n):
-                    curve.Gauss[k * n + r, l * n + c] += common * curve.M[r, c]
-                    curve.Hessian[k * n + r, l * n + c] += common * curve.M[r, c]
+                    Hessian[k * n + r, l * n + c] += 2 * slope * slope_l * M[r, c]
             for a in range(moving):
                 at = metric.moving[a]
                 for c in range(n):
-                    mixed = -2 * weight * curve.mixed[1, a, c]
-                    curve.Hessian[k * n + at, l * n + c] += mixed * phi * slope_l
-                    curve.Hessian[k * n + c, l * n + at] += mixed * slope * phi_l
+                    Hessian[k * n + at, l * n + c] -= 2 * phi * slope_l * M_W_m[a, c]
+                    Hessian[k * n + c, l * n + at] -= 2 * slope * phi_l * M_W_m[a, c]
                 for b in range(moving):
-                    curve.Hessian[k * n + at, l * n + metric.moving[b]] += (
-                        weight * phi * phi_l * curve.second[a, b]
-                    )
+                    Hessian[k * n + at, l * n + metric.moving[b]] += phi * phi_l * curve.second[a, b]
+
+
+@entry
+def solve_all(metric: Any, curve: Any, p: Any, q: Any, status: Any, energy: Any) -> None:
+    """Geodesics from p (N, n) to q (N, n), each one the warm start of the next: status and energy (N,)."""
+    for i in range(p.shape[0]):
+        status[i], energy[i] = connect(metric, curve, p[i], q[i])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Geodesic:
-    """A geodesic from p to q: its energy E = d^2, and gamma_s and M gamma_s at both ends, (2, n); None if not `found`."""
+    """A geodesic from p to q: its energy E = d^2, M gamma_s at both ends (2, n), and its coefficients (D - 1, n).
+
+    If it was not `found`, `reason` says why and the rest means nothing.
+    """
 
     found: bool
     reason: str
@@ -360,14 +317,15 @@ class Geodesic:
     coefficients: Array
 
 
-def geodesic(space: Metric, p: Array, q: Array, memory: Curve | None = None) -> Geodesic:
-    """The geodesic from p (n,) to q (n,); `memory` of an earlier one makes a warm start."""
-    work = curve(space) if memory is None else memory
-    status, energy = connect(space, work, np.asarray(p, dtype=float), np.asarray(q, dtype=float))
+def geodesic(space: Metric, memory: Curve, p: Array, q: Array) -> Geodesic:
+    """The geodesic from p (n,) to q (n,); `memory` makes the one before a warm start."""
+    status, energy = np.zeros(1, dtype=np.int64), np.zeros(1)
+    ends = (np.array([end], dtype=float) for end in (p, q))
+    solve_all(space, memory, *ends, status, energy)
     return Geodesic(
-        found=status == FOUND,
-        reason=REASONS.get(status, ""),
-        energy=float(energy),
-        covectors=np.stack([work.start, work.end]),
-        coefficients=work.a.copy(),
+        found=bool(status[0] == FOUND),
+        reason=REASONS.get(int(status[0]), ""),
+        energy=float(energy[0]),
+        covectors=memory.vectors[:2].copy(),
+        coefficients=memory.a[0].copy(),
     )

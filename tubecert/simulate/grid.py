@@ -11,7 +11,8 @@ from tubecert.enclosure.tape import Tape
 from tubecert.simulate.computer import Computer
 from tubecert.simulate.fast import KINDS, NONE, SAMPLED, Fast, exact_flows
 from tubecert.simulate.problem import LoopProblem
-from tubecert.simulate.stepping import Course, Grid
+from tubecert.simulate.program import Index
+from tubecert.simulate.stepping import Grid
 from tubecert.spec import Knots
 
 _SAME = 1e-11  # of the horizon: times that differ by less are one
@@ -19,7 +20,7 @@ _FEWEST_STEPS = 64
 MOST_STEPS = 4_000_000
 
 
-def corners(problem: LoopProblem) -> tuple[Array, Array]:
+def corners(problem: LoopProblem) -> tuple[Array, Index]:
     """Times (C,) that must be ends of steps, and which of them are samples of a computer."""
     end = problem.horizon
     period = sample_period(problem)
@@ -85,39 +86,30 @@ def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
     distinct, which = np.unique(length, return_inverse=True)
     exact_length = np.repeat(spans / counts, counts)
-    S = len(start)
-    output, tick = np.full(S + 1, -1, dtype=np.int64), np.zeros(S + 1, dtype=np.int64)
-    tick[first] = ticking
-    output[first[nearest(t, problem.times)]] = np.arange(len(problem.times))
-    grid = Grid(
-        np.append(start, problem.horizon),
-        np.append(exact_length, 0.0),
-        np.append(which, 0).astype(np.int64),
-        tick,
-        output,
-        course(problem, start, exact_length),
-    )
-    return grid, distinct
+    marks = np.zeros((len(start) + 1, 3), dtype=np.int64)
+    marks[:-1, 0], marks[:, 2] = which, -1
+    marks[first, 1] = ticking
+    marks[first[nearest(t, problem.times)], 2] = np.arange(len(problem.times))
+    times = np.stack([np.append(start, problem.horizon), np.append(exact_length, 0.0)], axis=1)
+    return Grid(times, marks, course(problem, start, exact_length)), distinct
 
 
-def course(problem: LoopProblem, start: Array, length: Array) -> Course:
+def course(problem: LoopProblem, start: Array, length: Array) -> Array:
     """The plan on every step, and after the last one: where u* jumps, the side that belongs to the step."""
     plan, model = problem.plan, problem.model
-    n, S = len(model.states), len(start)
+    S = len(start)
     t = np.minimum(start[:, None] + length[:, None] * np.array([0.0, 0.5, 1.0]), problem.horizon)
-    t[-1, 2] = problem.horizon
     span = None
     if plan.spans is not None:
-        span = np.searchsorted(plan.spans.lo, t[:, 1], side="right") - 1
-        span = np.repeat(np.clip(span, 0, len(plan.spans.lo) - 1), 3)
+        piece = np.searchsorted(plan.spans.lo, t[:, 1], side="right") - 1
+        span = np.repeat(np.clip(piece, 0, len(plan.spans.lo) - 1), 3).astype(float)
     flat = t.ravel()
     x, u = (part.mid.reshape(S, 3, -1) for part in plan.enclose(flat, flat, span))
-    x, u = (np.concatenate([part, np.repeat(part[-1:, 2:], 3, axis=1)]) for part in (x, u))
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
     values = [*np.moveaxis(x, -1, 0), *np.moveaxis(u, -1, 0)]
-    speed = np.moveaxis(drift.run_floats(values, (S + 1, 3)), 0, -1)
-    assert x.shape[-1] == n
-    return Course(*(np.ascontiguousarray(part) for part in (x, u, speed)))
+    speed = np.moveaxis(drift.run_floats(values, (S, 3)), 0, -1)
+    whole = np.concatenate([x, speed, u], axis=2)
+    return np.concatenate([whole, np.repeat(whole[-1:, 2:], 3, axis=1)])
 
 
 def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
@@ -136,8 +128,8 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
         1.0 if gains is None else gains.projection_radius,
         0.0 if gains is None or gains.smooth is None else gains.smooth,
         False,
-        np.zeros((1, 2, Y, Y)),
-        np.zeros((1, 2, 3, Y, m)),
+        np.zeros((1, Y, Y)),
+        np.zeros((1, 3, Y, m)),
         0.5**level,
     )
     if kind == NONE or problem.control_rate is not None or not model.constant_input:

@@ -17,6 +17,7 @@ from tubecert.simulate.problem import Disturbance, LoopProblem
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 
 if TYPE_CHECKING:
+    from tubecert.simulate.feedback import Point
     from tubecert.simulate.stepping import Loop, Output
 
 Progress = Callable[[int, int], None]
@@ -35,9 +36,9 @@ def integrate(
 ) -> Runs:
     """N runs from x0 (N, n) under a disturbance of N lanes, to an error of about `tolerance` in |x|.
 
-    A lane that cannot be integrated so far has a larger `error` than asked for; one that diverges or has no geodesic is
-    stopped and listed in `failures`, and the others go on. ValueError for arguments that do not fit. `progress` is told
-    how many of how many lanes are done.
+    A lane that cannot be integrated so far has a larger `error` than asked for; one that diverges or has no geodesic
+    is stopped and listed in `failures`, and the others go on. ValueError for arguments that do not fit. `progress` is
+    told how many of how many lanes are done.
     """
     starts = np.ascontiguousarray(x0, dtype=float)
     N, n = starts.shape
@@ -62,24 +63,22 @@ class Ladder:
         from tubecert.simulate.feedback import field
 
         self.problem = problem
-        self.field = field(problem.model, base, problem.degree)
+        self.field, self.point = field(problem.model, base, problem.degree)
         self.computer = grid.computer(problem)
         self._levels: dict[int, Loop] = {}
 
     def level(self, number: int, disturbance: Disturbance) -> Loop:
         """The compiled loop's data at a level; ValueError if it has too many steps."""
         from tubecert.simulate import grid
-        from tubecert.simulate.feedback import Force
+        from tubecert.simulate.feedback import force
         from tubecert.simulate.stepping import Loop
 
-        d = disturbance
-        parts = (d.amplitude, d.frequency, d.wave, d.phase, d.push, d.radius, d.centre)
-        force = Force(*(np.ascontiguousarray(part, dtype=float) for part in parts), float(d.layer))
+        acting = force(disturbance)
         if number not in self._levels:
             steps, lengths = grid.steps(self.problem, number)
             fast = grid.fast_part(self.problem, lengths, number)
-            self._levels[number] = Loop(self.field, force, fast, self.computer, steps)
-        return self._levels[number]._replace(force=force)
+            self._levels[number] = Loop(self.field, acting, fast, self.computer, steps)
+        return self._levels[number]._replace(force=acting)
 
 
 @lru_cache(maxsize=2)
@@ -111,8 +110,13 @@ class _Lanes:
                 if number == 0:
                     raise
                 break  # no more steps: the error estimates say how far it came
-            done = self._compare(lanes, run(loop, self.starts[lanes]), number, tolerance)
-            self.steps[lanes] = len(loop.grid.t) - 1
+            done = self._compare(
+                lanes,
+                run(loop, self.ladder.point, self.starts[lanes], len(self.problem.times)),
+                number,
+                tolerance,
+            )
+            self.steps[lanes] = len(loop.grid.times) - 1
             lanes = lanes[~done]
             if progress is not None:
                 progress(self.N - len(lanes), self.N)
@@ -124,13 +128,12 @@ class _Lanes:
         self, lanes: NDArray[np.intp], finer: Output, number: int, tolerance: float
     ) -> NDArray[np.bool_]:
         """Takes the finer runs, estimates their errors, and says which lanes are done."""
-        coarser = self.found
-        with np.errstate(invalid="ignore"):
-            change = np.sqrt(np.sum((finer.x - coarser.x[lanes]) ** 2, axis=2)).max(axis=1)
-        failed, before = finer.status != 0, coarser.status[lanes] != 0
+        coarser, n = self.found, self.starts.shape[1]
+        difference = finer.values[:, :, :n] - coarser.values[lanes, :, :n]
+        change = np.sqrt(np.sum(difference**2, axis=2)).max(axis=1)
         change = np.where(np.isnan(change), np.inf, change)
-        with np.errstate(invalid="ignore"):
-            agree = np.abs(finer.stop - coarser.stop[lanes]) <= _AGREEING * self.problem.horizon
+        failed, before = finer.ends[:, 0] != 0, coarser.ends[lanes, 0] != 0
+        agree = np.abs(finer.ends[:, 1] - coarser.ends[lanes, 1]) <= _AGREEING * self.problem.horizon
         for ours, theirs in zip(coarser, finer, strict=True):
             ours[lanes] = theirs
         self.error[lanes] = np.where(failed, np.inf, change)
@@ -142,26 +145,30 @@ class _Lanes:
         from tubecert.simulate.stepping import PEAKS
 
         problem, found = self.problem, self.found
-        loop = self.ladder.level(0, self.disturbance)
-        at = [np.flatnonzero(loop.grid.output == k)[0] for k in range(len(problem.times))]
+        n, m = self.starts.shape[1], len(problem.model.inputs)
+        grid = self.ladder.level(0, self.disturbance).grid
+        at = [np.flatnonzero(grid.marks[:, 2] == k)[0] for k in range(len(problem.times))]
+        plan = grid.plan[at, 0]
         peaks = {
-            name: Peak(value=found.peak[:, i].copy(), time=found.peak_time[:, i].copy())
+            name: Peak(value=found.peaks[:, i, 0].copy(), time=found.peaks[:, i, 1].copy())
             for i, name in enumerate(PEAKS)
         }
+        ends = np.cumsum([n, n, m, m, m, m])
+        x, xtilde, k, u_a, sigma_hat, h, distance = np.split(found.values, ends, axis=2)
         return Runs(
             t=np.array(problem.times, dtype=float),
-            x=found.x,
-            x_plan=loop.grid.plan.x[at, 0],
-            u_plan=loop.grid.plan.u[at, 0],
-            k=found.k,
-            u_a=found.u_a,
-            sigma_hat=found.sigma_hat,
-            h=found.h,
-            xtilde=found.xtilde,
-            distance=found.distance,
+            x=x,
+            x_plan=plan[:, :n],
+            u_plan=plan[:, 2 * n :],
+            k=k,
+            u_a=u_a,
+            sigma_hat=sigma_hat,
+            h=h,
+            xtilde=xtilde,
+            distance=distance[:, :, 0],
             worst=Worst(**peaks),
             error=self.error,
-            failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.status)),
+            failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.ends[:, 0])),
             steps=self.steps,
         )
 
@@ -175,22 +182,21 @@ class _Lanes:
             INFEASIBLE: "no input makes the metric contract here",
             DIVERGED: "the state diverges from the plan",
         }
-        return Failure(
-            lane=lane, t=float(self.found.stop[lane]), reason=reasons[int(self.found.status[lane])]
-        )
+        status, t = self.found.ends[lane]
+        return Failure(lane=lane, t=float(t), reason=reasons[int(status)])
 
 
-def run(loop: Loop, starts: Array) -> Output:
+def run(loop: Loop, point: Point, starts: Array, outputs: int) -> Output:
     """One level of some lanes, on all cores; the result does not depend on how many there are."""
     from tubecert.simulate import stepping
 
     N = len(starts)
-    out = stepping.output(N, int(loop.grid.output.max()) + 1, loop.field.n, loop.field.m)
+    out = stepping.output(N, outputs, *point.B.shape)
     chunk = max(1, min(_CHUNK, -(-N // _cores())))
 
     def work(first: int) -> None:
         last = min(first + chunk, N)
-        stepping.run(first, last, loop, starts, stepping.work(loop.field), out)
+        stepping.run(first, last, loop, starts, stepping.work(point), out)
 
     firsts = range(0, N, chunk)
     if len(firsts) == 1:

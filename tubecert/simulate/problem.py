@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression, free_symbols
@@ -60,10 +61,10 @@ class Gains:
 class LoopProblem:
     """One closed loop over [0, horizon] in s.
 
-    `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference system
-    (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in Hz the
-    whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing in
-    [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant).
+    `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference
+    system (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in
+    Hz the whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing
+    in [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant).
     """
 
     model: ControlAffineModel
@@ -149,7 +150,7 @@ class Disturbance:
         """Whether h vanishes for every lane."""
         return self.base is None and not np.any(self.amplitude) and not np.any(self.push)
 
-    def of(self, lanes: Array) -> Disturbance:
+    def of(self, lanes: NDArray[np.intp]) -> Disturbance:
         """The disturbance of some lanes, given by their numbers."""
         return Disturbance(
             base=self.base,

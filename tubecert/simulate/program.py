@@ -28,22 +28,21 @@ _CODES = {
 
 
 class Program(NamedTuple):
-    """Memory is (inputs, constants, results); operation i writes at `first + i`.
+    """Memory is (inputs, constants, results), one result for each step.
 
-    `start` is the memory with its constants; operation i is `code[i]` on the places `left[i]`, `right[i]` (of a power,
-    `right` is the exponent); `outputs` are the places of the results asked for.
+    A step (S, 3) is an operation and the places of its operands (of a power, place and exponent); `outputs` are the
+    places of the results asked for. The results of earlier outputs come first.
     """
 
-    start: Array
-    first: int
-    code: Index
-    left: Index
-    right: Index
+    steps: Index
     outputs: Index
 
 
-def assemble(outputs: Sequence[Expression], inputs: Sequence[str]) -> Program:
-    """The program of the outputs; ValueError if they depend on anything but the inputs."""
+def assemble(outputs: Sequence[Expression], inputs: Sequence[str]) -> tuple[Program, Array]:
+    """The program of the outputs, and a memory for it with the constants in place.
+
+    ValueError if they depend on anything but the inputs.
+    """
     order = topological(outputs)
     names = {name: index for index, name in enumerate(inputs)}
     constants = [node for node in order if node.op in ("const", "pi")]
@@ -76,10 +75,9 @@ def assemble(outputs: Sequence[Expression], inputs: Sequence[str]) -> Program:
             place[node] = emit(_POW, args[0], int(str(node.value)))
         elif node.op in _CODES:
             place[node] = emit(_CODES[node.op], args[0], args[-1])
-    table = np.array(steps, dtype=np.int64).reshape(-1, 3)
     memory = np.array(start + [0.0] * len(steps))
     places = np.array([place[node] for node in outputs], dtype=np.int64)
-    return Program(memory, first, *(np.ascontiguousarray(column) for column in table.T), places)
+    return Program(np.array(steps, dtype=np.int64).reshape(-1, 3), places), memory
 
 
 def _float(node: Expression) -> float:
@@ -90,37 +88,32 @@ def _float(node: Expression) -> float:
 
 
 @compiled
-def execute(program: Any, memory: Any) -> None:
-    """Runs the program on a memory whose inputs and constants are in place."""
-    target = program.first
-    for i in range(program.code.size):
-        code = program.code[i]
-        x = memory[program.left[i]]
+def execute(steps: Any, count: int, memory: Any) -> None:
+    """Runs the first steps on a memory whose inputs and constants are in place."""
+    target = memory.shape[0] - steps.shape[0]
+    for i in range(count):
+        code, right = steps[i, 0], steps[i, 2]
+        x = memory[steps[i, 1]]
         if code == _MUL:
-            value = x * memory[program.right[i]]
+            value = x * memory[right]
         elif code == _ADD:
-            value = x + memory[program.right[i]]
+            value = x + memory[right]
         elif code == _POW:
-            value = _power(x, program.right[i])
+            value = 1.0
+            for _ in range(abs(right)):
+                value *= x
+            if right < 0:
+                value = 1.0 / value
         elif code == _SIN:
             value = np.sin(x)
         elif code == _COS:
             value = np.cos(x)
         elif code == _DIV:
-            value = x / memory[program.right[i]]
+            value = x / memory[right]
         elif code == _SQRT:
             value = np.sqrt(x)
         elif code == _TAN:
             value = np.tan(x)
         else:
             value = np.exp(x)
-        memory[target] = value
-        target += 1
-
-
-@compiled
-def _power(x: float, exponent: int) -> float:
-    value = 1.0
-    for _ in range(abs(exponent)):
-        value *= x
-    return value if exponent > 0 else 1.0 / value
+        memory[target + i] = value

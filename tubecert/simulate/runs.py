@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 
@@ -47,10 +48,10 @@ class Runs:
     """N runs at K output times.
 
     Shapes: t (K,), x (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m), xtilde (N, K, n),
-    distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a is
-    then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is 0.
-    After a lane was stopped its values are nan. `error` (N,) is the largest difference in |x| to the run with steps twice
-    as long, an estimate of the error and mostly far above it; it is inf for a lane that was stopped.
+    distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a
+    is then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is
+    0. After a lane was stopped its values are nan. `error` (N,) is the largest difference in |x| to the run with steps
+    twice as long, an estimate of the error and mostly far above it; it is inf for a lane that was stopped.
     """
 
     t: Array
@@ -66,7 +67,7 @@ class Runs:
     worst: Worst
     error: Array
     failures: tuple[Failure, ...]
-    steps: Array  # (N,), how many steps the run took
+    steps: NDArray[np.int64]  # (N,), how many steps the run took
 
     @property
     def u(self) -> Array:
@@ -101,12 +102,13 @@ def joined(parts: list[Runs]) -> Runs:
         )
         for item in fields(Worst)
     }
-    lanewise = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance", "error", "steps")
+    lanewise = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance", "error")
     return Runs(
         t=parts[0].t,
         x_plan=parts[0].x_plan,
         u_plan=parts[0].u_plan,
         worst=Worst(**peaks),
         failures=failures,
+        steps=np.concatenate([part.steps for part in parts]),
         **{name: stacked(name) for name in lanewise},
     )

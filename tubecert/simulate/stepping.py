@@ -1,8 +1,9 @@
 """One lane from start to end: RK4 on the slow part, with the flow of the fast part inside every stage.
 
-x' = f + B(u* + k + h) + B u_a. The stages are those of the exponential Runge-Kutta method of Krogstad: between them h (and
-a moving B) are the polynomials of time through the stages so far, and the fast part flows under these. Without a fast part
-this is classical RK4. Source: S. Krogstad, Generalized integrating factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
+x' = f + B(u* + k + h) + B u_a. The stages are those of the exponential Runge-Kutta method of Krogstad: between
+them h (and a moving B) are the polynomials of time through the stages so far, and the fast part flows under these.
+Without a fast part this is classical RK4. Source: S. Krogstad, Generalized integrating factor methods for stiff
+PDEs, J. Comput. Phys. 203, 2005.
 """
 
 from __future__ import annotations
@@ -12,12 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate import fast as quick
-from tubecert.simulate.compiled import compiled
+from tubecert.simulate.compiled import compiled, entry
 from tubecert.simulate.computer import Computer, adapt, control
-from tubecert.simulate.fast import NONE, SAMPLED, Fast, Inner, advance
-from tubecert.simulate.feedback import Field, Force, Point, evaluate, point, without_feedback
-from tubecert.simulate.geodesic import FOUND
+from tubecert.simulate.fast import ADAPTIVE, NONE, SAMPLED, Fast, Inner, advance, inner, size
+from tubecert.simulate.feedback import Field, Force, Point, evaluate
+from tubecert.simulate.geodesic import FOUND, Curve
 from tubecert.simulate.program import Index
 from tubecert.simulate.small import dot
 
@@ -26,25 +26,17 @@ _FAR = 1e6
 PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h")
 
 
-class Course(NamedTuple):
-    """The plan at start, middle and end of every step: x (S + 1, 3, n), u (S + 1, 3, m), drift f + B u (S + 1, 3, n)."""
-
-    x: Array
-    u: Array
-    drift: Array
-
-
 class Grid(NamedTuple):
-    """Steps: `t` and `length` (S + 1,) in s (the last has length 0), `which` of the distinct lengths, `tick` 1 where a
-    computer samples, `output` the number of the output time that the step starts at, or -1.
+    """Steps: `times` (S + 1, 2) are start and length in s, the last of length 0.
+
+    `marks` (S + 1, 3): the number of the length, 1 where a computer samples, and the number of the output time at
+    which the step starts, or -1. `plan` (S + 1, 3, 2 n + m): x*, f(x*) + B(x*)u* and u* at start, middle and end of
+    every step.
     """
 
-    t: Array
-    length: Array
-    which: Index
-    tick: Index
-    output: Index
-    plan: Course
+    times: Array
+    marks: Index
+    plan: Array
 
 
 class Loop(NamedTuple):
@@ -58,232 +50,207 @@ class Loop(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Everything that a compiled lane writes to while it runs: state, stages, the fast part, held input."""
+    """What a compiled lane writes to while it runs.
 
-    x: Array
-    at: Array
-    y: Array
-    y_end: Array
-    w: Array
+    `vectors` (6, n): x, where a stage is, and the four slopes w = f + B(u* + k + h); `h` (4, m) and `B` (4, n, m) of
+    the stages; `y` (2, Y): the fast part at the start and at the end of a flow; `inputs` (2, m): u as held, and
+    scratch.
+    """
+
+    vectors: Array
     h: Array
     B: Array
-    held: Array
-    u_now: Array
+    y: Array
+    inputs: Array
     gram: Array
     point: Point
     inner: Inner
 
 
 class Output(NamedTuple):
-    """What lanes leave behind: values at the output times, peaks and their times (N, 7), why and when it stopped (N,)."""
+    """What lanes leave behind; nan where they did not come.
 
-    x: Array
-    k: Array
-    u_a: Array
-    sigma_hat: Array
-    h: Array
-    xtilde: Array
-    distance: Array
-    peak: Array
-    peak_time: Array
-    status: Index
-    stop: Array
+    `values` (N, K, 2 n + 4 m + 1): x, xtilde, k, u_a, sigma_hat, h, distance at the output times; `peaks` (N, 7, 2):
+    the largest values and their times; `ends` (N, 2): why (0: it did not) and when a lane stopped.
+    """
+
+    values: Array
+    peaks: Array
+    ends: Array
 
 
-def work(field: Field) -> Work:
-    """Fresh working memory of one thread."""
-    n, m, Y = field.n, field.m, quick.size(field.n, field.m)
+def work(point: Point) -> Work:
+    """Fresh working memory of one thread; that of an evaluation is copied."""
+    n, m = point.B.shape
+    fresh = Point(
+        point.memory.copy(),
+        np.zeros(n),
+        np.zeros((n, m)),
+        np.zeros((3, m)),
+        Curve(*(part.copy() for part in point.curve)),
+    )
     return Work(
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(Y),
-        np.zeros(Y),
-        np.zeros((4, n)),
+        np.zeros((6, n)),
         np.zeros((4, m)),
         np.zeros((4, n, m)),
-        np.zeros(m),
-        np.zeros(m),
+        np.zeros((2, size(n, m))),
+        np.zeros((2, m)),
         np.zeros((m, m)),
-        point(field),
-        quick.inner(n, m),
+        fresh,
+        inner(n, m),
     )
 
 
 def output(lanes: int, K: int, n: int, m: int) -> Output:
-    """Nothing yet: nan, and no peaks."""
-
-    def blank(*shape: int) -> Array:
-        return np.full((lanes, *shape), np.nan)
-
-    return Output(
-        blank(K, n),
-        blank(K, m),
-        blank(K, m),
-        blank(K, m),
-        blank(K, m),
-        blank(K, n),
-        blank(K),
-        np.zeros((lanes, len(PEAKS))),
-        np.zeros((lanes, len(PEAKS))),
-        np.zeros(lanes, dtype=np.int64),
-        np.full(lanes, np.nan),
-    )
+    """Nothing yet."""
+    ends = np.full((lanes, 2), np.nan)
+    ends[:, 0] = FOUND
+    return Output(np.full((lanes, K, 2 * n + 4 * m + 1), np.nan), np.zeros((lanes, len(PEAKS), 2)), ends)
 
 
-@compiled
+@entry
 def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> None:
     """Runs the lanes first..last-1 from `starts` (N, n)."""
+    grid, fast, field = loop.grid, loop.fast, loop.field
+    final = grid.times.shape[0] - 1
+    flows = fast.kind != NONE and not loop.computer.holds
+    x, at, y, v = work.vectors[0], work.vectors[1], work.y[0], work.y.shape[1] - work.vectors.shape[1]
     for lane in range(first, last):
-        work.x[:] = starts[lane]
+        x[:] = starts[lane]
         work.y[:] = 0.0
         work.point.curve.a[:] = 0.0
-        _lane(lane, loop, work, out)
-
-
-@compiled
-def _lane(lane: int, loop: Any, work: Any, out: Any) -> None:
-    grid, fast = loop.grid, loop.fast
-    last, ticks = grid.t.shape[0] - 1, 0
-    for s in range(last + 1):
-        status, energy = evaluate(
-            loop.field, loop.force, lane, grid.t[s], work.x, grid.plan, s, 0, work.point
-        )
-        if status == FOUND and not _near(work.x, grid.plan.x[s, 0]):
-            status = DIVERGED
-        if status != FOUND:
-            out.status[lane], out.stop[lane] = status, grid.t[s]
-            return
-        if grid.tick[s]:
-            if loop.computer.holds:
-                u = grid.plan.u[s, 0]
-                control(fast, loop.computer, ticks, work.x, u, work.point, work.y, work.held, work.gram)
-            elif fast.kind == SAMPLED:
-                adapt(fast, loop.computer, work.point.B, work.y, work.gram)
-            ticks += 1
-        _record(lane, s, np.sqrt(max(energy, 0.0)), loop, work, out)
-        if s < last:
-            status = _step(lane, s, loop, work)
+        ticks, status = 0, FOUND
+        for s in range(final + 1):
+            t, length = grid.times[s]
+            for stage in range(5):
+                half = 0.5 if 0 < stage < 3 else 1.0
+                share = 0.0 if stage == 0 else half * length
+                side = 0 if stage == 0 else (1 if half == 0.5 else 2)
+                if stage > 0 and flows:
+                    _polynomials(work.h, work.B, stage, work.inner)
+                    which, first_entry = 2 * grid.marks[s, 0] + side - 1, 0 if stage == 4 else v
+                    advance(fast, share, which, y, work.inner, first_entry, work.y[1])
+                if stage == 4:
+                    break
+                _stage_state(work, stage, share, flows)
+                whole = stage == 0 or not loop.computer.holds
+                plan = grid.plan[s, side]
+                status, energy = evaluate(field, loop.force, lane, t + share, at, plan, whole, work.point)
+                if not _near(at, plan):
+                    status = DIVERGED
+                if status != FOUND:
+                    break
+                if stage == 0:
+                    if grid.marks[s, 1] == 1 and loop.computer.holds:
+                        control(fast, loop.computer, ticks, x, plan, work.point, y, work.inputs[0], work.gram)
+                    elif grid.marks[s, 1] == 1 and fast.kind == SAMPLED:
+                        adapt(fast, loop.computer, work.point.B, y, work.gram)
+                    ticks += grid.marks[s, 1]
+                    _record(lane, grid.marks[s, 2], t, np.sqrt(max(energy, 0.0)), plan, loop, work, out)
+                _keep(stage, plan, loop.computer.holds, work)
             if status != FOUND:
-                out.status[lane], out.stop[lane] = status, grid.t[s]
-                return
+                out.ends[lane, 0], out.ends[lane, 1] = status, t
+                break
+            _finish(work, length, flows)
 
 
 @compiled
 def _near(x: Any, plan: Any) -> bool:
+    near = True  # not for nan
     for i in range(x.shape[0]):
-        if not abs(x[i] - plan[i]) <= _FAR * (1.0 + abs(plan[i])):
-            return False
-    return True
+        near = near and abs(x[i] - plan[i]) <= _FAR * (1.0 + abs(plan[i]))
+    return near
 
 
 @compiled
-def _step(lane: int, s: int, loop: Any, work: Any) -> int:
-    """One step of x and y; the evaluation at its start is already in `work.point`."""
-    grid, n = loop.grid, loop.field.n
-    length, which = grid.length[s], grid.which[s]
-    flows = loop.fast.kind != NONE and not loop.computer.holds
-    v = work.y.shape[0] - n
-    held_xhat = not flows
-    _keep(0, s, 0, loop, work)
-    for stage in range(1, 4):
-        half = 1 if stage == 3 else 0
-        share = length if half else 0.5 * length
-        if flows:
-            _line(work, stage - 1, 2.0 if half else 1.0)
-            advance(loop.fast, share, which, half, work.y, work.inner, v, work.y_end)
-        for i in range(n):
-            gained = 0.0 if held_xhat else work.y_end[v + i]
-            work.at[i] = work.x[i] + share * work.w[stage - 1, i] + gained
-        t = grid.t[s] + share
-        if loop.computer.holds and loop.force.push[lane] == 0.0:
-            without_feedback(loop.field, loop.force, lane, t, work.at, work.point)
-        else:
-            status, _ = evaluate(loop.field, loop.force, lane, t, work.at, grid.plan, s, 1 + half, work.point)
-            if status != FOUND:
-                return DIVERGED if not _near(work.at, grid.plan.x[s, 1 + half]) else status
-        _keep(stage, s, 1 + half, loop, work)
-    if flows:
-        _parabola(work)
-        advance(loop.fast, length, which, 1, work.y, work.inner, 0, work.y_end)
+def _stage_state(work: Any, stage: int, share: float, flows: bool) -> None:
+    """Where the stage is: x, the slope of the stage before, and what u_a has added meanwhile."""
+    n, v = work.vectors.shape[1], work.y.shape[1] - work.vectors.shape[1]
     for i in range(n):
-        gained = 0.0 if held_xhat else work.y_end[v + i]
-        slope = work.w[0, i] + 2 * work.w[1, i] + 2 * work.w[2, i] + work.w[3, i]
-        work.x[i] += length / 6 * slope + gained
-    if flows:
-        work.y[:v] = work.y_end[:v]
-    return FOUND
+        work.vectors[1, i] = work.vectors[0, i]
+        if stage > 0:
+            work.vectors[1, i] += share * work.vectors[1 + stage, i]
+            if flows:
+                work.vectors[1, i] += work.y[1, v + i]
 
 
 @compiled
-def _keep(stage: int, s: int, side: int, loop: Any, work: Any) -> None:
+def _finish(work: Any, length: float, flows: bool) -> None:
+    """The end of the step becomes the start of the next."""
+    n, v = work.vectors.shape[1], work.y.shape[1] - work.vectors.shape[1]
+    for i in range(n):
+        slope = work.vectors[2, i] + 2 * work.vectors[3, i] + 2 * work.vectors[4, i] + work.vectors[5, i]
+        work.vectors[0, i] += length / 6 * slope + (work.y[1, v + i] if flows else 0.0)
+    if flows:
+        work.y[0, :v] = work.y[1, :v]
+
+
+@compiled
+def _keep(stage: int, plan: Any, holds: bool, work: Any) -> None:
     """w = f + B(u* + k + h) of the stage, without u_a; h and B."""
-    n, m, point = loop.field.n, loop.field.m, work.point
+    point, n, m = work.point, work.vectors.shape[1], work.h.shape[1]
+    u = work.inputs[1]
     for j in range(m):
-        work.h[stage, j] = point.h[j]
-        u = work.held[j] if loop.computer.holds else loop.grid.plan.u[s, side, j] + point.k[j]
-        work.u_now[j] = u + point.h[j]
+        work.h[stage, j] = point.inputs[0, j]
+        u[j] = point.inputs[0, j] + (work.inputs[0, j] if holds else plan[2 * n + j] + point.inputs[1, j])
     for i in range(n):
-        work.w[stage, i] = point.f[i]
         for j in range(m):
             work.B[stage, i, j] = point.B[i, j]
-            work.w[stage, i] += point.B[i, j] * work.u_now[j]
+        work.vectors[2 + stage, i] = point.f[i] + dot(point.B[i], u)
 
 
 @compiled
-def _line(work: Any, stage: int, slope: float) -> None:
-    """h and B run from those of the first stage to those of another, which lies at 1/slope of the time."""
-    inner = work.inner
-    inner.h[0], inner.h[2] = work.h[0], 0.0
-    inner.B[0], inner.B[2] = work.B[0], 0.0
-    for j in range(work.h.shape[1]):
-        inner.h[1, j] = slope * (work.h[stage, j] - work.h[0, j])
-        for i in range(work.B.shape[1]):
-            inner.B[1, i, j] = slope * (work.B[stage, i, j] - work.B[0, i, j])
+def _polynomials(h: Any, B: Any, stage: int, inner: Any) -> None:
+    """h and B as polynomials of the time over the length of the flow.
+
+    Before the last stage they run from the first one to the one before, which lies in the middle of a whole step; at
+    last through start, the mean of the two stages in the middle, and end.
+    """
+    for j in range(h.shape[1]):
+        inner.h[0, j], inner.h[1, j], inner.h[2, j] = _through(h[0, j], h[1, j], h[2, j], h[3, j], stage)
+        for i in range(B.shape[1]):
+            inner.B[0, i, j], inner.B[1, i, j], inner.B[2, i, j] = _through(
+                B[0, i, j], B[1, i, j], B[2, i, j], B[3, i, j], stage
+            )
 
 
 @compiled
-def _parabola(work: Any) -> None:
-    """h and B through start, the mean of the two stages in the middle, and the end."""
-    inner = work.inner
-    for j in range(work.h.shape[1]):
-        a, b, c = work.h[0, j], 0.5 * (work.h[1, j] + work.h[2, j]), work.h[3, j]
-        inner.h[0, j], inner.h[1, j], inner.h[2, j] = a, -3 * a + 4 * b - c, 2 * (a - 2 * b + c)
-        for i in range(work.B.shape[1]):
-            a, b, c = work.B[0, i, j], 0.5 * (work.B[1, i, j] + work.B[2, i, j]), work.B[3, i, j]
-            inner.B[0, i, j], inner.B[1, i, j], inner.B[2, i, j] = a, -3 * a + 4 * b - c, 2 * (a - 2 * b + c)
+def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float, float, float]:
+    if stage == 1:
+        return a, 0.0, 0.0
+    if stage == 2:
+        return a, b - a, 0.0
+    if stage == 3:
+        return a, 2 * (c - a), 0.0
+    return a, -3 * a + 2 * (b + c) - d, 2 * (a - b - c + d)
 
 
 @compiled
-def _record(lane: int, s: int, distance: float, loop: Any, work: Any, out: Any) -> None:
+def _record(
+    lane: int, place: int, t: float, distance: float, plan: Any, loop: Any, work: Any, out: Any
+) -> None:
     """Peaks at the start of the step, and the values if it is an output time."""
-    n, m, fast, point, y = loop.field.n, loop.field.m, loop.fast, work.point, work.y
-    plan_x, plan_u = loop.grid.plan.x[s, 0], loop.grid.plan.u[s, 0]
-    k = work.u_now
-    deviation, u, sigma_error = 0.0, 0.0, 0.0
+    n, m, kind, holds = work.vectors.shape[1], work.h.shape[1], loop.fast.kind, loop.computer.holds
+    x, y, h, k, u = work.vectors[0], work.y[0], work.point.inputs[0], work.point.inputs[1], work.inputs[1]
+    sizes = np.zeros(7)
+    sizes[0] = distance * distance
     for i in range(n):
-        deviation += (work.x[i] - plan_x[i]) ** 2
+        sizes[1] += (x[i] - plan[i]) ** 2
     for j in range(m):
-        k[j] = work.held[j] - plan_u[j] - y[n + m + j] if loop.computer.holds else point.k[j]
-        u += (plan_u[j] + k[j] + y[n + m + j]) ** 2
-        sigma_error += (y[n + j] - point.h[j]) ** 2
-    if fast.kind == NONE or fast.kind == quick.REFERENCE:
-        sigma_error = 0.0
-    _peak(lane, 0, distance, loop.grid.t[s], out)
-    _peak(lane, 1, np.sqrt(deviation), loop.grid.t[s], out)
-    _peak(lane, 2, np.sqrt(u), loop.grid.t[s], out)
-    _peak(lane, 3, np.sqrt(dot(k, k)), loop.grid.t[s], out)
-    _peak(lane, 4, np.sqrt(dot(y[:n], y[:n])), loop.grid.t[s], out)
-    _peak(lane, 5, np.sqrt(sigma_error), loop.grid.t[s], out)
-    _peak(lane, 6, np.sqrt(dot(point.h, point.h)), loop.grid.t[s], out)
-    place = loop.grid.output[s]
+        if holds:
+            k[j] = work.inputs[0, j] - plan[2 * n + j] - y[n + m + j]
+        u[j] = plan[2 * n + j] + k[j] + y[n + m + j]
+        if kind >= ADAPTIVE:  # or sampled
+            sizes[5] += (y[n + j] - h[j]) ** 2
+    sizes[2], sizes[3], sizes[4], sizes[6] = dot(u, u), dot(k, k), dot(y[:n], y[:n]), dot(h, h)
+    for q in range(7):
+        value = np.sqrt(sizes[q])
+        if value > out.peaks[lane, q, 0]:
+            out.peaks[lane, q, 0], out.peaks[lane, q, 1] = value, t
     if place >= 0:
-        out.x[lane, place], out.xtilde[lane, place] = work.x, y[:n]
-        out.k[lane, place], out.h[lane, place] = k, point.h
-        out.sigma_hat[lane, place], out.u_a[lane, place] = y[n : n + m], y[n + m : n + 2 * m]
-        out.distance[lane, place] = distance
-
-
-@compiled
-def _peak(lane: int, which: int, value: float, t: float, out: Any) -> None:
-    if value > out.peak[lane, which]:
-        out.peak[lane, which], out.peak_time[lane, which] = value, t
+        values = out.values[lane, place]
+        values[:n], values[n : 2 * n] = x, y[:n]
+        for j in range(m):
+            values[2 * n + j], values[2 * n + m + j] = k[j], y[n + m + j]
+            values[2 * n + 2 * m + j], values[2 * n + 3 * m + j] = y[n + j], h[j]
+        values[2 * n + 4 * m] = distance
