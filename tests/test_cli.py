@@ -35,6 +35,8 @@ def folder(tmp_path, monkeypatch):
     work.mkdir()
     monkeypatch.chdir(work)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     return work
 
 
@@ -615,7 +617,7 @@ def test_check_mathematics(folder, monkeypatch):
         ([warning, error], 1, "1 error, 1 warning"),
     ):
         monkeypatch.setattr(pipeline, "inspect", lambda _, found=found: found)
-        result = run("check", SPEC)
+        result = run("check", SPEC, "--no-cache")
         assert result.exit_code == code
         assert result.stdout.endswith(f"1 specification checked: {words}\n")
 

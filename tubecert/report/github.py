@@ -70,13 +70,14 @@ def step_summary(results: Sequence[Checked]) -> str:
     rows = ["### tubecert check", "", summary(findings, len(results)), ""]
     if findings:
         rows += ["| | file | code | what | help |", "|---|---|---|---|---|", *_rows(findings), ""]
-    text, kept = "", 0
+    text, size = [], 0
     for row in rows:
-        if len(text.encode()) + len(row.encode()) > _LARGEST_SUMMARY:
-            text += "\n... and more\n"
+        size += len(row.encode()) + 1
+        if size > _LARGEST_SUMMARY:
+            text += ["", "... and more"]
             break
-        text, kept = text + row + "\n", kept + 1
-    return text
+        text.append(row)
+    return "\n".join(text) + "\n"
 
 
 def _rows(findings: Iterable[Finding]) -> list[str]:

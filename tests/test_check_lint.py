@@ -1,0 +1,163 @@
+"""Lint: each finding where it belongs, and nothing said of good files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import tubecert
+from tubecert import lint, pipeline
+from tubecert.findings import Finding, Severity
+from tubecert.spec import load_text
+
+PACKAGE = Path(tubecert.__file__).parent
+ROOT = PACKAGE.parent
+GOOD = [*sorted((ROOT / "configs").glob("*.yaml")), *sorted((PACKAGE / "templates").glob("*.yaml"))]
+
+BASE = """\
+tubecert: 1
+name: base
+system:
+  states: [p, v]
+  inputs: [u]
+  parameters: {k: 2}
+  f: [v, "-k*p - v"]
+  B: [[0], [1]]
+safe_set: {p: [-1, 1], v: [-2, 2]}
+uncertainty:
+  h: ["0.1*sin(2*t)"]
+trajectory: {kind: equilibrium, at: [0, 0], input: [0], horizon: 10}
+initial_state: {at: [0, 0]}
+metric:
+  rate: 0.4
+  dual_metric: [[1, -0.5], [-0.5, 1]]
+tube: {epsilon: 0.1, rho_a: 0.1}
+"""
+
+W = "  dual_metric: [[1, -0.5], [-0.5, 1]]"
+HELD = "{kind: equilibrium, at: [0, 0], input: [0], horizon: 10}"
+MOVING = '{kind: expressions, x: ["0.5*sin(t)", "0.5*cos(t)"], u: ["%s"], horizon: 5}'
+ALONG = "initial_state: {at: [0, 0.5]}"
+START = "initial_state: {at: [0, 0]}"
+TUBE = "rho_a: 0.1}"
+CSV = "t,p,v,u\n0,0,0,0\n1,%s,0,0\n"
+
+CASES = {
+    "unused": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1}")]),
+    "unused but mentioned": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1} # m is the mass")]),
+    "case": ("TC131", "6:25", [("{k: 2}", "{k: 2, K: 1}"), ("-k*p", "-k*K*p")]),
+    "shape": ("TC131", "6:27", [("{k: 2}", "{l1: 2, II: 1}"), ("-k*p", "-l1*II*p")]),
+    "function": ("TC131", "6:21", [("{k: 2}", "{Sin: 2}"), ("-k*p", "-Sin*p")]),
+    "time": ("TC131", "6:19", [("{k: 2}", "{T: 2}"), ("-k*p", "-T*p")]),
+    "units": ("TC132", "4:10", [("  states: [p, v]", "  units: {p: m}\n  states: [p, v]")]),
+    "idle": ("TC133", "7:7", [("f: [v, ", "f: [0, ")]),
+    "expect nothing": ("TC134", "9:9", [("safe_set", "expect: {}\nsafe_set")]),
+    "no uncertainty": ("TC205", "11:6", [('"0.1*sin(2*t)"', "0")]),
+    "bounded by zero": ("TC205", "11:15", [('h: ["0.1*sin(2*t)"]', "bounds: {h: 0, h_x: 0, h_t: 0}")]),
+    "unknown constant": ("TC205", "11:11", [('h: ["0.1*sin(2*t)"]', "bounds: {h: 1, h_x: 0, h_t: 0}")]),
+    "loose": ("TC206", "12:15", [('t)"]', 't)"]\n  bounds: {h: 1}')]),
+    "loose slope": ("TC206", "12:17", [('t)"]', 't)"]\n  bounds: {h_x: 1}')]),
+    "broken": ("TC207", "12:17", [('t)"]', 't)"]\n  bounds: {h_t: 0.1}')]),
+    "mode out of reach": ("TC208", "15:9", [('"-k*p - v"', "0"), ("[v, ", '["-0.1*p", '), ("{k: 2}", "{}")]),
+    "indefinite": ("TC301", "16:16", [(W, "  dual_metric: [[1, 2], [2, 1]]")]),
+    "indefinite somewhere": ("TC301", "16:16", [(W, "  dual_metric: [[p, 0], [0, 1]]")]),
+    "too fast": ("TC302", "15:9", [("rate: 0.4", "rate: 0.6")]),
+    "not compatible": ("TC303", "16:16", [(W, '  dual_metric: [["1 + v**2", 0], [0, 1]]')]),
+    "loose metric": ("TC304", "17:19", [(W, W + "\n  bounds: {lower: 0.1, upper: 2}")]),
+    "broken metric": ("TC305", "17:31", [(W, W + "\n  bounds: {lower: 0.6, upper: 1.9}")]),
+    "held outside": ("TC403", "12:37", [("at: [0, 0]", "at: [2, 0]")]),
+    "leaves": ("TC403", "12:36", [(HELD, MOVING.replace("0.5", "3") % "0"), (START, ALONG)]),
+    "no equilibrium": ("TC404", "12:52", [("input: [0]", "input: [1]")]),
+    "no input given": ("TC404", "12:37", [("at: [0, 0], input: [0]", "at: [0.1, 0]"), (START, "")]),
+    "start": ("TC405", "13:22", [("{at: [0, 0]}", "{at: [3, 0]}")]),
+    "no room": ("TC406", "17:7", [("epsilon: 0.1", "epsilon: 1")]),
+    "no room for the start": ("TC406", "17:7", [("{at: [0, 0]}", "{at: [0.95, 0]}")]),
+    "no room for a ball": ("TC406", "17:7", [("{at: [0, 0]}", "{within: 0.9}")]),
+    "defect": ("TC407", "12:69", [(HELD, MOVING % "0"), (START, ALONG)]),
+    "collision with a disc": ("TC408", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [0, 0], radius: 1}")]),
+    "collision": ("TC408", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - polygon: [[-1, -1], [1, -1], [0, 1]]")]),
+    "far obstacle": ("TC409", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [9, 0], radius: 0.2}")]),
+}  # fmt: skip
+
+
+def found(text: str) -> list[Finding]:
+    return pipeline.inspect(load_text(text, "base.yaml"))
+
+
+def changed(*changes: tuple[str, str]) -> str:
+    text = BASE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+def test_nothing_is_said_of_the_base():
+    assert found(BASE) == []
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+def test_nothing_is_said_of_good_files(path):
+    assert found(path.read_text("utf-8")) == []
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_each_finding_where_it_belongs(name):
+    code, where, changes = CASES[name]
+    findings = found(changed(*changes))
+    own = [item for item in findings if item.code == code]
+    assert own, "\n".join(map(str, findings))
+    assert own[0].location is not None
+    line, column = own[0].location.line, own[0].location.column
+    assert f"{line}:{column}" == where, own[0]
+    assert own[0].help or code == "TC205"
+
+
+def test_every_code_is_met():
+    met = {code for code, _, _ in CASES.values()}
+    assert met == set(lint.CODES)
+
+
+def test_knots_outside_are_found(tmp_path):
+    (tmp_path / "plan.csv").write_text(CSV % "5")
+    path = tmp_path / "spec.yaml"
+    path.write_text(changed((HELD, "{kind: csv, file: plan.csv}")))
+    from tubecert.spec import load
+
+    [finding] = [item for item in pipeline.inspect(load(str(path))) if item.code == "TC403"]
+    assert "p = 5" in finding.message
+    assert "t = 1" in finding.message
+
+
+def test_a_target_outside_is_found_before_planning():
+    plan = "{kind: ilqr, target: [0, 9], horizon: 5}"
+    assert "TC403" in {item.code for item in found(changed((HELD, plan)))}
+    free = "{kind: ilqr, target: [0, 9], horizon: 5, goal: false}"
+    assert "TC403" not in {item.code for item in found(changed((HELD, free)))}
+
+
+def test_a_file_that_expects_to_be_refuted_is_not_blamed():
+    text = changed(("rate: 0.4", "rate: 0.6"), ("safe_set", "expect: {verdict: refuted}\nsafe_set"))
+    [finding] = found(text)
+    assert (finding.code, finding.severity) == ("TC302", Severity.NOTE)
+
+
+def test_the_rate_that_a_point_allows_is_named():
+    [finding] = found(changed(("rate: 0.4", "rate: 0.6")))
+    assert re.search(r"supports 0\.5 at most", finding.message)
+
+
+@pytest.mark.parametrize("value", ["1e300", "1e-300", "-1e300", "1e200/3"])
+@pytest.mark.parametrize("place", ["k: 2", "rate: 0.4", "at: [0, 0]", "epsilon: 0.1", "[-2, 2]", "[0], [1]"])
+def test_extreme_numbers_are_no_trouble(value, place):
+    new = {
+        "[-2, 2]": f"[-1, {value.lstrip('-')}]",
+        "at: [0, 0]": f"at: [{value}, 0]",
+        "[0], [1]": f"[0], [{value}]",
+    }
+    value = value.lstrip("-") if place in ("rate: 0.4", "epsilon: 0.1") else value
+    text = BASE.replace(place, new.get(place, f"{place.split(':')[0]}: {value}"))
+    for item in found(text):
+        assert item.code

@@ -1,0 +1,246 @@
+"""schema, init, explain, version, completion, help: what is at hand every day."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import tubecert
+from tubecert import lint, spec
+from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.checking import expectations
+from tubecert.cli.app import app
+from tubecert.cli.init import TEMPLATES
+from tubecert.cli.schema import NAMES
+from tubecert.report import pages
+
+PACKAGE = Path(tubecert.__file__).parent
+ROOT = PACKAGE.parent
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+
+
+# schema
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_schema(name):
+    result = run("schema", name)
+    assert result.exit_code == 0
+    assert result.stdout == (PACKAGE / "schemas" / f"{name}.schema.json").read_text("utf-8")
+    assert json.loads(result.stdout)["title"].startswith("tubecert ")
+
+
+def test_schema_of_the_specification_by_default():
+    assert run("schema").stdout == run("schema", "spec").stdout
+    assert run("schema", "other").exit_code == 2
+
+
+# init
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_templates_certify_as_they_are(template, folder):
+    made = run("init", "--template", template)
+    assert (made.exit_code, made.stderr) == (0, "")
+    assert f"tubecert certify {template}.yaml" in made.stdout
+    assert [path.name for path in folder.iterdir()] == [f"{template}.yaml"]
+    assert run("check", f"{template}.yaml", "--strict", "--no-cache").stdout.endswith("no errors\n")
+    result = run("certify", f"{template}.yaml", "-q")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith(f"certified {template}: ")
+
+
+def test_init_refuses_to_overwrite(folder):
+    (folder / "mine.yaml").write_text("mine")
+    result = run("init", "-o", "mine.yaml")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "mine.yaml exists and is not overwritten" in result.stderr
+    assert (folder / "mine.yaml").read_text() == "mine"
+    (folder / "link.yaml").symlink_to("nowhere.yaml")
+    assert run("init", "-o", "link.yaml").exit_code == 2
+
+
+@pytest.mark.parametrize("target", ["no/folder.yaml", ".", "a" * 300])
+def test_init_where_nothing_can_be_written(target):
+    result = run("init", "-o", target)
+    assert result.exit_code == 2
+    assert "TC120" in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_init_to_stdout(folder):
+    result = run("init", "-o", "-")
+    assert result.stdout == (PACKAGE / "templates" / "regulation.yaml").read_text("utf-8")
+    assert not list(folder.iterdir())
+    assert run("init", "--template", "other").exit_code == 2
+
+
+# explain
+
+
+def codes_of_the_package() -> set[str]:
+    text = "".join(path.read_text("utf-8") for path in PACKAGE.rglob("*.py"))
+    return set(re.findall(r"\bTC\d{3}\b", text))
+
+
+def test_every_code_has_a_page_and_every_page_a_code():
+    assert codes_of_the_package() == set(pages.codes())
+
+
+def test_codes_with_a_table_say_there_what_they_say_here():
+    tables = {**spec.CODES, **lint.CODES, **expectations.CODES}
+    assert set(tables) <= set(pages.codes())
+
+
+def test_every_constant_and_every_tag_has_a_page():
+    assert set(pages.constants()) == {*TABLE, *DERIVED}
+    index = (ROOT / "docs" / "equations.md").read_text("utf-8")
+    section = index.split("## Tags of the paper")[1].split("##")[0]
+    tags = {
+        tag
+        for line in section.splitlines()
+        for tag in re.findall(r"`([^`]+)`", line.split("|")[1] if "|" in line else "")
+    }
+    assert tags <= set(pages.equations()), tags - set(pages.equations())
+
+
+@pytest.mark.parametrize("topic", sorted({*pages.codes(), *pages.constants(), *pages.equations()}))
+def test_every_page_has_meaning_formula_and_source(topic):
+    result = run("explain", topic)
+    assert (result.exit_code, result.stderr) == (0, "")
+    head, *parts = result.stdout.rstrip("\n").split("\n\n")
+    assert head.lower().startswith(topic.lower())
+    assert len(parts) >= 2
+    assert parts[-1].startswith("Source: ")
+    assert max(map(len, result.stdout.splitlines())) <= 130
+    if topic in pages.codes():
+        page = pages.codes()[topic]
+        assert page.wrong != page.right
+        assert f"Right:\n    {page.right.splitlines()[0]}" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("asked", "head"),
+    [("tc302", "TC302"), ("du", "feedback_gain (du)"), ("A", "upper (A)"), ("a", "lower (a)"), ("(26c)", "26c"), ("ccm_2", "CCM_2")],
+)  # fmt: skip
+def test_topics_by_other_names(asked, head):
+    assert run("explain", asked).stdout.startswith(head)
+
+
+def test_what_is_not_known_gets_a_suggestion():
+    result = run("explain", "TC1000")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "did you mean TC100" in result.stderr
+    for topic in ("", "ä", "x" * 1000, "[", "--"):
+        assert run("explain", "--", topic).exit_code == 2
+
+
+def test_the_list_of_topics():
+    shown = run("explain").stdout
+    for topic in [*pages.codes(), *pages.constants(), *pages.equations()]:
+        assert re.search(rf"^  {re.escape(topic)} ", shown, re.MULTILINE), topic
+
+
+EXAMPLE = """\
+tubecert: 1
+name: example
+system: {states: [x, y], inputs: [u], f: [y, -x - y], B: [[0], [1]]}
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {rate: 0.4, dual_metric: [["1", "-0.5"], ["-0.5", "1"]]}
+tube: {epsilon: 0.1, rho_a: 0.1}
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "old"),
+    [
+        ("TC104", "tube: {epsilon: 0.1, rho_a: 0.1}"),
+        ("TC105", "trajectory: {kind: equilibrium, at: [0, 0]}"),
+        ("TC113", "tube: {epsilon: 0.1, rho_a: 0.1}"),
+        ("TC117", "tube: {epsilon: 0.1, rho_a: 0.1}"),
+    ],
+)
+def test_examples_are_wrong_and_right_as_they_say(code, old):
+    page = pages.codes()[code]
+    wrong = run("check", write(EXAMPLE.replace(old, page.wrong)), "--json")
+    right = run("check", write(EXAMPLE.replace(old, page.right)), "--json")
+    assert code in wrong.stdout
+    assert code not in right.stdout
+
+
+def write(text: str) -> Path:
+    path = Path("example.yaml")
+    path.write_text(text)
+    return path
+
+
+# version, help, completion
+
+
+def test_version_as_json():
+    shown = json.loads(run("version", "--json").stdout)
+    assert shown["tubecert"] == tubecert.__version__
+    assert {"python", "numpy", "pyyaml"} <= set(shown)
+
+
+def commands() -> list[str]:
+    return [command.name for command in app.registered_commands if command.name] + ["certify"]
+
+
+@pytest.mark.parametrize("command", sorted(set(commands())))
+def test_every_command_helps_with_an_example(command):
+    shown = run(command, "--help").stdout
+    assert re.search(rf"Examples?:\n\s+tubecert {command}\b", shown), shown
+
+
+def test_completion_is_offered_and_works():
+    shown = run("--help").stdout
+    assert "--install-completion" in shown
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "_TUBECERT_COMPLETE": "complete_bash"}
+    environment |= {"COMP_WORDS": "tubecert ch", "COMP_CWORD": "1", "_TYPER_COMPLETE_ARGS": "tubecert ch"}
+    done = subprocess.run(
+        [sys.executable, "-m", "tubecert"], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.split() == ["check"], done
+
+
+def test_help_is_as_fast_as_without_completion():
+    """Completion loads nothing until it is asked for."""
+    code = "import sys; from tubecert.cli.app import app; from typer.testing import CliRunner\n"
+    code += "CliRunner().invoke(app, ['--help']); print(*sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert "shellingham" not in done.stdout.split()
+
+
+def test_explain_needs_no_numerics_for_a_code():
+    started = time.perf_counter()
+    code = "import sys; from tubecert.report import pages; pages.find('TC302').text(); print(*sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert "numpy" not in done.stdout.split(), time.perf_counter() - started
