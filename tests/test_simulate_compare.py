@@ -187,7 +187,7 @@ def test_an_uncertainty_outside_its_class_is_an_error(text, what):
     with pytest.raises(TubecertError) as caught:
         check_class(where, quiet_runs(), h_of(text), "uncertainty.h")
     (finding,) = caught.value.findings
-    assert finding.code == "TC606"
+    assert finding.code == "TC706"
     assert what in finding.message
     assert "t = " in finding.message
 

@@ -66,7 +66,7 @@ def adopted(spec: Spec, result: Result) -> Spec:
         message = f"the certificate is about another system: {', '.join(differing)} differ"
         help = "give the specification that was certified, or certify this one"
         raise SpecError(
-            [Finding(code="TC602", message=message, location=spec.location(differing[0]), help=help)]
+            [Finding(code="TC604", message=message, location=spec.location(differing[0]), help=help)]
         )
     return spec
 
@@ -80,7 +80,7 @@ def require_tube(result: Result) -> None:
     error = TubecertError(
         [
             Finding(
-                code="TC603",
+                code="TC703",
                 message=f"there is no tube that a simulation could leave ({result['verdict']}: {why})",
                 help=(reason or {}).get("relax", "") or "tubecert certify tells more",
             )

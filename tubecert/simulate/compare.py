@@ -198,5 +198,5 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
             )
             help = f"certify with {name if name != 'h_initial' else 'h'} declared in uncertainty.bounds"
             raise TubecertError(
-                [Finding(code="TC606", message=message, location=setting.spec.location(where), help=help)]
+                [Finding(code="TC706", message=message, location=setting.spec.location(where), help=help)]
             )

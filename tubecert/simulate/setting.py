@@ -127,7 +127,7 @@ def _horizon(spec: Spec, duration: Fraction | None) -> float:
         wanted = 10 / spec.metric.rate
     if spec.trajectory.horizon is not None and wanted > spec.trajectory.horizon:
         message = f"the plan ends at {float(spec.trajectory.horizon):g} s, before {float(wanted):g} s"
-        raise TubecertError([Finding(code="TC604", message=message, help="ask for a shorter duration")])
+        raise TubecertError([Finding(code="TC704", message=message, help="ask for a shorter duration")])
     return float(wanted)
 
 
@@ -188,7 +188,7 @@ def _certified(result: Result, source: str) -> dict[str, float]:
 def _no_gains(setting: Setting, controller: Controller, source: str, missing: list[str]) -> Finding:
     options = " and ".join(f"--{name.replace('_', '-')}" for name in missing)
     return Finding(
-        code="TC605",
+        code="TC705",
         message=f"{TITLES[source]} certifies no gains for the controller {controller}",
         help=f"choose {options} (then nothing is covered by the certificate), or another --gains",
     )
