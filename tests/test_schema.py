@@ -302,3 +302,14 @@ def test_what_is_no_certificate_does_not_fit(change):
 
 def test_constants_are_explained_elsewhere():
     assert not set(TABLE) & set(DERIVED)
+
+
+# reference
+
+
+def test_the_reference_is_what_the_schemas_say():
+    sys.path.insert(0, str(ROOT / "docs"))
+    import generate
+
+    for name, text in generate.everything().items():
+        assert (ROOT / "docs" / "reference" / name).read_text("utf-8") == text, "run python docs/generate.py"

@@ -119,7 +119,8 @@ def constants() -> Mapping[str, ConstantPage]:
 
 def find(topic: str) -> Page | None:
     """The page of a code, an equation's tag, or a constant's name or symbol; case matters only where it has to."""
-    wanted = topic.strip().strip("()")
+    wanted = topic.strip()
+    wanted = wanted[1:-1] if wanted.startswith("(") else wanted
     tables: tuple[Mapping[str, Page], ...] = (codes(), constants(), equations())
     symbols: Mapping[str, Page] = {page.symbol: page for page in constants().values()}
     for table in (*tables, symbols):

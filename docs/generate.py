@@ -1,0 +1,131 @@
+"""Writes docs/reference/ from the JSON Schemas and the pages of `explain`: python docs/generate.py"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tubecert.report import pages  # noqa: E402
+
+REFERENCE = ROOT / "docs" / "reference"
+_NOTE = "<!-- written by docs/generate.py; do not edit -->"
+_KINDS = {
+    "object": "mapping",
+    "array": "list",
+    "string": "text",
+    "number": "number",
+    "integer": "whole number",
+}
+
+
+class Reference:
+    """A schema as a page: a table for each mapping."""
+
+    def __init__(self, schema: dict[str, Any]) -> None:
+        self.schema = schema
+        self.waiting: list[tuple[str, dict[str, Any]]] = []
+
+    def page(self) -> str:
+        """The text."""
+        parts = [_NOTE, f"# {self.schema['title'].capitalize()}", self.schema["description"]]
+        self.waiting = [("", self.schema)]
+        while self.waiting:
+            parts += self._section(*self.waiting.pop(0))
+        types = [f"- **{name}**: {self.schema['$defs'][name]['description']}" for name in self._simple()]
+        return "\n\n".join([*parts, "## Kinds of values", "\n".join(types)]) + "\n"
+
+    def _simple(self) -> list[str]:
+        return [name for name, value in self.schema.get("$defs", {}).items() if "properties" not in value]
+
+    def _section(self, path: str, schema: dict[str, Any]) -> Iterator[str]:
+        if path:
+            yield f"## `{path}`"
+            yield schema.get("description", "")
+        rows = ["| key | value | meaning |", "|---|---|---|"]
+        required = set(schema.get("required", ()))
+        for key, value in schema.get("properties", {}).items():
+            name = f"{path}.{key}" if path else key
+            mark = " (required)" if key in required else ""
+            rows.append(f"| `{key}`{mark} | {self._kind(name, value)} | {self._meaning(value)} |")
+        yield "\n".join(rows)
+
+    def _resolved(self, value: dict[str, Any]) -> dict[str, Any]:
+        if "$ref" not in value:
+            return value
+        target = self.schema["$defs"][value["$ref"].rsplit("/", 1)[1]]
+        return {**target, **{key: item for key, item in value.items() if key != "$ref"}}
+
+    def _kind(self, path: str, value: dict[str, Any]) -> str:
+        """What a value is, in words; mappings get sections of their own."""
+        if "$ref" in value:
+            name = value["$ref"].rsplit("/", 1)[1]
+            if "properties" not in self.schema["$defs"][name]:
+                return name
+        value = self._resolved(value)
+        if "allOf" in value:
+            return " or ".join(self._branch(path, item) for item in value["allOf"])
+        if "properties" in value:
+            self.waiting.append((path, value))
+            return "mapping, see below"
+        if "enum" in value:
+            return ", ".join(dict.fromkeys(f"`{str(item).lower()}`" for item in value["enum"]))
+        if "const" in value:
+            return f"`{value['const']}`"
+        if "anyOf" in value:
+            return " or ".join(dict.fromkeys(self._kind(path, item) for item in value["anyOf"]))
+        if value.get("type") == "array":
+            return f"list of: {self._kind(f'{path}[]', value['items'])}"
+        if isinstance(value.get("additionalProperties"), dict):
+            return f"mapping of names to: {self._kind(f'{path}.*', value['additionalProperties'])}"
+        kinds = value.get("type", "anything")
+        return " or ".join(_KINDS.get(kind, kind) for kind in ([kinds] if isinstance(kinds, str) else kinds))
+
+    def _branch(self, path: str, item: dict[str, Any]) -> str:
+        kind = item["if"]["properties"]["kind"]["const"]
+        self.waiting.append((f"{path}, kind: {kind}", self._resolved(item["then"])))
+        return f"`kind: {kind}`"
+
+    def _meaning(self, value: dict[str, Any]) -> str:
+        value = self._resolved(value)
+        words = value.get("description", "").replace("*", "\\*").replace("<", "&lt;")
+        if "default" in value:
+            words += f" Default: `{json.dumps(value['default'])}`."
+        if "examples" in value:
+            words += " Example: " + ", ".join(f"`{json.dumps(item)}`" for item in value["examples"]) + "."
+        return words.replace("|", "\\|").strip()
+
+
+def codes() -> str:
+    """The page of finding codes."""
+    parts = [_NOTE, "# Finding codes", "The same pages as `tubecert explain CODE`. Codes are stable."]
+    for page in pages.codes().values():
+        parts += [f"## {page.code}: {page.title}", page.meaning]
+        parts += [f"Wrong:\n\n```text\n{page.wrong}\n```", f"Right:\n\n```text\n{page.right}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def everything() -> dict[str, str]:
+    """The text of every page by its file name."""
+    schemas = {"specification": "spec", "metric": "metric", "certificate": "certificate"}
+    made = {}
+    for name, short in schemas.items():
+        path = ROOT / "tubecert" / "schemas" / f"{short}.schema.json"
+        made[f"{name}.md"] = Reference(json.loads(path.read_text(encoding="utf-8"))).page()
+    return {**made, "codes.md": codes()}
+
+
+def main() -> None:
+    """Write the pages."""
+    REFERENCE.mkdir(exist_ok=True)
+    for name, text in everything().items():
+        (REFERENCE / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
