@@ -24,7 +24,7 @@ from tubecert.metric.synthesis.problem import SynthesisProblem
 from tubecert.model import ControlAffineModel
 
 _DIGITS = 12
-_EFFORT = Effort(budget=6_000)
+_EFFORT = Effort(budget=3_000)
 Box = Sequence[tuple[Fraction, Fraction]]
 _ALLOWED = 2.5e-4  # of the rate: less than any back-off, and much easier to decide than the rate itself
 
