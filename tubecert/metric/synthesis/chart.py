@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -109,7 +110,7 @@ def chebyshev(order: int) -> Array:
 @cache
 def monomial_matrix(order: int) -> Array:
     """Values at the nodes -> coefficients of 1, u, u^2, ..."""
-    return np.linalg.inv(np.vander(chebyshev(order), increasing=True))
+    return np.asarray(np.linalg.inv(np.vander(chebyshev(order), increasing=True)), dtype=np.float64)
 
 
 @cache
@@ -117,16 +118,15 @@ def control_matrix(order: int, pieces: int) -> Array:
     """Values at the nodes -> Bernstein coefficients on equal pieces of [-1, 1], repeated ends once."""
     rows = []
     for lo, hi in _pieces(pieces):
-        for i in range(
-            order + 1
-        ):  # sum_k binom(i, k)/binom(d, k) times the coefficient of s^k, u = lo + (hi - lo) s
-            row = np.zeros(order + 1)
-            for k in range(i + 1):
-                for power in range(k, order + 1):
-                    row[power] += (
-                        comb(i, k) / comb(order, k) * comb(power, k) * lo ** (power - k) * (hi - lo) ** k
-                    )
-            rows.append(row)
+        shifted = np.zeros(
+            (order + 1, order + 1)
+        )  # coefficients of s^k from those of u^p, u = lo + (hi - lo) s
+        for p in range(order + 1):
+            for k in range(p + 1):
+                shifted[k, p] = comb(p, k) * lo ** (p - k) * (hi - lo) ** k
+        rows += [
+            sum(comb(i, k) / comb(order, k) * shifted[k] for k in range(i + 1)) for i in range(order + 1)
+        ]
     return np.array(rows)[_distinct(order, pieces)] @ monomial_matrix(order)
 
 
@@ -139,7 +139,7 @@ def control_points(order: int, pieces: int) -> Array:
 
 def _pieces(count: int) -> list[tuple[float, float]]:
     ends = np.linspace(-1, 1, count + 1)
-    return [(float(a), float(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return [(float(a), float(b)) for a, b in pairwise(ends)]
 
 
 def _distinct(order: int, pieces: int) -> list[int]:

@@ -76,6 +76,20 @@ class ConicSolution:
     iterations: int
     seconds: float
 
+    @classmethod
+    def none(cls, status: str) -> ConicSolution:
+        """No solution, and why."""
+        return cls(
+            values=None,
+            objective=np.inf,
+            bound=-np.inf,
+            feasible=None,
+            finished=False,
+            status=status,
+            iterations=0,
+            seconds=0.0,
+        )
+
 
 def triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns (i <= j) of the upper triangle, column by column."""
@@ -106,7 +120,7 @@ def solve(
     """
     lifted = _stacked(program)
     if not (np.isfinite(lifted.slopes.data).all() and np.isfinite(lifted.constant).all()):
-        return _failed("the program has coefficients that are not finite")
+        return ConicSolution.none("the program has coefficients that are not finite")
     if solver == "scs":
         return _scs(program, lifted, tolerance, iterations or 20_000)
     return _clarabel(program, lifted, tolerance, iterations or 200)
@@ -162,7 +176,7 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
     except BaseException as error:  # a panic of the Rust side is no Exception
         if isinstance(error, (KeyboardInterrupt, SystemExit)):
             raise
-        return _failed(f"Clarabel failed: {error}")
+        return ConicSolution.none(f"Clarabel failed: {error}")
     name = str(found.status)
     opinions = {
         "Solved": True,
@@ -228,19 +242,6 @@ def _lower(program: ConicProgram) -> list[NDArray[np.intp]]:
 
 def _judged(values: Array, **rest: Any) -> ConicSolution:
     return ConicSolution(values=values if np.isfinite(values).all() else None, **rest)
-
-
-def _failed(status: str) -> ConicSolution:
-    return ConicSolution(
-        values=None,
-        objective=np.inf,
-        bound=-np.inf,
-        feasible=None,
-        finished=False,
-        status=status,
-        iterations=0,
-        seconds=0.0,
-    )
 
 
 def _words(name: str) -> str:

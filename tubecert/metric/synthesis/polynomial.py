@@ -1,14 +1,14 @@
 """The conditions on a metric as polynomial matrices on cubes, affine in the unknown coefficients.
 
-I <= W, W <= kappa I and -N'(F_0 + 2 rate W)N >= 0, each from values at the nodes of its own chart. Variables in which a
-condition has degree one are replaced by the ends of their ranges.
+I <= W, W <= kappa I and -N'(F_0 + 2 rate W)N >= 0, each from values at the nodes of its own chart.
 Untrusted. Implements: (CCM_1), (CCM_2).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,23 +24,27 @@ from tubecert.metric.synthesis.problem import SynthesisProblem
 from tubecert.model import ControlAffineModel
 
 Array = NDArray[np.float64]
-SMALL = 1e-3  # W >= SMALL I beside W >= B B'
+Signs = tuple[tuple[int, ...], ...]
+_SMALL = 1e-3  # W >= _SMALL I beside W >= B B'
+_LARGE = 40  # order of a Gram matrix above which a variable is replaced by control points
+_LARGEST = 150  # order at which the route gives up
+_MOST_NODES = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
     """C(u) >= 0 on a cube, of order `size`, at one control point of the variables that were replaced.
 
-    `coefficients` (order_1 + 1, ..., t, U + 2): for every monomial the upper triangle of C by columns, as coefficients of
-    the unknowns, of kappa and the constant; `orders` in each variable of the cube. `signs`: each symmetry's action on
-    the cube's variables and on the rows of C.
+    `coefficients` (monomials, t, U + 2): of every monomial up to the degrees `orders`, in C order, the upper triangle
+    of C by columns, as coefficients of the unknowns, of kappa, and the constant. `signs`: how each symmetry acts on
+    the variables of the cube and on the rows of C.
     """
 
     name: str
     size: int
     orders: tuple[int, ...]
     coefficients: Array
-    signs: tuple[tuple[int, ...], ...]
+    signs: Signs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,45 +55,35 @@ class Conditions:
     conditions: tuple[Condition, ...]
 
 
-def polynomial_conditions(problem: SynthesisProblem, *, pieces: int = 0) -> Conditions:
+def polynomial_conditions(problem: SynthesisProblem, *, pieces: int = 2) -> Conditions:
     """The conditions of a problem.
 
-    With `pieces`, plain variables of a higher degree that share a condition with an angle are replaced too, by the
-    control points of their Bernstein form on so many pieces: cheaper, and a little stricter.
-    Raises `NotPolynomialError` or `NotLiftedError` if the route does not apply.
+    A variable of degree one is replaced by the ends of its range: that is exact. Where Gram matrices would get large,
+    variables of low degree are replaced by the control points of their Bernstein form on so many `pieces`: a little
+    stricter, and much cheaper. Raises `NotPolynomialError` or `NotLiftedError` if the route does not apply.
     """
-    model, n = problem.model, len(problem.model.states)
-    N = _annihilator(model)
-    metric, contraction, angles = _degrees(problem, N)
+    model, family = problem.model, problem.family
     box = np.array([[float(lo), float(hi)] for lo, hi in problem.safe_set])
-    forms = FormsTape(model, problem.family)
-    symmetries, mask = invariant_entries(model, problem.family, box, forms)
+    N = _annihilator(model)
+    charts = _charts(problem, N)
+    forms = FormsTape(model, family)
+    symmetries, mask = invariant_entries(model, family, box, forms)
     unknowns = Unknowns(mask)
+    found: list[Condition] = []
 
-    chart = _chart(problem, metric, angles)
-    points, weight = _points(chart, model, box)
-    at = forms(points, np.zeros((len(points), n, 0)))
-    W = at.metric_rows(unknowns)
-    i, j = triangle(n)
-    eye = np.repeat(np.where(i == j, 1.0, 0.0)[None], len(points), axis=0)
-    none = np.zeros_like(eye)
-    floors = {"floor": (W, none, -eye)}
-    if problem.floor == "input":
-        floors = {"floor": (W, none, -at.input[:, i, j]), "definite": (W, none, -SMALL * eye)}
-    states = [(sign, sign) for sign in symmetries]
-    found = []
-    for name, parts in (floors | {"ceiling": (-W, eye, none)}).items():
-        found += _placed(name, chart, _weighted(parts, weight), states, model, pieces)
-
+    points, weight = _points(charts[0], model, box)
+    at = forms(points, np.zeros((len(points), len(box), 0)))
+    own = [(sign, sign) for sign in symmetries]
+    for name, values in _bounds(at.metric_rows(unknowns), at.input, problem.floor):
+        found += _placed(name, charts[0], values * weight[:, None, None], own, model=model, pieces=pieces)
     if N[0]:
-        chart = _chart(problem, contraction, angles)
-        points, weight = _points(chart, model, box)
-        F = forms(points, _values(N, model, points)).contraction_rows(unknowns, problem.rate)
-        none = np.zeros(F.shape[:2])
-        states = [
-            (sign, rows) for sign in symmetries if (rows := _row_signs(N, model, box, sign)) is not None
-        ]
-        found += _placed("contraction", chart, _weighted((F, none, none), weight), states, model, pieces)
+        points, weight = _points(charts[1], model, box)
+        rows = forms(points, _values(N, model, points)).contraction_rows(unknowns, problem.rate)
+        values = np.concatenate([rows, np.zeros((*rows.shape[:2], 2))], axis=2)
+        kept = [(sign, q) for sign in symmetries if (q := _row_signs(N, model, box, sign)) is not None]
+        found += _placed(
+            "contraction", charts[1], values * weight[:, None, None], kept, model=model, pieces=pieces
+        )
     return Conditions(unknowns=unknowns, conditions=tuple(found))
 
 
@@ -113,8 +107,8 @@ def _annihilator(model: ControlAffineModel) -> Matrix:
     raise NotPolynomialError("B has no rows that are independent")
 
 
-def _degrees(problem: SynthesisProblem, N: Matrix) -> tuple[dict[str, int], dict[str, int], frozenset[str]]:
-    """Bounds on the degrees of W and of C2 in each state, and the states that are angles."""
+def _charts(problem: SynthesisProblem, N: Matrix) -> tuple[Chart, Chart]:
+    """The variables and degrees of W, and of C2."""
     model, family = problem.model, problem.family
     E, f, states = family.frame, model.f, model.states
     A = model.f_x if family.flat else combine(1, multiply(model.f_x, E), -1, along(E, f, states))
@@ -123,18 +117,20 @@ def _degrees(problem: SynthesisProblem, N: Matrix) -> tuple[dict[str, int], dict
     flat = [[e for row in group for e in row] for group in groups]
     found, angles = degrees_of([e for part in flat for e in part])
     ends = np.cumsum([0, *map(len, flat)])
-    frame, P, Q, values, rates = (highest(*found[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True))
-    contraction = highest(total(P, P, highest(values, rates)), total(P, Q, values))
-    return total(frame, frame, values), contraction, angles
-
-
-def _chart(problem: SynthesisProblem, degrees: dict[str, int], angles: frozenset[str]) -> Chart:
-    variables, orders = [], []
-    for name, (lo, hi) in zip(problem.model.states, problem.safe_set, strict=True):
-        if degrees.get(name, 0):
-            variables.append(Variable(name=name, lo=float(lo), hi=float(hi), angle=name in angles))
-            orders.append(degrees[name])
-    return Chart(variables=tuple(variables), degrees=tuple(orders))
+    frame, P, Q, values, rates = (highest(*found[a:b]) for a, b in pairwise(ends))
+    both = total(frame, frame, values), highest(total(P, P, highest(values, rates)), total(P, Q, values))
+    charts = []
+    for degrees in both:
+        used = [
+            (Variable(name=name, lo=float(lo), hi=float(hi), angle=name in angles), degrees[name])
+            for name, (lo, hi) in zip(states, problem.safe_set, strict=True)
+            if degrees.get(name, 0)
+        ]
+        chart = Chart(variables=tuple(v for v, _ in used), degrees=tuple(d for _, d in used))
+        if np.prod([order + 1.0 for order in chart.orders]) > _MOST_NODES:
+            raise NotPolynomialError("too many variables of too high a degree")
+        charts.append(chart)
+    return charts[0], charts[1]
 
 
 def _points(chart: Chart, model: ControlAffineModel, box: Array) -> tuple[Array, Array]:
@@ -143,6 +139,23 @@ def _points(chart: Chart, model: ControlAffineModel, box: Array) -> tuple[Array,
     points = np.repeat(box.mean(axis=1)[None], len(nodes), axis=0)
     points[:, [model.states.index(v.name) for v in chart.variables]] = nodes
     return points, weight
+
+
+def _bounds(W: Array, BBt: Array, floor: str) -> Iterator[tuple[str, Array]]:
+    """Floors and the ceiling of W, from its rows (N, t, U), as (N, t, U + 2)."""
+    i, j = triangle(BBt.shape[1])
+    eye = np.broadcast_to(np.where(i == j, 1.0, 0.0), W.shape[:2])
+    none = np.zeros_like(eye)
+    if floor == "input":
+        yield "floor", _joined(W, none, -BBt[:, i, j])
+        yield "definite", _joined(W, none, -_SMALL * eye)
+    else:
+        yield "floor", _joined(W, none, -eye)
+    yield "ceiling", _joined(-W, eye, none)
+
+
+def _joined(unknowns: Array, kappa: Array, constant: Array) -> Array:
+    return np.concatenate([unknowns, kappa[..., None], constant[..., None]], axis=2)
 
 
 def _values(N: Matrix, model: ControlAffineModel, points: Array) -> Array:
@@ -159,50 +172,49 @@ def _row_signs(N: Matrix, model: ControlAffineModel, box: Array, sign: Array) ->
     return rows if np.allclose(there, here * rows, rtol=1e-9, atol=1e-9 * np.abs(here).max()) else None
 
 
-def _weighted(parts: tuple[Array, Array, Array], weight: Array) -> Array:
-    """(N, t, U + 2), times the factor that makes it a polynomial."""
-    unknowns, kappa, constant = parts
-    table = np.concatenate([unknowns, kappa[..., None], constant[..., None]], axis=2)
-    return table * weight[:, None, None]
-
-
 def _placed(
     name: str,
     chart: Chart,
     values: Array,
     symmetries: Sequence[tuple[Array, Array]],
+    *,
     model: ControlAffineModel,
     pieces: int,
-) -> list[Condition]:
+) -> Iterator[Condition]:
     """One condition for every control point, one of each orbit under the symmetries."""
-    angle = any(v.angle for v in chart.variables)
-    replaced = [
-        1 if order <= 1 else (pieces if angle and not v.angle else 0)
-        for order, v in zip(chart.orders, chart.variables, strict=True)
-    ]
+    size = int(np.sqrt(2 * values.shape[1]))
+    replaced = _replaced(chart.orders, size, pieces)
     places, tables = chart.coefficients(values, replaced)
     states = [model.states.index(v.name) for v in chart.variables]
     gone = [state for state, count in zip(states, replaced, strict=True) if count]
     kept = [state for state, count in zip(states, replaced, strict=True) if not count]
     orders = tuple(order for order, count in zip(chart.orders, replaced, strict=True) if not count)
-    conditions = []
-    for place, table in zip(places, tables, strict=True):
-        images = [place * sign[gone] for sign, _ in symmetries]
-        if any(tuple(image) > tuple(place + 1e-9) for image in images):
+    for place, table in zip(np.round(places, 9), tables, strict=True):
+        images = [(place * sign[gone]).tolist() for sign, _ in symmetries]
+        if any(image > place.tolist() for image in images):
             continue
-        stays = [np.allclose(image, place) for image in images]
-        signs = [
+        signs = {
             (*sign[kept].astype(int).tolist(), *rows.astype(int).tolist())
-            for (sign, rows), stay in zip(symmetries, stays, strict=True)
-            if stay
-        ]
-        conditions.append(
-            Condition(
-                name=name,
-                size=int(np.sqrt(2 * values.shape[1])),
-                orders=orders,
-                coefficients=table,
-                signs=tuple(sorted(set(map(tuple, signs)))),
-            )
+            for (sign, rows), image in zip(symmetries, images, strict=True)
+            if image == place.tolist()
+        }
+        yield Condition(
+            name=name,
+            size=size,
+            orders=orders,
+            coefficients=table.reshape(-1, *table.shape[len(orders) :]),
+            signs=tuple(sorted(signs)),
         )
-    return conditions
+
+
+def _replaced(orders: Sequence[int], size: int, pieces: int) -> list[int]:
+    """How many pieces each variable is replaced on, 0 if it is kept; the highest degree is kept."""
+    counts = [1 if order <= 1 else 0 for order in orders]
+    while True:
+        kept = [k for k, count in enumerate(counts) if not count]
+        order = size * np.prod([(orders[k] + 1) // 2 + 1.0 for k in kept])
+        if len(kept) < 2 or order <= _LARGE:
+            if order > _LARGEST:
+                raise NotPolynomialError(f"Gram matrices of order {order:.0f} would be needed")
+            return counts
+        counts[min(kept, key=lambda k: orders[k])] = pieces

@@ -7,6 +7,7 @@ Untrusted. Implements: (CCM_1), (CCM_2) as sufficient conditions, on the whole s
 
 from __future__ import annotations
 
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -22,21 +23,25 @@ from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
 
 Array = NDArray[np.float64]
 ROUTE = "sos"
+_DUST = 1e-11  # of interpolation, relative to the largest coefficient
+_PIECES = 2
 
 
-def propose_sos(problem: SynthesisProblem, *, raised: int = 0, pieces: int = 0) -> Proposal:
+def propose_sos(problem: SynthesisProblem, *, raised: int = 0) -> Proposal:
     """The member of the family with the least kappa that sums of squares find.
 
-    `raised`: multipliers of so many times two degrees more. `pieces`: see `polynomial_conditions`.
+    `raised`: by so many steps finer than the degrees of the conditions suggest: multipliers of two degrees more, and
+    twice the pieces where variables are replaced by control points.
     """
     start = perf_counter()
     try:
-        conditions = polynomial_conditions(problem, pieces=pieces)
+        conditions = polynomial_conditions(problem, pieces=_PIECES << raised)
     except (NotPolynomialError, NotLiftedError) as error:
-        return _nothing(f"sums of squares do not apply: {error}", perf_counter() - start)
-    program = sos_program(conditions, raised=raised)
-    found = solve(program, problem.solver)
-    return _proposal(conditions, found, perf_counter() - start)
+        return _proposal(None, ConicSolution.none(f"sums of squares do not apply: {error}"), problem, start)
+    if problem.progress is not None:
+        problem.progress(f"sums of squares: {len(conditions.conditions)} polynomial matrices")
+    found = solve(sos_program(conditions, raised=raised), problem.solver)
+    return _proposal(conditions, found, problem, start)
 
 
 def sos_program(conditions: Conditions, *, raised: int = 0) -> ConicProgram:
@@ -66,8 +71,8 @@ def _gram_entries(
 ) -> tuple[tuple[int, ...], Array, sparse.csr_array, sparse.csr_array]:
     """(orders, constants, slopes in unknowns and kappa, slopes in free Gram entries) of the Gram blocks."""
     form = gram_form(condition.orders, condition.size, raised, condition.signs)
-    table = condition.coefficients.reshape(-1, condition.coefficients.shape[-1])
-    table = np.where(np.abs(table) > 1e-11 * np.abs(table).max(), table, 0.0)  # interpolation leaves dust
+    table = condition.coefficients.reshape(-1, condition.coefficients.shape[-1])  # by monomial, then by entry
+    table = np.where(np.abs(table) > _DUST * np.abs(table).max(), table, 0.0)
     shared = sparse.csr_array(form.pivots @ sparse.csr_array(table[:, :-1]))
     return form.orders, np.asarray(form.pivots @ table[:, -1]), shared, form.free
 
@@ -82,28 +87,24 @@ def _side_by_side(
     return sparse.csr_array((data, (rows, columns)), shape=(a.shape[0], width))
 
 
-def _proposal(conditions: Conditions, found: ConicSolution, seconds: float) -> Proposal:
-    count = conditions.unknowns.count
-    y = found.values if found.feasible is not False else None
+def _proposal(
+    conditions: Conditions | None, found: ConicSolution, problem: SynthesisProblem, start: float
+) -> Proposal:
+    y, kappa, status, feasible = found.values, inf, found.status, found.feasible
+    if conditions is None or feasible is False:
+        y = None
+    coefficients = None
+    if conditions is not None and y is not None:
+        count = conditions.unknowns.count
+        coefficients, kappa = conditions.unknowns.matrices(y[:count]), float(y[count])
+    if problem.limit is not None and feasible and kappa > problem.limit:
+        feasible, status = False, f"{status}, with kappa {kappa:.6g} above the limit {problem.limit:.6g}"
     return Proposal(
         route=ROUTE,
-        coefficients=None if y is None else conditions.unknowns.matrices(y[:count]),
-        kappa=float("inf") if y is None else float(y[count]),
-        bound=0.0,
-        feasible=found.feasible,
-        status=found.status,
-        seconds=seconds,
-        solver_seconds=found.seconds,
-    )
-
-
-def _nothing(status: str, seconds: float) -> Proposal:
-    return Proposal(
-        route=ROUTE,
-        coefficients=None,
-        kappa=float("inf"),
-        feasible=None,
+        coefficients=coefficients,
+        kappa=kappa,
+        feasible=feasible,
         status=status,
-        seconds=seconds,
-        solver_seconds=0.0,
+        seconds=perf_counter() - start,
+        solver_seconds=found.seconds,
     )
