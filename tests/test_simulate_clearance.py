@@ -37,7 +37,7 @@ def filled(obstacle, step=0.02):
     corners = np.array(obstacle.polygon, dtype=float)
     g = np.stack(np.meshgrid(np.arange(-4, 6, step), np.arange(-1, 6, step)), axis=-1).reshape(-1, 2)
     rays = corners[None] - g[:, None]
-    angles = np.angle((rays[..., 0] + 1j * rays[..., 1]))
+    angles = np.angle(rays[..., 0] + 1j * rays[..., 1])
     turns = np.diff(np.concatenate([angles, angles[:, :1]], axis=1), axis=1)
     return g[np.abs(((turns + np.pi) % (2 * np.pi) - np.pi).sum(axis=1)) > np.pi]
 

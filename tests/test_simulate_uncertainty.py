@@ -122,7 +122,7 @@ def test_pushes_use_the_class():
     member = adversary(kind, genes, np.zeros(2), np.zeros(2), 0.5)
     # slope of the direction: 4/0.5 per push; rate: 5/0.5 per push
     assert member.push == pytest.approx(min(2.0 / 8, 3.0 / 10, 1.0), rel=1e-6)
-    size, slope, rate = Member.bounds(member)
+    size, slope, _ = member.bounds()
     assert size + member.push <= 1.0
     assert slope + 8 * member.push <= 2.0 * (1 + 1e-9)
 

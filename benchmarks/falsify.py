@@ -1,0 +1,95 @@
+"""Tries to break certificates, and shows that it can: random runs and adversaries, with the gains and far below them.
+
+    python benchmarks/falsify.py              everything: 10 000 and 1 000 random runs, about 10 minutes on 2 cores
+    python benchmarks/falsify.py --runs 200   at most 200 runs each
+
+What is printed is the largest d/dbar that was met; above 1 the tube was left.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from fractions import Fraction
+from pathlib import Path
+
+from tubecert import pipeline
+from tubecert.simulate.campaign import Attack, simulate
+from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
+from tubecert.spec import load
+
+CONFIGS = Path(__file__).parent.parent / "configs"
+SYSTEMS = {"two_state": 10_000, "three_state": 1_000}
+FEW = 100  # random runs of the comparisons
+FAR_BELOW = (Fraction(1, 10), Fraction(1, 1000))  # of omega, of Gamma
+TOO_SLOW = (1, 5, 20)  # times the sample time
+
+
+def main() -> None:
+    """Prints one row for each loop that is attacked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=max(SYSTEMS.values()))
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    print(f"{'system':12} {'loop':44} {'runs':>6} {'left':>6} {'random':>8} {'adversary':>9} {'runs/s':>7}")
+    for name, count in SYSTEMS.items():
+        setting = _setting(name)
+        few = min(FEW, asked.runs)
+        _row(setting, loop_of(setting, "l1", Choice()), min(count, asked.runs), asked.seed)
+        _row(setting, _far_below(setting), few, asked.seed)
+        for factor in TOO_SLOW:
+            _row(setting, _slower(setting, factor), few if factor > 1 else min(1000, asked.runs), asked.seed)
+
+
+def _setting(name: str) -> Setting:
+    spec = load(str(CONFIGS / f"{name}.yaml"))
+    return setting_of(spec, pipeline.certify(spec, pipeline.Options()))
+
+
+def _far_below(setting: Setting) -> Loop:
+    proof = setting.result["proof"]["distance"]
+    omega, Gamma = (Fraction(repr(proof[name])) for name in ("bandwidth", "adaptation_rate"))
+    choice = Choice(bandwidth=omega * FAR_BELOW[0], adaptation_rate=Gamma * FAR_BELOW[1])
+    return loop_of(setting, "l1", choice)
+
+
+def _slower(setting: Setting, factor: int) -> Loop:
+    Ts = Fraction(repr(setting.result["proof"]["sampled"]["sample_time"]))
+    return loop_of(setting, "sampled", Choice(sample_time=factor * Ts))
+
+
+def _row(setting: Setting, loop: Loop, count: int, seed: int) -> None:
+    started = time.perf_counter()
+    campaign = simulate(setting, [loop], count=count, seed=seed)
+    (attack,) = campaign.attacks
+    rate = count / (time.perf_counter() - started)
+    assert attack.comparison is not None
+    assert attack.worst_comparison is not None
+    shares = [_share(attack.comparison), _share(attack.worst_comparison)]
+    left = len(attack.comparison.outside)
+    row = f"{setting.spec.name:12} {_words(loop):44} {count:6} {left:6} {shares[0]:>8} {shares[1]:>9} {rate:7.0f}"
+    print(row + _notes(attack), flush=True)
+
+
+def _share(found: object) -> str:
+    use = getattr(found, "uses", {}).get("distance")
+    return "-" if use is None or use.share is None else f"{use.share:.3f}"
+
+
+def _notes(attack: Attack) -> str:
+    """Broken promises and runs without a result, if there are any."""
+    assert attack.comparison is not None
+    broken = [item.name for item in attack.comparison.violations]
+    lost = len(attack.comparison.unreliable)
+    return (f"  BROKEN: {', '.join(broken)}" if broken else "") + (f"  no result: {lost}" if lost else "")
+
+
+def _words(loop: Loop) -> str:
+    gains = loop.problem.gains
+    assert gains is not None
+    fast = f"Gamma {gains.adaptation_rate:.4g}" if gains.adaptation_rate else f"Ts {gains.sample_time:.4g}"
+    return f"{loop.controller}, omega {gains.bandwidth:.4g}, {fast}, {'B/C' if loop.promise else 'chosen'}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,234 @@
+"""The command `simulate`: exit codes, files, bytes, and one clear message per mistake."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated import FLAT, certified, setting
+from typer.testing import CliRunner
+
+from tubecert.certificate import dump, seal
+from tubecert.cli.app import app
+from tubecert.simulate import campaign as campaigns
+from tubecert.simulate import monte_carlo as sampling
+from tubecert.simulate.campaign import simulate
+from tubecert.simulate.setting import Choice, loop_of
+
+pytestmark = pytest.mark.timeout(240)  # the first run compiles
+LOCATED = re.compile(r"(^|\n)(\S+:\d+:\d+: |--[a-z-]+: )?error TC\d{3}: ")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+
+
+@pytest.fixture(autouse=True)
+def files(tmp_path, monkeypatch):
+    """A folder with a specification and its certificate."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flat.yaml").write_text(FLAT)
+    (tmp_path / "flat.json").write_text(dump(seal(certified("flat")[1], {})))
+    return tmp_path
+
+
+def command(*more):
+    return run("simulate", "flat.yaml", "--certificate", "flat.json", "--duration", "2", *more)
+
+
+# what comes out
+
+
+def test_a_campaign_that_finds_nothing(files):
+    result = command("--runs", "8", "--controllers", "ccm,l1,sampled")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("not falsified flat: ")
+    assert not re.search(r"\b(verified|safe|certified that)\b", result.stdout)
+    data = json.loads((files / "flat.simulation" / "summary.json").read_text())
+    assert data["outcome"] == "not falsified"
+    assert [loop["controller"] for loop in data["loops"]] == ["ccm", "l1", "sampled"]
+    assert [loop["covered"] for loop in data["loops"]] == [False, True, True]
+    assert {attack["random"]["runs"] for attack in data["attacks"]} == {8}
+    names = {path.name for path in (files / "flat.simulation").iterdir()}
+    assert {"runs.npz", "l1.csv", "monte_carlo_l1.csv", "states.png", "plane.svg"} <= names
+    assert not [name for name in names if name.startswith(".")]
+    arrays = np.load(files / "flat.simulation" / "runs.npz")
+    rows = (files / "flat.simulation" / "l1.csv").read_text().splitlines()
+    assert rows[0].split(",")[:3] == ["t", "p", "v"]
+    last = dict(zip(rows[0].split(","), map(float, rows[-1].split(",")), strict=True))
+    assert last["p"] == pytest.approx(arrays["l1_x"][-1, 0], rel=1e-6)
+    assert last["u"] == pytest.approx(last["plan_u"] + last["k_u"] + last["u_a_u"], abs=1e-8)
+
+
+def test_the_same_command_gives_the_same_bytes(files):
+    for name in ("one", "two"):
+        assert command("--runs", "3", "-o", name).exit_code == 0
+    names = sorted(path.name for path in (files / "one").iterdir())
+    assert names == sorted(path.name for path in (files / "two").iterdir())
+    for name in names:
+        assert (files / "one" / name).read_bytes() == (files / "two" / name).read_bytes(), name
+    svg = (files / "one" / "states.svg").read_text()
+    assert "<dc:date>" not in svg
+
+
+def test_json_and_quiet():
+    data = json.loads(command("--runs", "0", "--json").stdout)
+    assert data["format"] == "tubecert-simulation/1"
+    assert data["attacks"] == []
+    assert command("--runs", "0", "-q").stdout.count("\n") == 1
+
+
+def test_gains_that_are_far_too_small_leave_the_tube(files):
+    text = FLAT.replace("0.2*sin(t)", "1.5*sin(t)").replace("epsilon: 0.2", "epsilon: 0.3")
+    (files / "strong.yaml").write_text(text)
+    result = run("simulate", "strong.yaml", "--bandwidth", "0.1", "--adaptation-rate", "1", "--runs", "4")
+    assert result.exit_code == 1, result.output
+    assert result.stdout.startswith("tube left strong: ")
+    assert "chosen, not certified" in " ".join(result.stdout.split())
+    assert "certifying first" in result.stderr
+    assert (files / "strong.simulation" / "certificate.json").exists()
+
+
+def test_a_broken_promise_is_loud_and_can_be_replayed(files):
+    """A certificate that promises too much: the tube is made ten times thinner than it was certified."""
+    _, result = certified("flat")
+    forged = json.loads(json.dumps(result))
+    forged["metric"]["lower"] = [value / 400 for value in forged["metric"]["lower"]]
+    (files / "forged.json").write_text(dump(seal(forged, {})))
+    result = run(
+        "simulate", "flat.yaml", "--certificate", "forged.json", "--runs", "8", "--controllers", "l1"
+    )
+    assert result.exit_code == 1, result.output
+    assert result.stdout.startswith("falsified flat: ")
+    assert "VIOLATION" in result.stdout
+    assert re.search(r"t = \S+ s, (random run \d+|adversary|uncertainty)", result.stdout)
+    number = re.search(r"--replay (\d+)", result.stdout)
+    assert number is not None
+    sample = json.loads((files / "flat.simulation" / "summary.json").read_text())["attacks"][0]["random"]
+    named = {item["run"]: item["value"] for item in sample["violations"] if item["bound_of"] == "tube"}
+    again = run(
+        "simulate", "flat.yaml", "--certificate", "forged.json", "--runs", "0", "--controllers", "l1",
+        "--replay", next(iter(named)), "--json",
+    )  # fmt: skip
+    worst = json.loads(again.stdout)["loops"][0]["worst"]["distance"]["value"]
+    assert worst == pytest.approx(next(iter(named.values())), rel=1e-3)
+
+
+# runs do not depend on how they are grouped; interruption keeps what is finished
+
+
+def test_runs_do_not_depend_on_their_batches(monkeypatch):
+    where = setting("flat", duration="2")
+    loop = loop_of(where, "l1", Choice())
+    whole = sampling.monte_carlo(where, loop, 7, seed=5)
+    monkeypatch.setattr(sampling, "BATCH", 3)
+    parts = sampling.monte_carlo(where, loop, 7, seed=5)
+    np.testing.assert_array_equal(whole.runs.x, parts.runs.x)
+    np.testing.assert_array_equal(whole.runs.worst.distance.value, parts.runs.worst.distance.value)
+
+
+def test_interruption_keeps_what_is_finished(files, monkeypatch):
+    monkeypatch.setattr(sampling, "BATCH", 2)
+    real, calls = sampling.integrate, []
+
+    def integrate(*arguments, **options):
+        calls.append(1)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(sampling, "integrate", integrate)
+    result = command("--runs", "9")
+    assert result.exit_code == 130, result.output
+    data = json.loads((files / "flat.simulation" / "summary.json").read_text())
+    assert data["outcome"] == "interrupted"
+    assert (data["attacks"][0]["random"]["runs"], data["attacks"][0]["random"]["asked"]) == (4, 9)
+    assert "4 of 9" in result.stdout
+
+
+def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
+    real = campaigns.integrate
+
+    def coarse(*arguments, **options):
+        found = real(*arguments, **options)
+        return replace(found, error=np.full_like(found.error, 0.02 * setting("flat").rho))
+
+    monkeypatch.setattr(campaigns, "integrate", coarse)
+    result = command("--runs", "0")
+    assert result.exit_code == 4, result.output
+    assert result.stdout.startswith("no result flat: ")
+
+
+def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
+    from fractions import Fraction
+
+    where = setting("two_state", "0.4")
+    Ts = Fraction(repr(where.result["sampled"]["sample_time"]))
+    use = {}
+    for factor in (1, 20):
+        loop = loop_of(where, "sampled", Choice(sample_time=factor * Ts))
+        found = simulate(where, [loop], count=0, seed=0)
+        use[factor] = found.drawn[0].comparison.uses["distance"].share
+        assert found.left == (factor > 1)
+        assert not found.falsified
+    assert use[1] < 0.6
+    assert use[20] > 2
+
+
+# mistakes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--controllers", "ccm,l2"], "is no controller"),
+        (["--runs", "1.5"], "whole number"),
+        (["--runs", "-3"], "positive"),
+        (["--seed", "x"], "--seed"),
+        (["--control-rate", "0"], "positive"),
+        (["--duration", "9"], "the plan ends at 4 s"),
+        (["--certificate", "flat.yaml"], "is not a certificate"),
+        (["--certificate", "none.json"], "cannot read"),
+        (["-o", "flat.yaml"], "cannot write"),
+        (["-o", "/proc/nothing"], "cannot write"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(arguments, words):
+    given = ["simulate", "flat.yaml", "--certificate", "flat.json", *arguments]
+    result = run(*given)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert "Traceback" not in result.output
+    assert LOCATED.search(result.stderr)
+    assert words in result.stderr
+
+
+def test_radii_belong_to_the_certificate():
+    result = command("--epsilon", "0.3")
+    assert result.exit_code == 2
+    assert "a certificate has its own epsilon and rho_a" in result.output
+
+
+def test_an_uncertainty_outside_its_class_ends_the_command(files):
+    (files / "flat.yaml").write_text(FLAT + 'simulation: {h: ["0.3*sin(t)"]}\n')
+    result = command("--runs", "0", "--controllers", "l1")
+    assert result.exit_code == 2, result.output
+    assert "leaves the class" in result.stderr
+    assert "flat.yaml:" in result.stderr
+
+
+def test_without_a_tube_the_reason_is_told(files):
+    (files / "wide.yaml").write_text(FLAT.replace("epsilon: 0.2", "epsilon: 20"))
+    result = run("simulate", "wide.yaml")
+    assert result.exit_code == 1, result.output
+    assert "there is no tube" in result.stderr
+    assert "leaves the safe set" in result.stderr
+
+
+def test_help_has_an_example():
+    result = run("simulate", "--help")
+    assert result.exit_code == 0
+    assert "tubecert simulate plant.yaml" in result.stdout

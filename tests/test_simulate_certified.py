@@ -1,0 +1,157 @@
+"""Certificates read back: the genuine one is taken, everything else is refused with its reason."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from simulated import CONFIGS, certified, setting
+
+from tubecert.certificate import digest, dump, seal
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.model import build
+from tubecert.simulate.certified import adopted, plan_of, read_certificate, require_tube
+from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
+from tubecert.spec import load, load_text
+
+
+def refused(call, *arguments):
+    with pytest.raises(TubecertError) as caught:
+        call(*arguments)
+    (finding,) = caught.value.findings
+    return caught.value, finding
+
+
+def written(tmp_path, result, **changes):
+    path = tmp_path / "c.json"
+    path.write_text(dump(seal(result, {}) | changes))
+    return str(path)
+
+
+def test_a_certificate_is_read_back(tmp_path):
+    _, result = certified("flat")
+    assert read_certificate(written(tmp_path, result))["result"]["verdict"] == "certified"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"format": "tubecert-certificate/1"}', "[" * 50_000, "\x00"]
+)
+def test_other_files_are_no_certificates(tmp_path, text):
+    path = tmp_path / "c.json"
+    path.write_text(text)
+    error, finding = refused(read_certificate, str(path))
+    assert error.exit_code is ExitCode.INVALID
+    assert "is not a certificate" in finding.message
+
+
+def test_a_changed_certificate_is_refused(tmp_path):
+    _, result = certified("flat")
+    changed = json.loads(json.dumps(result))
+    changed["distance"]["least_adaptation"]["adaptation_rate"] *= 0.9
+    _, finding = refused(read_certificate, written(tmp_path, changed, hash=digest(result)))
+    assert "was changed" in finding.message
+
+
+def test_a_certificate_of_another_system_is_refused_by_what_differs():
+    _, result = certified("flat")
+    spec = load(str(CONFIGS / "two_state.yaml"))
+    error, finding = refused(adopted, spec, result)
+    assert error.exit_code is ExitCode.INVALID
+    assert "another system" in finding.message
+    assert "uncertainty" in finding.message
+    assert finding.location is not None
+
+
+def test_overrides_of_the_certificate_are_adopted_and_other_radii_refused():
+    spec = load(str(CONFIGS / "two_state.yaml"))
+    _, result = certified("two_state", "0.4")
+    assert adopted(spec, result).tube.epsilon == Fraction(2, 5)
+    other = replace(spec, tube=replace(spec.tube, epsilon=Fraction(1, 2)))
+    _, plain = certified("two_state")
+    _, finding = refused(adopted, other, plain)
+    assert "tube differ" in finding.message
+
+
+def test_obstacles_and_simulation_are_no_part_of_the_system():
+    spec = load(str(CONFIGS / "two_state.yaml"))
+    _, result = certified("two_state")
+    bare = replace(spec, obstacles=(), simulation=None, name="other")
+    assert adopted(bare, result).name == "other"
+
+
+@pytest.mark.parametrize(("verdict", "code"), [("refuted", 1), ("undecided", 4)])
+def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
+    result = {
+        "verdict": verdict,
+        "reasons": [{"claim": "metric, C2", "verdict": verdict, "message": "it is not"}],
+    }
+    error, finding = refused(require_tube, result)
+    assert error.exit_code == code
+    assert "metric, C2: it is not" in finding.message
+
+
+def test_the_plan_is_that_of_the_certificate():
+    spec, result = certified("two_state")
+    plan = plan_of(spec, build(spec), result)
+    assert plan.knots is not None
+    assert plan.knots.x[0] == (Fraction("3.4"), Fraction("-2.4"))
+    x, _ = plan.enclose(np.array([5.0]), np.array([5.0]))
+    assert np.abs(x.mid).max() < 0.05
+
+
+def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
+    where = setting("two_state")
+    pair = where.result["distance"]["least_adaptation"]
+    loop = loop_of(where, "l1", Choice())
+    assert (loop.problem.gains.bandwidth, loop.problem.gains.adaptation_rate) == (
+        pair["bandwidth"],
+        pair["adaptation_rate"],
+    )
+    assert loop.promise is not None
+    assert "B distance" in loop.origin
+    paper = loop_of(where, "l1", Choice(source="26"))
+    assert paper.problem.gains.adaptation_rate == where.result["conditions_26"]["adaptation_rate"]
+    for chosen in (
+        loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000))),
+        loop_of(where, "sampled", Choice(sample_time=Fraction(1, 10))),
+    ):
+        assert chosen.promise is None
+        assert chosen.origin == CHOSEN
+    held = loop_of(where, "l1", Choice(), Fraction(1000))
+    assert held.promise is None
+    assert loop_of(where, "ccm", Choice()).promise is None
+
+
+def test_without_certified_gains_the_options_are_named():
+    where = setting("flat")
+    bare = replace(where, result={**where.result, "proof": {}})
+    error, finding = refused(loop_of, bare, "l1", Choice())
+    assert error.exit_code is ExitCode.INVALID
+    assert "--bandwidth and --adaptation-rate" in finding.help
+    loop = loop_of(bare, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000)))
+    assert loop.promise is None
+    assert loop.problem.gains.projection_radius >= where.uncertainty.h
+
+
+def test_the_duration_is_the_horizon_unless_asked_for():
+    spec, result = certified("flat")
+    assert setting_of(spec, result).horizon == 4
+    assert setting_of(spec, result, Fraction(1)).horizon == 1
+    _, finding = refused(setting_of, spec, result, Fraction(5))
+    assert "the plan ends at 4 s" in finding.message
+
+
+def test_a_plan_for_ever_is_simulated_for_ten_time_constants():
+    spec, result = certified("three_state")
+    assert setting_of(spec, result).horizon == 10  # simulation.duration
+    assert setting_of(replace(spec, simulation=None), result).horizon == pytest.approx(10 / 0.9999)
+
+
+def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
+    text = (CONFIGS / "three_state.yaml").read_text() + '  h: ["0.05*cos(t)"]\n'
+    _, result = certified("three_state")
+    found = setting_of(load_text(text), result)
+    assert found.h != setting("three_state").h
