@@ -463,9 +463,9 @@ def test_bad_arguments_are_refused():
             problem(**options)
     with pytest.raises(ValueError, match="bandwidth"):
         Gains(bandwidth=0.0, projection_radius=1.0)
+    held = Gains(bandwidth=10.0, projection_radius=1.0, sample_time=0.03)
+    case = problem("sampled", gains=held, control_rate=50.0)
     with pytest.raises(ValueError, match="multiple"):
-        held = Gains(bandwidth=10.0, projection_radius=1.0, sample_time=0.03)
-        case = problem("sampled", gains=held, control_rate=50.0)
         integrate(case, START, Disturbance.from_expressions(None, TWO, 1), tolerance=1e-3)
     with pytest.raises(ValueError, match="lanes"):
         integrate(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)

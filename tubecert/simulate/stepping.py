@@ -203,8 +203,8 @@ def _keep(stage: int, plan: Any, holds: bool, work: Any) -> None:
 def _polynomials(h: Any, B: Any, stage: int, inner: Any) -> None:
     """h and B as polynomials of the time over the length of the flow.
 
-    Before the last stage they run from the first one to the one before, which lies in the middle of a whole step; at
-    last through start, the mean of the two stages in the middle, and end.
+    Before the last stage they are lines from the first stage whose mean is the stage before, as in classical RK4; at
+    last they run through start, the mean of the two stages in the middle, and end.
     """
     for j in range(h.shape[1]):
         inner.h[0, j], inner.h[1, j], inner.h[2, j] = _through(h[0, j], h[1, j], h[2, j], h[3, j], stage)
@@ -219,7 +219,7 @@ def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float,
     if stage == 1:
         return a, 0.0, 0.0
     if stage == 2:
-        return a, b - a, 0.0
+        return a, 2 * (b - a), 0.0
     if stage == 3:
         return a, 2 * (c - a), 0.0
     return a, -3 * a + 2 * (b + c) - d, 2 * (a - b - c + d)
