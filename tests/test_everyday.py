@@ -238,3 +238,33 @@ def test_explain_needs_no_numerics_for_a_code():
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True, timeout=60
     )
     assert "numpy" not in done.stdout.split()
+
+
+# what others run
+
+
+def test_the_hooks_run_commands_that_exist():
+    import yaml
+
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text("utf-8"))
+    assert {hook["id"] for hook in hooks} == {"tubecert-check", "tubecert-certify"}
+    for hook in hooks:
+        program, *arguments = hook["entry"].split()
+        assert program == "tubecert"
+        assert hook["language"] == "python"
+        assert re.search(hook["files"], "some/configs/plant.yaml")
+        assert run(*arguments, ROOT / "tests/specs/ok/plan.yaml", "--help").exit_code == 0
+
+
+def test_the_workflow_that_is_documented_is_one():
+    import yaml
+
+    text = (ROOT / "docs" / "ci.md").read_text("utf-8")
+    blocks = [yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
+    [workflow] = [block for block in blocks if "jobs" in block]
+    steps = [step["run"] for step in workflow["jobs"]["check"]["steps"] if "run" in step]
+    for step in steps[1:]:
+        options = step.split(">")[0].split()[2:]
+        assert run("check", *options, "--help").exit_code == 0
+    ci = (ROOT / ".ci" / "run").read_text("utf-8")
+    assert '"$bin/tubecert" check --strict --certify' in ci
