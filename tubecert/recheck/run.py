@@ -63,9 +63,18 @@ class Recheck:
 
 
 def recheck(
-    text: str, file: str, budget: int = BUDGET, report: Report | None = None, memory: Memory | None = None
+    text: str,
+    file: str,
+    budget: int = BUDGET,
+    report: Report | None = None,
+    memory: Memory | None = None,
+    *,
+    to_first_failure: bool = False,
 ) -> Recheck:
-    """Examine every claim of the certificate `text`; raises `CertificateError` for what is no certificate."""
+    """Examine every claim of the certificate `text`; raises `CertificateError` for what is no certificate.
+
+    `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed.
+    """
     document = read(text, file)
     result = document["result"]
     document["run"].mapping()
@@ -77,6 +86,8 @@ def recheck(
         if report is not None:
             report(claim.name)
         found.append(Examined(claim.name, claim.outcome(memory)))
+        if to_first_failure and not found[-1].outcome.holds:
+            break
     return Recheck(
         stated=verdict, hash=document["hash"].text(), claims=tuple(found), unread=tuple(unread(result))
     )

@@ -1,0 +1,231 @@
+"""Random changes of single fields of a certificate, its hash made right again, and which of them are harmless.
+
+A change that still rechecks must be of a kind in `HARMLESS`: the field makes no claim, or the changed claim is itself
+examined and true, and weaker (the safe direction is checked here, without the code under test).
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import random
+import re
+from collections import defaultdict
+
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.recheck.run import recheck
+
+BUDGET = 4_000
+
+
+def anything(old, new):
+    """The field makes no claim."""
+    return True
+
+
+def number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def same(old, new):
+    """The same number, or the same written as a text."""
+    return number(old) and (number(new) or isinstance(new, str)) and str(old) == str(new)
+
+
+def lower(old, new):
+    """A lower bound that claims less, or nothing."""
+    return new is None or (number(new) and new <= old)
+
+
+def higher(old, new):
+    """An upper bound that claims less."""
+    return new is None or (number(new) and new >= old)
+
+
+def gone(old, new):
+    return new is None
+
+
+def verified(old, new):
+    """Numbers of a point or pair or plan that are examined anew as they stand."""
+    return number(new) or isinstance(new, str) or new is None
+
+
+_PRIMARY = "lower|upper|f|f_x|B|B_x|b_x|B_pinv|B_pinv_x|M_x|u_star|h|h_x|h_t|h_initial|feedback_gain|metric_input_gain"
+HARMLESS = [
+    # labels and prose: nothing reads them
+    (r"constants\.\w+\.(symbol|equation|unit|meaning|at)\b.*", anything),
+    (r"reasons\[\]\.(message|relax|at)\b.*", anything),
+    (r"reasons(\[\])?", anything),  # an explanation less
+    (r"plan\.(curve|file|file_hash|samples)\b.*", anything),
+    (r"spec\.file_hash", anything),  # compared with the file itself by --spec
+    # orientation
+    (r"(effort|elasticities)\b.*", anything),
+    (r"conditions_26\.(bandwidth_infimum|below_twice_rate|binds)", anything),
+    (r"sampled\.sample_time_limit", anything),
+    (r"\w+\.margins_around\b.*", anything),
+    # the sides of intervals that no claim uses; upper ends of margins
+    (r"constants\.(?!(?:lower|input_gain_least)\.)\w+\.below", anything),
+    (r"constants\.(lower|input_gain_least)\.above", anything),
+    (r"conditions_26\.(least_adaptation\.)?margins\.26[abc]\[1\]", anything),
+    (r"(distance\.\w+|sampled)\.margin\[1\]", anything),
+    (r"metric\.(margin|largest_rate|lower_on_set)\[1\]", anything),
+    (r"metric\.(upper_on_set|unique_geodesics\.value)\[0\]", anything),
+    # weaker claims, examined as they stand
+    (r"conditions_26\.(least_adaptation\.)?margins\.26[abc]\[0\]", lower),
+    (r"(distance\.\w+|sampled)\.margin\[0\]", lower),
+    (r"metric\.(margin|largest_rate|lower_on_set)\[0\]", lower),
+    (r"metric\.upper_on_set\[1\]", higher),
+    (r"metric\.unique_geodesics\.value\[1\]", higher),
+    (r"metric\.unique_geodesics(\..*)?", anything),  # of a constant metric: its words do not depend on it
+    (r"tube\.half_widths\.\w+", higher),
+    (r"(\w+\.)+ultimate_radius", higher),
+    (r"constants\.\w+\.above", higher),
+    (r"constants\.input_gain_least\.below", lower),
+    # gains that are examined as they stand: another point that serves
+    (r"conditions_26\.least_adaptation(\.\w+)?", verified),
+    (r"distance\.(split|asked)(\.\w+)?", verified),
+    (r"distance\.least_adaptation\.margin", gone),
+    (r"\w+\.curve(\[\](\.\w+)?)?", verified),
+    (r"plan\.knots\.\w+\[\](\[\])?", verified),  # another plan, examined as it stands
+    # a recipe may be any that serves
+    (r"proof\.(distance|sampled)\.(speed|prediction_error|uncertainty)", verified),
+    (r"decided_by\[\]", anything),  # any certified section may decide
+    (r"overrides\b.*", anything),
+    (r"conditions_26\.shortfalls.*", anything),
+]
+
+
+def leaves(value, path=()):
+    """Every field: paths to members of objects and lists, containers included."""
+    members = (
+        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    )
+    for key, member in members:
+        yield (*path, key)
+        yield from leaves(member, (*path, key))
+
+
+def shape(path, *, indices=False):
+    """A path as text; indices of lists are left out, except in pairs where `indices` asks for them."""
+    text = ""
+    for key in path:
+        text += (f"[{key}]" if indices else "[]") if isinstance(key, int) else f".{key}"
+    return text.lstrip(".")
+
+
+def fields(result):
+    """Paths by shape, so that long lists do not drown the rest."""
+    found = defaultdict(list)
+    for path in leaves(result):
+        found[re.sub(r"constants\.\w+", "constants.*", shape(path))].append(path)
+    return found
+
+
+def changed(random_, value):
+    """Another value for a field; `None` with the word `removed` takes it away."""
+    if random_.random() < 0.15 or isinstance(value, (dict, list)):
+        return "removed", None
+    if isinstance(value, bool):
+        return "changed", not value
+    if number(value):
+        return "changed", _other_number(random_, value)
+    if isinstance(value, str):
+        return "changed", _other_text(random_, value)
+    return "changed", random_.choice([0.0, 1.0, "x", False])
+
+
+def _other_number(random_, value):
+    kind = random_.randrange(7)
+    if kind == 0:
+        return -value
+    if kind == 1:
+        return random_.choice([0, 1, 2, 1e9, 1e-9, -1.5])
+    if kind == 2:
+        return None
+    if kind == 3:
+        return str(value)
+    size = 10.0 ** -random_.uniform(0, 10)
+    return (value or 1.0) * (1 + random_.choice([-1, 1]) * size)
+
+
+def _other_text(random_, value):
+    kind = random_.randrange(4)
+    if kind == 0 or not value:
+        return random_.choice(["", "certified", "0", "refuted", "x"])
+    place = random_.randrange(len(value))
+    letter = random_.choice("0123456789.-+*xs ")
+    if kind == 1:
+        return value[:place] + letter + value[place + 1 :]
+    if kind == 2:
+        return value[:place] + value[place + 1 :]
+    return value[:place] + letter + value[place:]
+
+
+def applied(certificate, path, kind, value):
+    """A copy with one field changed and the hash recomputed."""
+    result = copy.deepcopy(certificate["result"])
+    holder = result
+    for key in path[:-1]:
+        holder = holder[key]
+    if kind == "removed":
+        del holder[path[-1]]
+    else:
+        holder[path[-1]] = value
+    text = json.dumps(result, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    digest = "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+    return {**certificate, "hash": digest, "result": result}
+
+
+def is_harmless(path, old, new):
+    names = {shape(path), shape(path, indices=True)}
+    # an index matters in a pair only: [..][1] keeps its own name, other indices are dropped
+    if path and isinstance(path[-1], int):
+        names.add(f"{shape(path[:-1])}[{path[-1]}]")
+    return any(
+        re.fullmatch(pattern, name) and (serves(old, new) or same(old, new))
+        for name in names
+        for pattern, serves in HARMLESS
+    )
+
+
+def verdict_on(certificate, memory):
+    """What recheck says: an exit code; findings of an invalid document count as their code."""
+    try:
+        found = recheck(json.dumps(certificate), "tampered", BUDGET, memory=memory, to_first_failure=True)
+    except TubecertError as error:
+        return error.exit_code
+    return found.exit_code
+
+
+def campaign(certificate, count, seed, report=None):
+    """`count` random changes: how many were refused, how many accepted by shape, and those that must not be.
+
+    `report` is told every hundred changes how far it is.
+    """
+    random_, memory = random.Random(seed), {}
+    shapes = fields(certificate["result"])
+    names = sorted(shapes)
+    refused, accepted, wrong = 0, defaultdict(int), []
+    for done in range(count):
+        if report is not None and done % 100 == 0:
+            report(
+                f"{done} changes: {refused} refused, {sum(accepted.values())} harmless, {len(wrong)} wrong"
+            )
+        path = random_.choice(shapes[random_.choice(names)])
+        old = certificate["result"]
+        for key in path:
+            old = old[key]
+        kind, new = changed(random_, old)
+        if kind == "changed" and type(new) is type(old) and new == old:
+            continue
+        code = verdict_on(applied(certificate, path, kind, new), memory)
+        assert code in (ExitCode.CERTIFIED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID, ExitCode.UNDECIDED)
+        if code != ExitCode.CERTIFIED:
+            refused += 1
+            continue
+        accepted[shape(path)] += 1
+        if not is_harmless(path, old, new):
+            wrong.append((shape(path, indices=True), kind, old, new))
+    return refused, dict(accepted), wrong
