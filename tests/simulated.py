@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tubecert import pipeline
+from tubecert.simulate.certified import adopted
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 from tubecert.simulate.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text
@@ -34,7 +35,8 @@ def certified(name: str, epsilon: str | None = None) -> tuple[Spec, dict[str, An
     """A specification and its result."""
     spec = load_text(FLAT) if name == "flat" else load(str(CONFIGS / f"{name}.yaml"))
     options = pipeline.Options(epsilon=None if epsilon is None else Fraction(epsilon))
-    return pipeline.overridden(spec, options), pipeline.certify(spec, options)
+    result = pipeline.certify(spec, options)
+    return adopted(spec, result), result
 
 
 @lru_cache

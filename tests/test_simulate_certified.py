@@ -69,15 +69,15 @@ def test_overrides_of_the_certificate_are_adopted_and_other_radii_refused():
     spec = load(str(CONFIGS / "two_state.yaml"))
     _, result = certified("two_state", "0.4")
     assert adopted(spec, result).tube.epsilon == Fraction(2, 5)
-    other = replace(spec, tube=replace(spec.tube, epsilon=Fraction(1, 2)))
-    _, plain = certified("two_state")
+    flat, plain = certified("flat")
+    other = replace(flat, tube=replace(flat.tube, epsilon=Fraction(1, 2)))
     _, finding = refused(adopted, other, plain)
     assert "tube differ" in finding.message
 
 
 def test_obstacles_and_simulation_are_no_part_of_the_system():
     spec = load(str(CONFIGS / "two_state.yaml"))
-    _, result = certified("two_state")
+    _, result = certified("two_state", "0.4")
     bare = replace(spec, obstacles=(), simulation=None, name="other")
     assert adopted(bare, result).name == "other"
 
@@ -94,7 +94,7 @@ def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
 
 
 def test_the_plan_is_that_of_the_certificate():
-    spec, result = certified("two_state")
+    spec, result = certified("two_state", "0.4")
     plan = plan_of(spec, build(spec), result)
     assert plan.knots is not None
     assert plan.knots.x[0] == (Fraction("3.4"), Fraction("-2.4"))
@@ -103,7 +103,7 @@ def test_the_plan_is_that_of_the_certificate():
 
 
 def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
-    where = setting("two_state")
+    where = setting("two_state", "0.4")
     pair = where.result["distance"]["least_adaptation"]
     loop = loop_of(where, "l1", Choice())
     assert (loop.problem.gains.bandwidth, loop.problem.gains.adaptation_rate) == (

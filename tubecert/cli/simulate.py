@@ -162,12 +162,16 @@ def _certificate(
 
     options = pipeline.Options(epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"])
     _tell("no certificate is given: certifying first")
-    show = report and (lambda step: report(f"certifying: {step.name}", step.boxes, step.boxes))
+
+    def show(step: pipeline.Step) -> None:
+        if report is not None:
+            report(f"certifying: {step.name}", step.boxes, step.boxes)
+
     result = pipeline.certify(system, options, show)
     sealed = certificate.seal(result, {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)
-    return pipeline.overridden(system, options), sealed
+    return adopted(system, result), sealed
 
 
 def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: Step | None) -> Campaign:

@@ -15,7 +15,7 @@ from tubecert.certificate import FORMAT, digest
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Interpolation, Knots, Spec, canonical, load_text
+from tubecert.spec import Interpolation, Knots, Spec, Tube, canonical, load_text
 from tubecert.spec.source import read_bytes
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
@@ -47,17 +47,19 @@ def read_certificate(path: str) -> dict[str, Any]:
 
 
 def adopted(spec: Spec, result: Result) -> Spec:
-    """The specification with what the certificate's command line had changed (radii, metric).
+    """The specification with what the certification had changed: radii and metric of the command line, a new metric.
 
     Raises `SpecError` if the certificate is about another system.
     """
     effective = result["spec"]["effective"]
     changed = result["overrides"]
-    other = load_text(json.dumps(effective), "certificate")
     if "epsilon" in changed or "rho_a" in changed:
-        spec = replace(spec, tube=other.tube)
-    if "metric" in changed:
-        spec = replace(spec, metric=other.metric)
+        spec = replace(
+            spec, tube=Tube(**{name: Fraction(value) for name, value in effective["tube"].items()})
+        )
+    if "metric" in changed or spec.metric is None:
+        other = _without_plan(effective)
+        spec = replace(spec, metric=other.metric, synthesis=other.synthesis)
     own = canonical(spec)
     differing = [
         key for key in sorted({*own, *effective} - set(_FREE)) if own.get(key, {}) != effective.get(key, {})
@@ -69,6 +71,13 @@ def adopted(spec: Spec, result: Result) -> Spec:
             [Finding(code="TC604", message=message, location=spec.location(differing[0]), help=help)]
         )
     return spec
+
+
+def _without_plan(effective: Mapping[str, Any]) -> Spec:
+    """The specification in a certificate, at rest at 0: its plan may be in a file that is elsewhere."""
+    rest = {"kind": "equilibrium", "at": ["0"] * len(effective["system"]["states"])}
+    kept = {key: value for key, value in effective.items() if key not in ("initial_state", *_FREE[1:])}
+    return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
 
 
 def require_tube(result: Result) -> None:
