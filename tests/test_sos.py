@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +25,14 @@ from tubecert.metric.synthesis.chart import (
     degrees_of,
     monomial_matrix,
 )
-from tubecert.metric.synthesis.conic import Affine, ConicProgram, Semidefinite, semidefinite, solve, triangle
+from tubecert.metric.synthesis.conic import (
+    Affine,
+    ConicProgram,
+    SemidefiniteBlocks,
+    semidefinite,
+    solve,
+    triangle,
+)
 from tubecert.metric.synthesis.family import metric_family
 from tubecert.metric.synthesis.gram import gram_form
 from tubecert.metric.synthesis.polynomial import polynomial_conditions
@@ -268,24 +277,6 @@ def test_symmetries_split_the_blocks():
     assert split.free.shape == (18, 10)
 
 
-def test_symmetries_lose_nothing(monkeypatch):
-    from tubecert.metric.synthesis import polynomial
-
-    asked = problem(PENDULUM, BOX_PENDULUM, degree=2, rate=0.5)
-    split = propose_sos(asked)
-
-    seeing = polynomial.invariant_entries
-
-    def blind(model, family, box, forms):
-        mask = seeing(model, family, box, forms)[1]
-        every = np.broadcast_to(np.triu(np.ones(mask.shape[1:], dtype=bool)), mask.shape)
-        assert mask.sum() < every.sum()
-        return np.zeros((0, len(box))), every
-
-    monkeypatch.setattr(polynomial, "invariant_entries", blind)
-    assert propose_sos(asked).kappa == pytest.approx(split.kappa, rel=1e-5)
-
-
 def least(coefficients, raised=0):
     """The least value on [-1, 1] of a polynomial, by sums of squares: max r with p - r >= 0."""
     order = len(coefficients) - 1
@@ -294,16 +285,15 @@ def least(coefficients, raised=0):
     one[0] = -1
     from scipy import sparse
 
-    slopes = sparse.hstack([form.pivots @ one, form.free]).tocsr()
-    constant = form.pivots @ np.array(coefficients)
-    blocks, row = [], 0
-    for size in form.orders:
-        rows = slice(row, row + size * (size + 1) // 2)
-        row = rows.stop
-        blocks.append(Semidefinite(order=size, entries=Affine(constant=constant[rows], slopes=slopes[rows])))
+    entries = Affine(
+        constant=form.pivots @ np.array(coefficients),
+        slopes=(slopes := sparse.hstack([form.pivots @ one, form.free])),
+    )
     cost = np.zeros(slopes.shape[1])
     cost[0] = -1.0
-    return -solve(ConicProgram(cost=cost, semidefinite=blocks)).objective
+    return -solve(
+        ConicProgram(cost=cost, semidefinite=[SemidefiniteBlocks(orders=form.orders, entries=entries)])
+    ).objective
 
 
 @settings(max_examples=25, deadline=None)
@@ -369,6 +359,30 @@ def test_affine_variables_become_vertices():
     found = polynomial_conditions(problem(THREE_STATE, BOX_THREE, degree=2, rate=0.9))
     contraction = [c for c in found.conditions if c.name == "contraction"]
     assert [c.orders for c in contraction] == [(3,), (3,)]
+
+
+@pytest.mark.parametrize(
+    ("system", "box", "degree"),
+    [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 2), (PENDULUM, BOX_PENDULUM, 2)],
+    ids=["two_state", "three_state", "pendulum"],
+)
+def test_eliminated_split_and_direct_is_what_cvxpy_finds_plainly(system, box, degree):
+    """The plain formulation of benchmarks/synthesis.py: a variable for every Gram entry, no symmetries."""
+    asked = problem(system, box, degree=degree, rate=0.5)
+    conditions = polynomial_conditions(asked)
+    everything = polynomial_conditions(asked, pieces=0, symmetric=False)
+    assert conditions.unknowns.count <= everything.unknowns.count
+    plain = plain_formulation()(everything)
+    plain.solve(solver="CLARABEL")
+    assert propose_sos(asked).kappa == pytest.approx(plain.value, rel=1e-5)
+
+
+def plain_formulation():
+    path = Path(__file__).parent.parent / "benchmarks" / "synthesis.py"
+    spec = importlib.util.spec_from_file_location("synthesis_benchmark", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.plain
 
 
 # -- proposals --------------------------------------------------------------------------------------------------------

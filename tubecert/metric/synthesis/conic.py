@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -51,13 +52,30 @@ class Semidefinite:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SemidefiniteBlocks:
+    """Several such matrices of the given `orders`: their entries one after another."""
+
+    orders: tuple[int, ...]
+    entries: Affine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ConicProgram:
     """Minimise cost'y (N,) subject to `semidefinite` blocks, `inequalities` >= 0 and `equalities` = 0."""
 
     cost: Array
-    semidefinite: Sequence[Semidefinite] = ()
+    semidefinite: Sequence[Semidefinite | SemidefiniteBlocks] = ()
     inequalities: Affine | None = None
     equalities: Affine | None = None
+
+    @property
+    def orders(self) -> list[int]:
+        """Orders of all semidefinite matrices."""
+        return [
+            order
+            for block in self.semidefinite
+            for order in (block.orders if isinstance(block, SemidefiniteBlocks) else (block.order,))
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,8 +111,15 @@ class ConicSolution:
 
 def triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns (i <= j) of the upper triangle, column by column."""
-    j, i = np.tril_indices(order)
+    j, i = _lower_triangle(order)
     return i, j
+
+
+@cache
+def _lower_triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    j, i = np.tril_indices(order)
+    j.flags.writeable = i.flags.writeable = False
+    return j, i
 
 
 def semidefinite(constant: ArrayLike, slopes: ArrayLike) -> Semidefinite:
@@ -128,22 +153,23 @@ def solve(
 
 def _stacked(program: ConicProgram) -> Affine:
     """All rows as one: equalities, inequalities, blocks with off-diagonal entries times sqrt 2."""
-    width = len(program.cost)
     parts = [part for part in (program.equalities, program.inequalities) if part is not None]
-    parts += [_scaled(block) for block in program.semidefinite]
+    scale = np.concatenate([np.ones(sum(map(_rows, parts))), *map(_scale, program.orders)])
+    parts += [block.entries for block in program.semidefinite]
     slopes = sparse.vstack([sparse.csr_array(part.slopes) for part in parts], format="csc")
-    assert slopes.shape[1] == width, "all slopes have one column for every variable"
-    return Affine(constant=np.concatenate([part.constant for part in parts]), slopes=slopes)
-
-
-def _scaled(block: Semidefinite) -> Affine:
-    i, j = triangle(block.order)
-    scale = np.where(i == j, 1.0, np.sqrt(2.0))
-    slopes = sparse.csr_array(block.entries.slopes)
-    slopes = sparse.csr_array(
-        (slopes.data * np.repeat(scale, np.diff(slopes.indptr)), slopes.indices, slopes.indptr), slopes.shape
+    assert slopes.shape == (len(scale), len(program.cost)), (
+        "a row for every entry, a column for every variable"
     )
-    return Affine(constant=scale * block.entries.constant, slopes=slopes)
+    scaled = sparse.csc_matrix(
+        (slopes.data * scale[slopes.indices], slopes.indices, slopes.indptr), slopes.shape
+    )
+    return Affine(constant=scale * np.concatenate([part.constant for part in parts]), slopes=scaled)
+
+
+@cache
+def _scale(order: int) -> Array:
+    i, j = triangle(order)
+    return np.where(i == j, 1.0, np.sqrt(2.0))
 
 
 def _rows(part: Affine | None) -> int:
@@ -165,13 +191,11 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
         cones.append(clarabel.ZeroConeT(_rows(program.equalities)))
     if _rows(program.inequalities):
         cones.append(clarabel.NonnegativeConeT(_rows(program.inequalities)))
-    cones += [clarabel.PSDTriangleConeT(block.order) for block in program.semidefinite]
+    cones += [clarabel.PSDTriangleConeT(order) for order in program.orders]
     width = len(program.cost)
     quadratic = sparse.csc_matrix((width, width))
     try:
-        run = clarabel.DefaultSolver(
-            quadratic, program.cost, sparse.csc_matrix(-rows.slopes), rows.constant, cones, settings
-        )
+        run = clarabel.DefaultSolver(quadratic, program.cost, -rows.slopes, rows.constant, cones, settings)
         found = run.solve()
     except BaseException as error:  # a panic of the Rust side is no Exception
         if isinstance(error, (KeyboardInterrupt, SystemExit)):
@@ -211,7 +235,7 @@ def _scs(program: ConicProgram, rows: Affine, tolerance: float, iterations: int)
     cone = {
         "z": _rows(program.equalities),
         "l": _rows(program.inequalities),
-        "s": [block.order for block in program.semidefinite],
+        "s": program.orders,
     }
     run = scs.SCS(data, cone, verbose=False, eps_abs=tolerance, eps_rel=tolerance, max_iters=iterations)
     found = run.solve()
@@ -233,10 +257,10 @@ def _lower(program: ConicProgram) -> list[NDArray[np.intp]]:
     """For every block, where its lower triangle by columns stands in the upper triangle by columns."""
     start = _rows(program.equalities) + _rows(program.inequalities)
     places = []
-    for block in program.semidefinite:
-        column, row = np.triu_indices(block.order)  # lower triangle by columns: column <= row
+    for order in program.orders:
+        column, row = np.triu_indices(order)  # lower triangle by columns: column <= row
         places.append(start + row * (row + 1) // 2 + column)
-        start += block.order * (block.order + 1) // 2
+        start += order * (order + 1) // 2
     return places
 
 

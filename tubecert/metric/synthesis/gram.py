@@ -34,7 +34,7 @@ class GramForm:
 
     orders: tuple[int, ...]
     pivots: sparse.csr_array
-    free: sparse.csr_array
+    free: sparse.coo_array
 
 
 @lru_cache(maxsize=64)
@@ -58,7 +58,7 @@ def gram_form(orders: tuple[int, ...], size: int, raised: int = 0, signs: Signs 
     return GramForm(
         orders=tuple(len(basis) for basis, _ in blocks),
         pivots=sparse.csr_array(solved[:, _within(orders, half, size)]),
-        free=sparse.csr_array(selected - solved @ sums[:, kept]),
+        free=sparse.coo_array(selected - solved @ sums[:, kept]),
     )
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import ZERO
-from tubecert.expression.matrix import Matrix, adjugate, along, combine, determinant, multiply, transpose
+from tubecert.expression import ZERO, Expression
+from tubecert.expression.matrix import Matrix, adjugate, along, combine, determinant, jacobian, multiply
 from tubecert.metric.synthesis.chart import Chart, NotPolynomialError, Variable, degrees_of, highest, total
 from tubecert.metric.synthesis.conic import triangle
 from tubecert.metric.synthesis.forms import FormsTape, Unknowns
@@ -55,12 +55,15 @@ class Conditions:
     conditions: tuple[Condition, ...]
 
 
-def polynomial_conditions(problem: SynthesisProblem, *, pieces: int = 2) -> Conditions:
+def polynomial_conditions(
+    problem: SynthesisProblem, *, pieces: int = 2, symmetric: bool = True
+) -> Conditions:
     """The conditions of a problem.
 
     A variable of degree one is replaced by the ends of its range: that is exact. Where Gram matrices would get large,
     variables of low degree are replaced by the control points of their Bernstein form on so many `pieces`: a little
-    stricter, and much cheaper. Raises `NotPolynomialError` or `NotLiftedError` if the route does not apply.
+    stricter, and much cheaper (0: they never are). Sign symmetries are looked for if `symmetric`.
+    Raises `NotPolynomialError` or `NotLiftedError` if the route does not apply.
     """
     model, family = problem.model, problem.family
     box = np.array([[float(lo), float(hi)] for lo, hi in problem.safe_set])
@@ -68,6 +71,11 @@ def polynomial_conditions(problem: SynthesisProblem, *, pieces: int = 2) -> Cond
     charts = _charts(problem, N)
     forms = FormsTape(model, family)
     symmetries, mask = invariant_entries(model, family, box, forms)
+    if not symmetric:
+        symmetries, mask = (
+            symmetries[:0],
+            np.broadcast_to(np.triu(np.ones(mask.shape[1:], dtype=bool)), mask.shape),
+        )
     unknowns = Unknowns(mask)
     found: list[Condition] = []
 
@@ -111,14 +119,29 @@ def _charts(problem: SynthesisProblem, N: Matrix) -> tuple[Chart, Chart]:
     """The variables and degrees of W, and of C2."""
     model, family = problem.model, problem.family
     E, f, states = family.frame, model.f, model.states
+    met = [
+        i for i, row in enumerate(N) if any(e is not ZERO for e in row)
+    ]  # rows that N'A and N'E have terms of
     A = model.f_x if family.flat else combine(1, multiply(model.f_x, E), -1, along(E, f, states))
-    Nt, g = transpose(N), (family.functions,)
-    groups = [E, multiply(Nt, E), multiply(Nt, A), g, along(g, f, states)]
+    g = (family.functions,)
+    rates = [
+        sum((f[i] * d for i, d in enumerate(slopes) if d is not ZERO), start=ZERO)
+        for slopes in jacobian(*g, states)
+    ]
+    groups: list[Sequence[Sequence[Expression]]] = [
+        E,
+        N,
+        [E[i] for i in met],
+        [A[i] for i in met],
+        g,
+        [rates],
+    ]
     flat = [[e for row in group for e in row] for group in groups]
     found, angles = degrees_of([e for part in flat for e in part])
     ends = np.cumsum([0, *map(len, flat)])
-    frame, P, Q, values, rates = (highest(*found[a:b]) for a, b in pairwise(ends))
-    both = total(frame, frame, values), highest(total(P, P, highest(values, rates)), total(P, Q, values))
+    frame, basis, E_met, A_met, values, moved = (highest(*found[a:b]) for a, b in pairwise(ends))
+    P, Q = total(basis, E_met), total(basis, A_met)
+    both = total(frame, frame, values), highest(total(P, P, highest(values, moved)), total(P, Q, values))
     charts = []
     for degrees in both:
         used = [
@@ -213,7 +236,7 @@ def _replaced(orders: Sequence[int], size: int, pieces: int) -> list[int]:
     while True:
         kept = [k for k, count in enumerate(counts) if not count]
         order = size * np.prod([(orders[k] + 1) // 2 + 1.0 for k in kept])
-        if len(kept) < 2 or order <= _LARGE:
+        if len(kept) < 2 or order <= _LARGE or not pieces:
             if order > _LARGEST:
                 raise NotPolynomialError(f"Gram matrices of order {order:.0f} would be needed")
             return counts

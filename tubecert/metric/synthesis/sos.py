@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from math import inf
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from tubecert.metric.synthesis.chart import NotPolynomialError
-from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution, Semidefinite, solve
+from tubecert.metric.synthesis.conic import Affine, ConicProgram, ConicSolution, SemidefiniteBlocks, solve
 from tubecert.metric.synthesis.gram import gram_form
 from tubecert.metric.synthesis.lifting import NotLiftedError
 from tubecert.metric.synthesis.polynomial import Condition, Conditions, polynomial_conditions
@@ -23,7 +24,7 @@ from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
 
 Array = NDArray[np.float64]
 ROUTE = "sos"
-_DUST = 1e-11  # of interpolation, relative to the largest coefficient
+_DUST = 1e-11  # relative to the largest coefficient
 _PIECES = 2
 
 
@@ -47,44 +48,36 @@ def propose_sos(problem: SynthesisProblem, *, raised: int = 0) -> Proposal:
 def sos_program(conditions: Conditions, *, raised: int = 0) -> ConicProgram:
     """Minimise kappa: variables are the unknowns, kappa, then every condition's free Gram entries."""
     count = conditions.unknowns.count
-    pieces = [_gram_entries(condition, raised) for condition in conditions.conditions]
-    width = count + 1 + sum(free.shape[1] for _, _, _, free in pieces)
-    blocks: list[Semidefinite] = []
-    column = count + 1
-    for orders, constant, shared, free in pieces:
-        slopes = _side_by_side(shared, free, column, width)
-        column += free.shape[1]
-        row = 0
-        for order in orders:
-            rows = slice(row, row + order * (order + 1) // 2)
-            row = rows.stop
-            blocks.append(
-                Semidefinite(order=order, entries=Affine(constant=constant[rows], slopes=slopes[rows]))
-            )
-    cost = np.zeros(width)
+    orders: list[int] = []
+    constants: list[Array] = []
+    data: list[Array] = []
+    rows: list[NDArray[Any]] = []
+    columns: list[NDArray[Any]] = []
+    row, column = 0, count + 1
+    for condition in conditions.conditions:
+        form = gram_form(condition.orders, condition.size, raised, condition.signs)
+        table = form.pivots @ _clean(condition)
+        shared, free = table[:, :-1], form.free
+        i, j = np.nonzero(shared)
+        data += [shared[i, j], free.data]
+        rows += [i + row, free.coords[0] + row]
+        columns += [j, free.coords[1] + column]
+        constants.append(table[:, -1])
+        orders += form.orders
+        row, column = row + len(table), column + free.shape[1]
+    slopes = sparse.csr_array(
+        (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=(row, column)
+    )
+    entries = Affine(constant=np.concatenate(constants), slopes=slopes)
+    cost = np.zeros(column)
     cost[count] = 1.0
-    return ConicProgram(cost=cost, semidefinite=blocks)
+    return ConicProgram(cost=cost, semidefinite=[SemidefiniteBlocks(orders=tuple(orders), entries=entries)])
 
 
-def _gram_entries(
-    condition: Condition, raised: int
-) -> tuple[tuple[int, ...], Array, sparse.csr_array, sparse.csr_array]:
-    """(orders, constants, slopes in unknowns and kappa, slopes in free Gram entries) of the Gram blocks."""
-    form = gram_form(condition.orders, condition.size, raised, condition.signs)
-    table = condition.coefficients.reshape(-1, condition.coefficients.shape[-1])  # by monomial, then by entry
-    table = np.where(np.abs(table) > _DUST * np.abs(table).max(), table, 0.0)
-    shared = sparse.csr_array(form.pivots @ sparse.csr_array(table[:, :-1]))
-    return form.orders, np.asarray(form.pivots @ table[:, -1]), shared, form.free
-
-
-def _side_by_side(
-    shared: sparse.csr_array, free: sparse.csr_array, column: int, width: int
-) -> sparse.csr_array:
-    a, b = sparse.coo_array(shared), sparse.coo_array(free)
-    data = np.concatenate([a.data, b.data])
-    rows = np.concatenate([a.coords[0], b.coords[0]])
-    columns = np.concatenate([a.coords[1], b.coords[1] + column])
-    return sparse.csr_array((data, (rows, columns)), shape=(a.shape[0], width))
+def _clean(condition: Condition) -> Array:
+    """The coefficients, by monomial and entry, (equations, U + 2), without the dust of interpolation."""
+    table = condition.coefficients.reshape(-1, condition.coefficients.shape[-1])
+    return np.where(np.abs(table) > _DUST * np.abs(table).max(), table, 0.0)
 
 
 def _proposal(
