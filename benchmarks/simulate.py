@@ -22,13 +22,15 @@ W2 = np.array([[0, 0, 0.00053], [0, 0.81459, 0.00308], [0.00053, 0.00308, 0.0034
 FLAT = np.linalg.inv(np.array([[4.25828, -0.93423], [-0.93423, 3.76692]]))
 
 
-def seconds(work: Callable[[], Any], runs: int = 3) -> tuple[float, Any]:
-    """Median time and the last value."""
+def seconds(
+    work: Callable[[], Any], runs: int = 3, clock: Callable[[], float] = time.process_time
+) -> tuple[float, Any]:
+    """Median processor time and the last value: what else the machine does shall not count."""
     times, value = [], None
     for _ in range(runs):
-        start = time.perf_counter()
+        start = clock()
         value = work()
-        times.append(time.perf_counter() - start)
+        times.append(clock() - start)
     return statistics.median(times), value
 
 
@@ -165,10 +167,10 @@ def against_scipy(
     print(f"{title}: {ours:.3f} s, {found.steps[0]} steps, estimate {found.error[0]:.1e}, error {own:.1e}")
     z0 = np.concatenate([start[0], np.zeros(start.shape[1] + 2)])
     for method in ("Radau", "LSODA"):
-        begin = time.perf_counter()
+        begin = time.process_time()
 
         def watched(t: float, z: np.ndarray, begin: float = begin) -> np.ndarray:
-            if time.perf_counter() - begin > most:
+            if time.process_time() - begin > most:
                 raise TimeoutError(t)
             return rate(t, z)
 
@@ -176,7 +178,7 @@ def against_scipy(
             done = solve_ivp(
                 watched, (0, problem.horizon), z0, method=method, t_eval=problem.times, rtol=1e-4, atol=1e-6
             )
-            theirs = time.perf_counter() - begin
+            theirs = time.process_time() - begin
             wrong = np.abs(done.y[: start.shape[1]].T - exact.x[0]).max()
             print(f"  {method} {theirs:.2f} s, error {wrong:.1e}: {theirs / ours:.0f} x")
         except TimeoutError as late:
@@ -194,7 +196,7 @@ def three() -> None:
     )
     for tolerance in (1e-4, 1e-6):
         against_scipy(
-            f"three-state, to {tolerance:g}", case("three_state", 5e6, 50.0, 10.0), rate, tolerance, 40.0
+            f"three-state, to {tolerance:g}", case("three_state", 5e6, 50.0, 10.0), rate, tolerance, 10.0
         )
 
 
@@ -208,7 +210,7 @@ def two() -> None:
     for Gamma, omega in ((4e7, 90.0), (2e9, 51.0)):
         rate = loop_rate(two_drift, B, 1.74, straight, h, gains=(omega, Gamma))
         against_scipy(
-            f"two-state, Gamma {Gamma:g}", case("two_state_orbit", Gamma, omega, 5.0), rate, 1e-5, 15.0
+            f"two-state, Gamma {Gamma:g}", case("two_state_orbit", Gamma, omega, 5.0), rate, 1e-5, 10.0
         )
 
 
@@ -237,7 +239,9 @@ def lanes() -> None:
         )
         starts = np.repeat(start, N, axis=0)
         integrate(problem, starts[:2], waves.of(np.arange(2)), tolerance=1e-4)
-        spent, found = seconds(lambda: integrate(problem, starts, waves, tolerance=1e-4), 1)  # noqa: B023
+        spent, found = seconds(
+            lambda: integrate(problem, starts, waves, tolerance=1e-4), 1, time.perf_counter
+        )  # noqa: B023
         print(
             f"{name}: {N / spent:.0f} runs/s of {horizon:g} s on all cores, {len(found.failures)} failed, "
             f"largest error estimate {found.error.max():.1e}"
