@@ -161,3 +161,8 @@ def test_extreme_numbers_are_no_trouble(value, place):
     text = BASE.replace(place, new.get(place, f"{place.split(':')[0]}: {value}"))
     for item in found(text):
         assert item.code
+
+
+def test_floats_say_nothing_about_an_ill_conditioned_metric():
+    flat = "  dual_metric: [[1e-9, -0.5e-9], [-0.5e-9, 1e3]]"
+    assert "TC302" not in {item.code for item in found(changed((W, flat), ("rate: 0.4", "rate: 0.6")))}

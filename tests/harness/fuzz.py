@@ -438,6 +438,7 @@ def work(first: int, last: int, options: argparse.Namespace, pipe: Connection) -
     os.environ["OMP_NUM_THREADS"] = "1"
     os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="fuzz-state-")
     signal.signal(signal.SIGALRM, _ring)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the pool deals with it
     judge = Judge(mode=options.mode, budget=options.budget)
     os.chdir(judge.folder)
     for number_ in range(first, last):
@@ -467,6 +468,7 @@ class Report:
     failures: list[tuple[int, str]] = field(default_factory=list)
     slowest: tuple[float, int] = (0.0, -1)
     peak: float = 0.0
+    interrupted: bool = False
 
     def add(self, number_: int, said: str, seconds: float) -> None:
         """Counts a case."""
@@ -482,7 +484,7 @@ class Report:
         lines = [
             f"{total} cases, {len(self.failures)} failures; slowest {self.slowest[0]:.2f} s (case {self.slowest[1]})"
         ]
-        lines[0] += f"; largest worker {self.peak:.0f} MB"
+        lines[0] += f"; largest worker {self.peak:.0f} MB" + ("; interrupted" if self.interrupted else "")
         lines += [f"  {count:7d}  {said}" for said, count in self.outcomes.most_common()]
         kinds: dict[str, list[int]] = {}
         for number_, said in sorted(self.failures):
@@ -500,26 +502,43 @@ def chunks(first: int, cases: int, size: int) -> Iterator[tuple[int, int]]:
 
 def run(options: argparse.Namespace) -> Report:
     """All cases, `options.jobs` workers at a time; a worker that dies or hangs is replaced."""
-    context = multiprocessing.get_context("spawn")
     waiting = list(chunks(options.first, options.cases, 1000 if options.cases > 2000 else 100))[::-1]
     busy: dict[Connection, tuple[Any, int, int, float]] = {}
     report = Report()
-    while waiting or busy:
-        while waiting and len(busy) < options.jobs:
-            first, last = waiting.pop()
-            here, there = context.Pipe(duplex=False)
-            process = context.Process(target=work, args=(first, last, options, there))
-            process.start()
-            there.close()
-            busy[here] = (process, first, last, time.monotonic())
-        for pipe in multiprocessing.connection.wait(list(busy), timeout=1.0):
-            _take(pipe, busy, waiting, report)
-        for pipe, (process, current, _, since) in list(busy.items()):
-            if time.monotonic() - since > 3 * options.alarm + 60:
-                process.kill()
-                report.add(current, "FAILED hang: the alarm was not heard", time.monotonic() - since)
-                _restart(pipe, busy, waiting, current + 1)
+    try:
+        while waiting or busy:
+            _start(busy, waiting, options)
+            for pipe in multiprocessing.connection.wait(list(busy), timeout=1.0):
+                _take(pipe, busy, waiting, report)
+            _watch(busy, waiting, report, options)
+    except KeyboardInterrupt:
+        for process, *_ in busy.values():
+            process.kill()
+        report.interrupted = True
     return report
+
+
+def _start(busy: dict[Any, Any], waiting: list[tuple[int, int]], options: argparse.Namespace) -> None:
+    context = multiprocessing.get_context("spawn")
+    while waiting and len(busy) < options.jobs:
+        first, last = waiting.pop()
+        here, there = context.Pipe(duplex=False)
+        process = context.Process(target=work, args=(first, last, options, there))
+        process.start()
+        there.close()
+        busy[here] = (process, first, last, time.monotonic())
+        print(f"cases {first} to {last - 1}", file=sys.stderr, flush=True)
+
+
+def _watch(
+    busy: dict[Any, Any], waiting: list[tuple[int, int]], report: Report, options: argparse.Namespace
+) -> None:
+    """Kills workers in which not even the alarm was heard."""
+    for pipe, (process, current, _, since) in list(busy.items()):
+        if time.monotonic() - since > 3 * options.alarm + 60:
+            process.kill()
+            report.add(current, "FAILED hang: the alarm was not heard", time.monotonic() - since)
+            _restart(pipe, busy, waiting, current + 1)
 
 
 def _take(pipe: Any, busy: dict[Any, Any], waiting: list[tuple[int, int]], report: Report) -> None:

@@ -22,6 +22,7 @@ _POINTS = 200
 _MOST_CORNERS = 64
 _ROUNDING = 1e-6
 _LOOSE = 1.5
+_ILL = 1e8  # beyond this condition number floats say nothing about a rate or a bound
 
 
 def metric_findings(spec: Spec) -> list[Finding]:
