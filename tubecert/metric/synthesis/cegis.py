@@ -31,11 +31,11 @@ from tubecert.metric.synthesis.sampling import floats
 
 ROUTE = "cegis"
 _ROUNDS = 60
-_GAP = 0.01  # between kappa and its bound
+_GAP = 3e-3  # between kappa and its bound
 _FINE, _CHEAP = 1e-3, 40  # the same, for so few unknowns
 _WIDER, _WIDEST = 3.0, 0.1  # where the solver's accuracy leaves no room
 _HOPELESS = 1e7  # a larger kappa is no metric
-_LOOSE = 0.5  # conditions that hold by so much, relatively, are dropped
+_LOOSE = 0.2  # conditions that hold by so much, relatively, are dropped
 
 
 def propose(problem: SynthesisProblem) -> Proposal:
