@@ -149,14 +149,17 @@ def test_the_rate_that_a_point_allows_is_named():
     assert re.search(r"supports 0\.5 at most", finding.message)
 
 
-@pytest.mark.parametrize("value", ["1e300", "1e-300", "-1e300", "1e200/3"])
-@pytest.mark.parametrize("place", ["k: 2", "rate: 0.4", "at: [0, 0]", "epsilon: 0.1", "[-2, 2]", "[0], [1]"])
+@pytest.mark.parametrize("value", ["1e300", "1e-300", "-1e300", "1e200/3", "1e300*1e300"])
+@pytest.mark.parametrize(
+    "place", ["k: 2", "rate: 0.4", "at: [0, 0]", "epsilon: 0.1", "[-2, 2]", "[0], [1]", 't)"]']
+)
 def test_extreme_numbers_are_no_trouble(value, place):
     new = {
         "[-2, 2]": f"[-1, {value.lstrip('-')}]",
         "at: [0, 0]": f"at: [{value}, 0]",
         "[0], [1]": f"[0], [{value}]",
     }
+    new['t)"]'] = f't)"]\n  bounds: {{h: {value.lstrip("-")}, h_t: {value.lstrip("-")}}}'
     value = value.lstrip("-") if place in ("rate: 0.4", "epsilon: 0.1") else value
     text = BASE.replace(place, new.get(place, f"{place.split(':')[0]}: {value}"))
     for item in found(text):

@@ -15,6 +15,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, is_zero
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.floats import floats, nearest
 from tubecert.model import ControlAffineModel, build, place
 from tubecert.spec import Spec
 
@@ -40,6 +41,8 @@ def metric_findings(spec: Spec) -> list[Finding]:
     if lowest[k] < -_ROUNDING * scale:
         return [_indefinite(spec, points[k], lowest[k])]
     killing = list(_killing(spec, model))
+    if np.linalg.cond(W).max() > _ILL:
+        return killing or list(_modes(spec, model))
     return killing or [
         *_contraction(spec, model, points, W),
         *_declared(spec, points, W),
@@ -49,7 +52,7 @@ def metric_findings(spec: Spec) -> list[Finding]:
 
 def _points(spec: Spec) -> Array:
     """The middle of the safe set, corners, and points inside, the same in every run; shape (K, n)."""
-    low, high = (np.array([float(side[i]) for side in spec.safe_set]) for i in (0, 1))
+    low, high = (floats([side[i] for side in spec.safe_set]) for i in (0, 1))
     signs = list(itertools.islice(itertools.product((0.0, 1.0), repeat=len(low)), _MOST_CORNERS))
     inside = np.random.default_rng(0).random((_POINTS, len(low)))
     shares = np.concatenate([np.full((1, len(low)), 0.5), np.array(signs), inside])
@@ -106,7 +109,7 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
     inverse = np.linalg.inv(root)
     largest = -np.linalg.eigvalsh(inverse @ (across @ drift @ N) @ inverse.transpose(0, 2, 1))[:, -1] / 2
     k = int(np.argmin(largest))
-    rate = float(model.rate)
+    rate = nearest(model.rate)
     if largest[k] < rate - _ROUNDING * max(rate, abs(float(largest[k]))):
         word = f"it supports {largest[k]:.4g} at most" if largest[k] > 0 else "it does not contract at all"
         yield Finding(
@@ -130,7 +133,7 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
     values = np.linalg.eigvalsh(W)
     least, most = 1 / values[:, -1], 1 / values[:, 0]
     i, k = int(np.argmin(least)), int(np.argmax(most))
-    lower, upper = float(metric.lower), float(metric.upper)
+    lower, upper = nearest(metric.lower), nearest(metric.upper)
     for name, declared, found, at, broken, loose in (
         ("lower", lower, least[i], i, least[i] < lower * (1 - _ROUNDING), False),
         ("upper", upper, most[k], k, most[k] > upper * (1 + _ROUNDING), False),
@@ -155,7 +158,7 @@ def _modes(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
     plan = spec.trajectory
     if plan.kind != "equilibrium":
         return
-    x, u = ([float(term.expression.fraction) for term in terms] for terms in (plan.x, plan.u))
+    x, u = ([nearest(term.expression.fraction) for term in terms] for terms in (plan.x, plan.u))
     at = np.array([x])
     A, B = _values(model.f_x, model, at)[0], _values(model.B, model, at)[0]
     for value, slope in zip(u, model.b_x, strict=True):
@@ -163,7 +166,7 @@ def _modes(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
     if not (np.isfinite(A).all() and np.isfinite(B).all()):
         return
     scale = max(float(np.linalg.norm(A)), float(np.linalg.norm(B)), 1e-300)
-    rate = float(model.rate)
+    rate = nearest(model.rate)
     for value in np.linalg.eigvals(A):
         test = np.concatenate([value * np.eye(len(A)) - A, B], axis=1) / scale
         reached = np.linalg.svd(test, compute_uv=False)[-1] > _ROUNDING

@@ -6,7 +6,7 @@ Knots, equilibria and starts are compared exactly; between knots, and along expr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -17,6 +17,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.floats import floats, nearest
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
 
@@ -53,39 +54,28 @@ def _curve(spec: Spec) -> _Curve:
         knots = plan.table.knots
         kept = [k for k, t in enumerate(knots.t) if plan.horizon is None or t <= plan.horizon]
         return _Curve(
-            t=_floats([knots.t[k] for k in kept]),
-            x=np.array([_floats(knots.x[k]) for k in kept]),
-            u=np.array([_floats(knots.u[k]) for k in kept]),
+            t=floats([knots.t[k] for k in kept]),
+            x=np.array([floats(knots.x[k]) for k in kept]),
+            u=np.array([floats(knots.u[k]) for k in kept]),
             path="trajectory.file",
         )
     if plan.task is not None:
-        ends = np.array([_floats(plan.task.start), _floats(plan.task.target)])
-        last = math.inf if plan.horizon is None else _float(plan.horizon)
+        ends = np.array([floats(plan.task.start), floats(plan.task.target)])
+        last = math.inf if plan.horizon is None else nearest(plan.horizon)
         here = "trajectory.target" if plan.task.goal else "trajectory.start"
         count = 2 if plan.task.goal else 1
         u = np.zeros((count, len(spec.inputs)))
         return _Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
     count = 1 if plan.kind == "equilibrium" else _SAMPLES
-    t = np.linspace(0.0, _float(plan.horizon or Fraction(0)), count)
+    t = np.linspace(0.0, nearest(plan.horizon or Fraction(0)), count)
     tape = Tape([term.expression for term in (*plan.x, *plan.u)], (TIME,))
     both = tape.run_floats([t], t.shape).T
     n = len(spec.states)
     return _Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
 
 
-def _float(value: Fraction) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-
-
-def _floats(values: Sequence[Fraction]) -> Array:
-    return np.array([_float(value) for value in values])
-
-
 def _sides(spec: Spec) -> tuple[Array, Array]:
-    return _floats([low for low, _ in spec.safe_set]), _floats([high for _, high in spec.safe_set])
+    return floats([low for low, _ in spec.safe_set]), floats([high for _, high in spec.safe_set])
 
 
 def _excess(spec: Spec, points: Array) -> tuple[int, int, float]:
@@ -126,14 +116,14 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
 def _least_radius(spec: Spec) -> float:
     """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown)."""
     tube = spec.tube
-    radius = _float((tube.epsilon or Fraction(0)) + (tube.rho_a or Fraction(0)))
-    return radius + (0.0 if spec.within is None else _float(spec.within))
+    radius = nearest((tube.epsilon or Fraction(0)) + (tube.rho_a or Fraction(0)))
+    return radius + (0.0 if spec.within is None else nearest(spec.within))
 
 
 def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     offset = 0.0
     if spec.within is None and spec.trajectory.task is None:
-        offset = float(np.linalg.norm(_floats(spec.x0) - curve.x[0]))
+        offset = float(np.linalg.norm(floats(spec.x0) - curve.x[0]))
     rho = _least_radius(spec) + offset
     k, i, beyond = _excess(spec, curve.x)
     if not math.isfinite(rho) or beyond + rho <= _ROUNDING * rho:
@@ -166,7 +156,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     )
     if not worst > scale:
         return
-    bearable = float(model.rate) * _least_radius(spec)
+    bearable = nearest(model.rate) * _least_radius(spec)
     notable = worst > _NOTABLE * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
@@ -236,10 +226,10 @@ def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
     """Whether a point lies in the obstacle (floats)."""
     if obstacle.radius is not None:
         assert obstacle.center is not None
-        return math.hypot(x - _float(obstacle.center[0]), y - _float(obstacle.center[1])) < _float(
+        return math.hypot(x - nearest(obstacle.center[0]), y - nearest(obstacle.center[1])) < nearest(
             obstacle.radius
         )
-    corners = [(_float(a), _float(b)) for a, b in _corners(obstacle)]
+    corners = [(nearest(a), nearest(b)) for a, b in _corners(obstacle)]
     inside = False
     for (a, b), (c, d) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if (b > y) != (d > y) and x < a + (y - b) * (c - a) / (d - b):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -13,6 +14,7 @@ from tubecert.expression import ZERO, derivatives, free_symbols
 from tubecert.expression.matrix import Matrix, column, jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.floats import nearest
 from tubecert.model import TIME, build, place
 from tubecert.spec import Spec
 
@@ -88,19 +90,19 @@ def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None)
     """A bound that holds on the tube may be broken elsewhere in the safe set: that is a warning, too."""
     path = f"uncertainty.bounds.{name}"
     above = needed.above if needed else 0.0
-    if float(declared) > _LOOSE * above:
+    if nearest(declared) > _LOOSE * above:
         yield Finding(
             code=codes.LOOSE_BOUND,
             severity=Severity.WARNING,
-            message=f"{name} is declared as {float(declared):g}, but on the safe set {above:.3g} suffices",
+            message=f"{name} is declared as {nearest(declared):g}, but on the safe set {above:.3g} suffices",
             location=spec.location(path),
             help="declare less, or remove it: it is derived from the expression; a loose bound costs gain",
         )
-    elif needed and Fraction(needed.below) > declared:
+    elif needed and math.isfinite(needed.below) and Fraction(needed.below) > declared:
         yield Finding(
             code=codes.BROKEN_BOUND,
             severity=Severity.WARNING,
-            message=f"{name} is declared as {float(declared):g}, but its expression reaches {needed.below:.4g} "
+            message=f"{name} is declared as {nearest(declared):g}, but its expression reaches {needed.below:.4g} "
             f"in the safe set, at {place(needed.at)}",
             location=spec.location(path),
             help="declare more, unless the tube stays away from there",
