@@ -142,11 +142,12 @@ class Ladder:
             found = self._at_degree(rate, floor, degree)
             if best is None and found is not None and rate >= self._hardest:
                 self._least_degree, self._hardest = degree, float(rate)
-            if best is not None and (found is None or _kappa(found) > _PAYS * _kappa(best)):
-                return best if found is None else min(best, found, key=_kappa)
-            best = found
-            if found is not None and _kappa(found) <= enough:
-                return found
+            if found is None:
+                continue
+            pays = best is None or _kappa(found) <= _PAYS * _kappa(best)
+            best = found if best is None else min(best, found, key=_kappa)
+            if not pays or _kappa(best) <= enough:
+                break
         return best
 
     def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
