@@ -13,4 +13,10 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
 | `computer` | the controller as a computer: everything held between samples |
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
+| `certified`, `promise` | a certificate, read back; what it promises about a loop |
+| `setting` | plan, times, starts and loops with their gains, certified or chosen |
+| `uncertainty` | random members and adversaries of the certified class |
+| `monte_carlo`, `campaign` | many runs and the search for the worst; all that one command simulates |
+| `compare`, `clearance` | runs against promises; distances from obstacles |
+| `summary`, `output`, `figures` | a campaign as data, files and figures |
 """
