@@ -6,6 +6,7 @@ import importlib.util
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -399,6 +400,50 @@ def test_two_state_meets_the_best_published_condition_number():
     assert proof.verdict == "certified"
     assert proof.upper_on_set.above / proof.lower_on_set.below <= 1.6344
     assert proposal.kappa == pytest.approx(proof.upper_on_set.above / proof.lower_on_set.below, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("system", "box", "degree"),
+    [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 1)],
+    ids=["two_state", "three_state"],
+)
+def test_the_second_solver_proposes_the_same(system, box, degree):
+    asked = problem(system, box, degree=degree, rate=0.7)
+    first, second = propose_sos(asked), propose_sos(replace(asked, solver="scs"))
+    assert first.kappa == pytest.approx(second.kappa, rel=1e-4)
+    assert "SCS" in second.status
+
+
+def test_with_as_many_inputs_as_states_the_identity_is_best():
+    system = model(TWO, F_TWO, [["1", "0"], ["0", "1"]])
+    proposal = propose_sos(problem(system, BOX_FIVE, degree=0, rate=5.0))
+    assert proposal.kappa == pytest.approx(1.0, abs=1e-6)
+    assert proposal.coefficients[0] == pytest.approx(np.eye(2), abs=1e-6)
+
+
+@pytest.mark.parametrize("status", ["Solved", "PrimalInfeasible"])
+def test_a_solver_that_returns_nothing_finite_proposes_nothing(monkeypatch, status):
+    import clarabel
+
+    class Liar:
+        def __init__(self, P, q, *rest):
+            self.size = len(q)
+
+        def solve(self):
+            return SimpleNamespace(
+                x=[np.nan] * self.size,
+                obj_val=1.0,
+                obj_val_dual=1.0,
+                status=status,
+                iterations=1,
+                solve_time=0.0,
+            )
+
+    monkeypatch.setattr(clarabel, "DefaultSolver", Liar)
+    proposal = propose_sos(problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.0))
+    assert proposal.coefficients is None
+    assert proposal.kappa == np.inf
+    assert proposal.feasible is not True
 
 
 def test_three_state_at_rate_0_999_within_the_published_bounds():

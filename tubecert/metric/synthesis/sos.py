@@ -86,6 +86,8 @@ def _proposal(
     y, kappa, status, feasible = found.values, inf, found.status, found.feasible
     if conditions is None or feasible is False:
         y = None
+    elif y is None:
+        feasible = None  # "solved" without a finite solution is no opinion
     coefficients = None
     if conditions is not None and y is not None:
         count = conditions.unknowns.count
