@@ -15,7 +15,7 @@ from tubecert.expression import Expression, ExpressionError, near, parse, parse_
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
-from tubecert.spec.source import Mark, Source
+from tubecert.spec.source import Mark, Source, displayed
 from tubecert.spec.types import Matrix, Term, TermMatrix
 
 Parameters = Mapping[str, Fraction]
@@ -49,7 +49,8 @@ class Reader:
         self.places: dict[str, Location] = {}
 
     def report(self, code: str, location: Location, message: str, help: str = "") -> None:
-        """Adds an error."""
+        """Adds an error; what is quoted of the file cannot steer a terminal."""
+        message, help = displayed(message), displayed(help)
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
 
 

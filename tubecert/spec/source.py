@@ -39,7 +39,7 @@ class Source:
     def of(cls, file: str, text: str) -> Source:
         """The source with its lines found."""
         starts = (0, *(match.end() for match in _BREAK.finditer(text)))
-        lines = tuple(_displayed(line) for line in _BREAK.split(text))
+        lines = tuple(displayed(line) for line in _BREAK.split(text))
         return cls(file=file, text=text, lines=lines, starts=starts)
 
     def location(self, mark: Mark, width: int = 1) -> Location:
@@ -64,7 +64,8 @@ class Source:
         return Mark(line=low, column=index - self.starts[low])
 
 
-def _displayed(line: str) -> str:
+def displayed(line: str) -> str:
+    """The text with a space for every character that is not printable."""
     return line if line.isprintable() else "".join(c if c.isprintable() else " " for c in line)
 
 
