@@ -30,7 +30,7 @@ def number(value):
 
 def same(old, new):
     """The same number, or the same written as a text."""
-    return number(old) and (number(new) or isinstance(new, str)) and str(old) == str(new)
+    return number(old) and ((number(new) and new == old) or (isinstance(new, str) and new == str(old)))
 
 
 def lower(old, new):
@@ -41,6 +41,11 @@ def lower(old, new):
 def higher(old, new):
     """An upper bound that claims less."""
     return new is None or (number(new) and new >= old)
+
+
+def rounded_higher(old, new):
+    """The same for a bound that is rounded up by more than this."""
+    return higher(old * (1 - 1e-8), new)
 
 
 def gone(old, new):
@@ -79,7 +84,7 @@ HARMLESS = [
     (r"metric\.upper_on_set\[1\]", higher),
     (r"metric\.unique_geodesics\.value\[1\]", higher),
     (r"metric\.unique_geodesics(\..*)?", anything),  # of a constant metric: its words do not depend on it
-    (r"tube\.half_widths\.\w+", higher),
+    (r"tube\.half_widths\.\w+", rounded_higher),
     (r"(\w+\.)+ultimate_radius", higher),
     (r"constants\.\w+\.above", higher),
     (r"constants\.input_gain_least\.below", lower),

@@ -21,6 +21,7 @@ TIME = "t"
 
 # floats are correctly rounded: what they lose over a few operations is far below these factors
 _LESS, _MORE = 1 - 1e-14, 1 + 1e-14
+_MOST = 256  # segments that are looked at for one box: longer ones cover as well
 _COARSE = 0.25  # a segment may be so long against the box
 
 
@@ -81,7 +82,8 @@ class Tube:
             near = self._near(segment, columns, box)
             if near is None:
                 continue
-            if self._is_long(segment, columns, width, window) and segment.halves:
+            few = len(kept) + len(waiting) < _MOST
+            if few and self._is_long(segment, columns, width, window) and segment.halves:
                 waiting.extend(segment.halves)
                 continue
             kept.append(segment)
