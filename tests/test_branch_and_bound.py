@@ -61,7 +61,7 @@ CASES = {
     "negative": (scalar(read("-(x - y)**2 - 3 - x")), box(x=(1, 2), y=(-1, 5)), -4),
     "saddle": (scalar(read("x**2 - y**2 + x*y")), box(x=(-1, 1), y=(-1, 1)), 1.25),
     "wave": (scalar(read("sin(3*x)*cos(2*y) + 1/2")), box(x=(0, 3), y=(-1, 2)), 1.5),
-    "ripple": (scalar(read("sin(20*x) - x**2")), box(x=(-3, 3)), 0.993_869_2),
+    "ripple": (scalar(read("sin(20*x) - x**2")), box(x=(-3, 3)), 0.993_862_186_473),
     "quotient": (scalar(read("x/(1 + x**2)")), box(x=(-4, 5)), 0.5),
     "several": (scalar(read("x*y + y*z - x*z + sin(x)")), box(x=(-1, 1), y=(0, 1), z=(-1, 1)), 1 + math.sin(1)),
     "kink": (scalar(read("abs(x - 1/3) - x**2/2")), box(x=(-2, 2)), 0.5 + 1 / 3),

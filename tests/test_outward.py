@@ -64,7 +64,7 @@ def projected_values(model, points):
 def test_finslers_lemma_is_proven_at_every_vertex(inputs):
     """A target below a value inside the box is never said to hold, one well above it is in small boxes."""
     model = replace(MODEL, inputs=("u", "v")[:inputs], B=matrix([row[:inputs] for row in MODEL.B]))
-    pencil = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+    pencil = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs))
     lo, hi, points = boxes(60, 0.3)
     inside = np.array([projected_values(model, p) for p in points])
     least, most = inside.min(axis=0), inside.max(axis=0)

@@ -88,7 +88,9 @@ def test_finslers_lemma_agrees_with_the_moving_annihilator():
     chosen = spec()
     model = build(chosen)
     domain = BoxDomain(dict(zip(chosen.states, chosen.safe_set, strict=True)))
-    objective = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+    objective = ProjectedPencil(
+        model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
+    )
     found = supremum(objective, domain, Effort(gap=0.0, absolute=1e-3))
     exact = -2 * (1 + 0.5 * (2 - sin(0.5)))
     assert found.below <= exact * (1 - 1e-12)
@@ -114,7 +116,9 @@ tube: {epsilon: 0.1, rho_a: 0.1}
     chosen = load_text(text, "spec.yaml")
     model = build(chosen)
     domain = BoxDomain(dict(zip(chosen.states, chosen.safe_set, strict=True)))
-    objective = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+    objective = ProjectedPencil(
+        model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
+    )
     found = supremum(objective, domain, Effort(gap=0.0, absolute=1e-2))
     assert found.below <= -4 <= found.above
     assert found.above <= -4 + 2e-2

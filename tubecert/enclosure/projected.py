@@ -15,14 +15,17 @@ from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
 
 class ProjectedPencil:
-    """sup over x of the least tau with v'N v <= tau v'D v whenever B'v = 0; D > 0, B of full column rank.
+    """sup over x of the least tau with v'N v <= tau v'D v whenever B'v = 0; D > 0, B of full column rank `inputs`.
 
     `BBt` is B B', `projector` a matrix whose columns lie in the null space of B' (such as I - B B^+).
     """
 
-    def __init__(self, numerator: Matrix, denominator: Matrix, BBt: Matrix, projector: Matrix) -> None:
+    def __init__(
+        self, numerator: Matrix, denominator: Matrix, BBt: Matrix, projector: Matrix, *, inputs: int
+    ) -> None:
         self._function = MatrixFunction([numerator, denominator, BBt])
         self._projector = MatrixFunction([projector])
+        self._inputs = inputs
         self.variables = tuple(sorted({*self._function.variables, *self._projector.variables}))
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
@@ -31,7 +34,7 @@ class ProjectedPencil:
         e = self._function.expand(lo[:, own], hi[:, own])
         centre = [mid.mean(axis=1) for mid in e.mid]
         t = whitening(centre[1])[:, None]
-        s = _multiplier(centre, target)[:, None, None, None]
+        s = _multiplier(centre, target, self._inputs)[:, None, None, None]
         filled = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
         mid = e.mid[0] - target * e.mid[1] - s * e.mid[2]
         size = np.abs(e.mid[0]) + abs(target) * np.abs(e.mid[1]) + s * np.abs(e.mid[2])
@@ -80,8 +83,11 @@ def _interval(scalar: tuple[Array, Array]) -> Interval:
     return Interval(np.nextafter(mid - rad, -np.inf), np.nextafter(mid + rad, np.inf))
 
 
-def _multiplier(centre: list[Array], target: float) -> Array:
-    """A proposal for s: with R, N bases of the range and null space, the Schur complement of N - s B B' - tau D."""
+def _multiplier(centre: list[Array], target: float, inputs: int) -> Array:
+    """A proposal for s: with R, N bases of the range and null space, the Schur complement of N - s B B' - tau D.
+
+    The mean of a box's vertices is not quite of the rank of B: its largest eigenvalues are taken for the range.
+    """
     t = whitening(centre[1])
     tt = np.swapaxes(t, -1, -2)
     form, gram = t @ centre[0] @ tt - target * np.eye(t.shape[-1]), t @ centre[2] @ tt
@@ -91,7 +97,7 @@ def _multiplier(centre: list[Array], target: float) -> Array:
     form = np.swapaxes(v, -1, -2) @ form @ v
     result = np.zeros(len(form))
     for row in range(len(form)):
-        in_range = d[row] > 1e-9 * d[row, -1]
+        in_range = np.arange(len(d[row])) >= len(d[row]) - inputs
         null = form[row][np.ix_(~in_range, ~in_range)]
         mixed = form[row][np.ix_(~in_range, in_range)]
         own = form[row][np.ix_(in_range, in_range)]

@@ -1,8 +1,11 @@
 """Enclosures of matrix functions over boxes that converge quadratically.
 
-With c the centre and r the radii of a box X, every x in X has
-    G(x) = G(c) + sum_i (x_i - c_i) G_i(c) + R,   |R| <= 1/2 sum_ij r_i r_j |G_ij(X)|  elementwise.
-The part without R is affine in x, so a convex function of it is largest at one of the sign vertices. Variables in which
+With c the centre and r the radii of a box X, d = x - c, and second derivatives G_ij(X) within H_ij -+ D_ij, every x in
+X has elementwise
+    G(x) = G(c) + sum_i d_i G_i(c) + sum_{i<j} d_i d_j H_ij + sum_i r_i^2/4 H_ii + R,
+    |R| <= sum_i r_i^2/4 |H_ii| + 1/2 sum_ij r_i r_j D_ij,
+because d_i^2/2 lies in r_i^2/4 -+ r_i^2/4. The part without R is affine in each d_i (the others fixed), so a convex
+function of it is largest at one of the sign vertices. Variables in which
 every entry is affine (the others fixed) are not expanded at all: there the vertices of the box are exact.
 A norm (|x|, in h only) has a generalised gradient but no second derivative: such functions are enclosed to first order,
 and functions that contain the gradient itself by their natural interval extension.
@@ -128,7 +131,9 @@ class MatrixFunction:
         for k, value in enumerate(base):
             mid, rad = midrad(value)
             rest = np.zeros((dim, *mid.shape))
-            steps = []
+            steps: list[Array] = []
+            bends: list[tuple[int, int, Array]] = []  # of two variables in `expanded`, at the vertex (1, 1)
+            shifts: list[Array] = []
             for j, i in enumerate(curved):
                 r = stacked_radius[:, i][:, None, None]
                 slope_mid, slope_rad = midrad(here[j][k])
@@ -138,13 +143,26 @@ class MatrixFunction:
                 else:
                     rest[i] += r * (np.abs(slope_mid) + slope_rad)
                 for j2, i2 in enumerate(curved if second else []):
-                    pair = second[min(j, j2)][max(j, j2) - min(j, j2)][k]
-                    rest[i] += 0.5 * r * stacked_radius[:, i2][:, None, None] * pair.magnitude
+                    pair_mid, pair_rad = _known(second[min(j, j2)][max(j, j2) - min(j, j2)][k])
+                    area = r * stacked_radius[:, i2][:, None, None]
+                    if i == i2 and i in expanded:
+                        shifts.append(0.25 * area * pair_mid)
+                        rest[i] += area * (0.25 * np.abs(pair_mid) + 0.5 * pair_rad)
+                    elif i in expanded and i2 in expanded:
+                        rest[i] += 0.5 * area * pair_rad
+                        if j < j2:
+                            bends.append((j, j2, area * pair_mid))
+                    else:
+                        rest[i] += 0.5 * area * (np.abs(pair_mid) + pair_rad)
+            mid = mid + sum(shifts, start=np.zeros(()))
             lifted = mid[None] + sum(
                 (flips[:, s][:, None, None, None] * step[None] for s, step in enumerate(steps)),
                 start=np.zeros((len(flips), 1, 1, 1)),
             )
-            slack = 4e-16 * (len(steps) + 2) * (np.abs(mid) + sum(map(np.abs, steps), start=np.zeros(())))
+            for s, s2, bend in bends:
+                lifted = lifted + (flips[:, s] * flips[:, s2])[:, None, None, None] * bend[None]
+            parts = [np.abs(part) for part in (mid, *steps, *shifts, *(bend for _, _, bend in bends))]
+            slack = 4e-16 * (len(parts) + 2) * sum(parts[1:], start=parts[0])
             mids.append(_fold(lifted, len(choices), count))
             rads.append(
                 _fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count)
@@ -222,6 +240,13 @@ def _split(values: Array, shapes: Sequence[tuple[int, int]]) -> list[Array]:
         result.append(np.ascontiguousarray(np.moveaxis(block, 0, -1)).reshape(-1, p, q))
         start += p * q
     return result
+
+
+def _known(values: Interval) -> tuple[Array, Array]:
+    """Midpoint and radius; midpoint 0 where a range is not bounded."""
+    mid, rad = midrad(values)
+    known = np.isfinite(mid) & np.isfinite(rad)
+    return np.where(known, mid, 0.0), np.where(known, rad, np.inf)
 
 
 def _fold(values: Array, choices: int, count: int) -> Array:

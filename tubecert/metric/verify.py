@@ -112,7 +112,9 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
     if basis is not None:
         objective = Pencil(_restrict(model.drift_form, basis), [_restrict(model.W, basis)])
     else:
-        objective = ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+        objective = ProjectedPencil(
+            model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
+        )
     rate = float(model.rate)
     precision = 1e-2
     while True:

@@ -62,7 +62,9 @@ def counterexample(
 def _contraction(model: ControlAffineModel) -> Objective:
     """Its supremum is minus twice the largest rate that C2 supports."""
     if not model.constant_input:
-        return ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector)
+        return ProjectedPencil(
+            model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
+        )
     N = model.annihilator
     drift, weight = (multiply(transpose(N), multiply(a, N)) for a in (model.drift_form, model.W))
     return Pencil(drift, [weight])

@@ -16,6 +16,7 @@ from itertools import combinations_with_replacement
 from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, sin, symbol, topological
 from tubecert.expression.matrix import Matrix, identity, multiply, null_space, transpose
 from tubecert.metric.synthesis.frame import commuting_frame
+from tubecert.metric.synthesis.pivot_frame import pivot_frame
 from tubecert.model import ControlAffineModel
 
 
@@ -51,7 +52,11 @@ class MetricFamily:
 
 
 def metric_family(
-    model: ControlAffineModel, *, degree: int, variables: Sequence[str] | None = None
+    model: ControlAffineModel,
+    *,
+    degree: int,
+    variables: Sequence[str] | None = None,
+    safe_set: Sequence[tuple[Fraction, Fraction]] | None = None,
 ) -> MetricFamily:
     """The members of total degree <= `degree` in `variables` (default: all that C3 permits and the dynamics suggest).
 
@@ -59,7 +64,7 @@ def metric_family(
     """
     permitted = invariants(model)
     chosen = _chosen(model, permitted, variables) if degree else {}
-    frame = identity(len(model.states)) if model.constant_input else commuting_frame(model)
+    frame = _frame(model, safe_set)
     if frame is None:
         raise ValueError("no frame of vector fields that commute with the columns of B was found")
     generators = [g for form in chosen.values() for g in _generators(form, model)]
@@ -70,6 +75,14 @@ def metric_family(
         variables=tuple(chosen),
         degree=degree if generators else 0,
     )
+
+
+def _frame(model: ControlAffineModel, safe_set: Sequence[tuple[Fraction, Fraction]] | None) -> Matrix | None:
+    """Fields that commute with the columns of B: in closed form where there is one, which is the smallest."""
+    if model.constant_input:
+        return identity(len(model.states))
+    box = safe_set or [(Fraction(-1), Fraction(1))] * len(model.states)
+    return pivot_frame(model, box) or commuting_frame(model)
 
 
 def invariants(model: ControlAffineModel) -> dict[str, Expression]:

@@ -20,6 +20,7 @@ from tubecert.model import ControlAffineModel
 
 _DEGREES = (0, 1, 2, 3, 4)
 _BACK_OFF = (1e-3, 1e-4, 1e-5)  # relative to the rate: what the proof may need
+_ROOM = 6.0  # so much more where W moves: it is proven box by box, and the more to spare the fewer there are
 _RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again with so much more
 _LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
 _PAYS = 0.9  # a higher degree must lower the condition number to this share
@@ -33,8 +34,8 @@ Box = tuple[tuple[Fraction, Fraction], ...]
 class Request:
     """What is wanted: a metric of `model` on `safe_set`.
 
-    `degrees` None: raised until it works; `variables` None: chosen; `routes` in the order in which they are tried;
-    `limit` of the condition number.
+    `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
+    for constant W, backwards where W moves; `limit` of the condition number.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -151,7 +152,8 @@ class Ladder:
         return best
 
     def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
-        for name, route in self.request.routes:
+        known = self.request.routes
+        for name, route in known[::-1] if self._family(degree).degree else known:
             found = self._route(rate, floor, degree, name, route)
             if found is not None:
                 return found
@@ -176,7 +178,8 @@ class Ladder:
     ) -> VerifiedMetric | None:
         """One route at one degree: a smaller back-off if it finds nothing, a larger one if the proof fails."""
         retreated = False
-        back_offs = list(_BACK_OFF)
+        room = _ROOM if self._family(degree).degree else 1.0
+        back_offs = [room * part for part in _BACK_OFF]
         while back_offs:
             back_off = back_offs.pop(0)
             problem = self._problem(rate, floor, degree, back_off)
@@ -221,7 +224,10 @@ class Ladder:
     def _family(self, degree: int) -> MetricFamily:
         if degree not in self._families:
             self._families[degree] = metric_family(
-                self.request.model, degree=degree, variables=self.request.variables
+                self.request.model,
+                degree=degree,
+                variables=self.request.variables,
+                safe_set=self.request.safe_set,
             )
         return self._families[degree]
 

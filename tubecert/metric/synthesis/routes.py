@@ -1,4 +1,4 @@
-"""The routes of synthesis by name, in the order in which they are tried."""
+"""The routes of synthesis by name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from tubecert.metric.synthesis.ladder import Route
 
 
 def routes(choice: str) -> tuple[tuple[str, Route], ...]:
-    """The route that was chosen; for `auto` counterexamples first: they are faster, and treat every expression."""
+    """The route that was chosen; for `auto` both: counterexamples for constant W, sums of squares first where it moves.
+
+    Counterexamples treat every expression, sums of squares only polynomials, sines and cosines.
+    """
     from tubecert.metric.synthesis import cegis, sos
 
     known: dict[str, Route] = {"cegis": cegis.propose, "sos": sos.propose_sos}
