@@ -10,7 +10,7 @@ from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from tubecert.enclosure import interval as iv
-from tubecert.enclosure.interval import PI, Interval, fraction_bounds
+from tubecert.enclosure.interval import PI, Interval, down, fraction_bounds, up
 
 SETTINGS = settings(max_examples=150, deadline=None)
 DENORMAL = 5e-324
@@ -356,3 +356,21 @@ def test_a_library_believed_exact_is_noticed(name, monkeypatch):
     if name == "sin":
         monkeypatch.setattr(iv, "_wave", lambda a, f, *_: Interval(f(a.lo), f(a.hi)))
     assert not all(within(exact(arb(float(at))), function(Interval(at))) for at in x)
+
+
+def test_steps_outward_reach_at_least_the_next_float():
+    """Over random bit patterns, powers of two and their neighbours, subnormal numbers and the greatest."""
+    bits = np.random.default_rng(0).integers(0, 2**64, 200_000, dtype=np.uint64).view(np.float64)
+    powers = np.ldexp(1.0, np.arange(-1074, 1024))
+    near = np.concatenate(
+        [powers, np.nextafter(powers, 0), np.nextafter(powers, np.inf), [0.0, np.finfo(float).max]]
+    )
+    x = np.concatenate([bits[np.isfinite(bits)], near, -near])
+    with np.errstate(over="ignore"):
+        assert (up(x) >= np.nextafter(x, np.inf)).all()
+        assert (down(x) <= np.nextafter(x, -np.inf)).all()
+        assert (up(x) <= np.nextafter(np.nextafter(np.nextafter(x, np.inf), np.inf), np.inf)).all()
+    assert up(-np.inf) == -np.finfo(float).max
+    assert down(np.inf) == np.finfo(float).max
+    assert up(np.inf) == np.inf
+    assert np.isnan(up(np.nan))

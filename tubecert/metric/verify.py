@@ -28,7 +28,7 @@ from tubecert.model import ControlAffineModel, divide
 
 Box = Sequence[tuple[Fraction, Fraction]]
 _FINEST = 1e-10  # relative to the rate
-_ENOUGH = 1e-3
+_HALF = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,8 +104,8 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
     """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the sign of the margin is known, and its size.
 
-    Where that is costly, a small margin is known well enough to a thousandth of the rate: metrics of least condition
-    number nearly attain C2 in many places, and each further digit would be paid for in all of them.
+    Where that is costly, half of the margin is known well enough: metrics of least condition number nearly attain C2 in
+    many places, and each further digit would be paid for in all of them.
     """
     basis = model.annihilator if model.constant_input else _moving_annihilator(model, domain, effort)
     objective: Objective
@@ -116,17 +116,24 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
             model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
         )
     rate = float(model.rate)
-    precision = 1e-2
+    precision, budget = 1e-2, min(effort.cheap, effort.budget)  # a first look, to see how sharp the next must be
     while True:
-        sharp = Effort(gap=0.0, absolute=precision * rate, budget=effort.budget, progress=effort.progress)
+        sharp = Effort(gap=0.0, absolute=precision * rate, budget=budget, progress=effort.progress)
         found = supremum(objective, domain, sharp)
         margin = -found.above / 2 - rate, -found.below / 2 - rate
         settled = margin[0] > 0 or margin[1] < 0
-        width, wanted = margin[1] - margin[0], effort.gap * max(map(abs, margin))
-        known = width <= wanted or (found.boxes > effort.cheap and width <= _ENOUGH * rate)
-        if (settled and known) or precision <= _FINEST or not found.reached:
+        dear = found.boxes >= effort.cheap
+        known = margin[1] - margin[0] <= (_HALF if dear else effort.gap) * max(map(abs, margin))
+        exhausted = not found.reached and budget == effort.budget
+        if (settled and known) or precision <= _FINEST or exhausted:
             return found
-        precision /= 100 if found.boxes <= effort.cheap else 10
+        if not dear:
+            precision /= 100
+        elif budget < effort.budget:
+            budget, precision = effort.budget, min(precision, abs(margin[1]) / rate)
+        else:
+            precision = min(precision / 10, abs(margin[1]) / rate)
+        precision = max(precision, _FINEST)
 
 
 def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Matrix | None:
