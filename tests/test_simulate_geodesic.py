@@ -134,7 +134,7 @@ def test_warm_starts_are_guarded():
     p, q = np.array([0.0, 1.0]), np.array([0.6, 1.3])
     clean = geodesic(space, memory, p, q)
     for nonsense in (np.nan, np.inf, 3.0, -40.0):
-        memory.a[:] = nonsense
+        memory.bend.a[:] = nonsense
         again = geodesic(space, memory, p, q)
         assert again.found
         assert again.energy == pytest.approx(clean.energy, rel=1e-14)

@@ -14,11 +14,11 @@ import numpy as np
 
 from tubecert.simulate.compiled import compiled
 from tubecert.simulate.fast import ADAPTIVE, NONE, REFERENCE, SAMPLED
-from tubecert.simulate.small import clip, dot, factor, solve
+from tubecert.simulate.small import clip, copy, dot, factor, solve
 
 
 class Computer(NamedTuple):
-    """`holds`: the whole controller is held for `dt` s; of its samples every `every`-th adapts (C).
+    """What samples; `holds`: the whole controller is held for `dt` s; of its samples every `every`-th adapts (C).
 
     `decay` = e^{-omega dt}; `weight` = g/(e^{g Ts} - 1) and `growth` = e^{g Ts} of C.
     """
@@ -32,7 +32,29 @@ class Computer(NamedTuple):
 
 
 @compiled
-def adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
+def sample(
+    fast: Any,
+    computer: Any,
+    count: int,
+    x: Any,
+    plan: Any,
+    f: Any,
+    B: Any,
+    inputs: Any,
+    y: Any,
+    held: Any,
+    gram: Any,
+) -> None:
+    """What happens at a sample; without a computer it is not even compiled."""
+    if computer is not None:
+        if computer.holds:
+            _control(fast, computer, count, x, plan, f, B, inputs, y, held, gram)
+        else:
+            _adapt(fast, computer, B, y, gram)
+
+
+@compiled
+def _adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
     """The adaptation of C: s_hat and sigma_hat from xtilde."""
     n, m = fast.n, fast.m
     held, sigma = y[n + 2 * m : 2 * n + 2 * m], y[n : n + m]
@@ -54,31 +76,41 @@ def adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
 
 
 @compiled
-def control(
-    fast: Any, computer: Any, count: int, x: Any, plan: Any, point: Any, y: Any, held: Any, gram: Any
+def _control(
+    fast: Any,
+    computer: Any,
+    count: int,
+    x: Any,
+    plan: Any,
+    f: Any,
+    B: Any,
+    inputs: Any,
+    y: Any,
+    held: Any,
+    gram: Any,
 ) -> None:
     """One sample of the whole controller: `held` becomes u; the last n entries of y hold the predicted xhat."""
     n, m = fast.n, fast.m
     sigma, u_a, xhat = y[n : n + m], y[n + m : n + 2 * m], y[2 * n + 2 * m :]
     if count == 0:
-        xhat[:] = x
+        copy(xhat, x)
     for i in range(n):
         y[i] = xhat[i] - x[i]
     if fast.kind != NONE and count > 0:
         for j in range(m):
             u_a[j] = computer.decay * u_a[j] - (1.0 - computer.decay) * sigma[j]
     if fast.kind == REFERENCE:
-        sigma[:] = point.inputs[0]
+        copy(sigma, inputs[0])
     elif fast.kind == ADAPTIVE:
-        _integrate(fast, computer.dt, point.B, y)
+        _integrate(fast, computer.dt, B, y)
     elif fast.kind == SAMPLED and count % computer.every == 0:
-        adapt(fast, computer, point.B, y, gram)
+        _adapt(fast, computer, B, y, gram)
     for j in range(m):
-        held[j] = plan[2 * n + j] + point.inputs[1, j] + u_a[j]
+        held[j] = plan[2 * n + j] + inputs[1, j] + u_a[j]
     for i in range(n):
-        speed = point.f[i] + dot(point.B[i], held)
+        speed = f[i] + dot(B[i], held)
         if fast.kind == ADAPTIVE:
-            speed += dot(point.B[i], sigma)
+            speed += dot(B[i], sigma)
         if fast.kind == SAMPLED:
             speed += y[n + 2 * m + i]
         xhat[i] += computer.dt * (speed + dot(fast.A[i], y[:n]))

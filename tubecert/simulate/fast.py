@@ -17,7 +17,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled
-from tubecert.simulate.small import clip, dot
+from tubecert.simulate.small import clip, copy, dot
 
 NONE, REFERENCE, ADAPTIVE, SAMPLED = range(4)
 KINDS = {"nominal": NONE, "ccm": NONE, "reference": REFERENCE, "l1": ADAPTIVE, "sampled": SAMPLED}
@@ -118,7 +118,7 @@ def advance(fast: Any, length: float, index: int, y: Any, inner: Any, first: int
     if fast.exact and (fast.kind != ADAPTIVE or _idle(fast, y, inner.h)):
         _exact(fast.flow[index], fast.forced[index], y, inner.h, first, fast.n, out)
     else:
-        out[:] = y
+        copy(out, y)
         _resolved(fast, length, out, inner)
 
 
@@ -238,7 +238,7 @@ def _resolved(fast: Any, length: float, y: Any, inner: Any) -> None:
                 break
             before, after = (before, trial) if over else (trial, after)
             trial = 0.5 * (before + after) if after - before > _CLOSE * ds else after
-        y[:] = inner.stages[5]
+        copy(y, inner.stages[5])
         s += trial
         sliding = sliding != ends
         if hard:

@@ -77,47 +77,47 @@ def evaluate(
     Without `whole` the geodesic and k are left out unless the lane is pushed along it.
     """
     n = x.shape[0]
-    _drift(field.program, t, x, point)
+    _drift(field.program, t, x, point.memory, point.f, point.B, point.inputs[0])
     status, energy = FOUND, 0.0
     if whole or force.lanes[lane, 0] != 0.0:
-        status, energy = connect(field.metric, point.curve, plan[:n], x)
+        status, energy = connect(field.metric, point.curve, point.curve.bend, plan[:n], x)
         if status != FOUND:
             return status, energy
-        status = _feedback(field.rate * energy, plan[2 * n :], plan[n : 2 * n], point)
+        status = _feedback(field.rate * energy, plan[n:], point.f, point.B, point.inputs, point.curve.vectors)
     _disturb(force.waves[lane], force.lanes[lane], force.layer, t, x, point.inputs)
     return status, energy
 
 
 @compiled
-def _drift(program: Any, t: float, x: Any, point: Any) -> None:
-    n, m = point.B.shape
-    memory = point.memory
+def _drift(program: Any, t: float, x: Any, memory: Any, f: Any, B: Any, h: Any) -> None:
+    n, m = B.shape
     memory[0] = t
     for i in range(n):
         memory[1 + i] = x[i]
     execute(program.steps, program.steps.shape[0], memory)
     for i in range(n):
-        point.f[i] = memory[program.outputs[i]]
+        f[i] = memory[program.outputs[i]]
         for j in range(m):
-            point.B[i, j] = memory[program.outputs[n + i * m + j]]
+            B[i, j] = memory[program.outputs[n + i * m + j]]
     for j in range(m):
-        point.inputs[0, j] = memory[program.outputs[n + n * m + j]]
+        h[j] = memory[program.outputs[n + n * m + j]]
 
 
 @compiled
-def _feedback(decay: float, u: Any, drift: Any, point: Any) -> int:
-    n, m = point.B.shape
-    start, end, k, push = point.curve.vectors[0], point.curve.vectors[1], point.inputs[1], point.inputs[2]
+def _feedback(decay: float, plan: Any, f: Any, B: Any, inputs: Any, covectors: Any) -> int:
+    n, m = B.shape
+    drift, u = plan[:n], plan[n:]
+    start, end, k, push = covectors[0], covectors[1], inputs[1], inputs[2]
     phi_0 = 2 * decay - 2 * dot(start, drift)
     size = abs(phi_0)
     for i in range(n):
-        speed = point.f[i] + dot(point.B[i], u)
+        speed = f[i] + dot(B[i], u)
         phi_0 += 2 * end[i] * speed
         size += abs(end[i] * speed) + abs(start[i] * drift[i])
     for j in range(m):
         push[j] = 0.0
         for i in range(n):
-            push[j] += point.B[i, j] * end[i]
+            push[j] += B[i, j] * end[i]
     reach = dot(push, push)
     for j in range(m):
         k[j] = -phi_0 * push[j] / (2 * reach) if phi_0 > 0.0 and reach > 0.0 else 0.0

@@ -20,7 +20,7 @@ from tubecert.expression.matrix import Matrix, differentiate
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.compiled import compiled, entry
 from tubecert.simulate.program import Index, Program, assemble, execute
-from tubecert.simulate.small import dot, factor, solve
+from tubecert.simulate.small import copy, dot, factor, solve
 
 FOUND, NOT_POSITIVE, NOT_FOUND, UNRESOLVED = range(4)
 REASONS = {
@@ -50,23 +50,32 @@ class Metric(NamedTuple):
     table: Array
 
 
-class Curve(NamedTuple):
-    """Working memory and results of one geodesic.
+class Bend(NamedTuple):
+    """Working memory of Newton's method.
 
-    `a` (2, D - 1, n): the coefficients, and those before the step; `vectors` (6, n): the covectors M gamma_s at start
-    and end, then scratch; `squares` (2, n, n): a factor of W, and M; `large` (2, R, R): Hessian and a factor of it, R =
+    `a` (2, D - 1, n): the coefficients, and those before the step; `large` (2, R, R): Hessian and a factor of it, R =
     (D - 1) n; `columns` (2, R): gradient and step; `mixed` (2, n, n): rows W_i m and M W_i m; `second` (n, n): second
     derivatives by x.
     """
 
-    memory: Array
     a: Array
-    vectors: Array
-    squares: Array
     large: Array
     columns: Array
     mixed: Array
     second: Array
+
+
+class Curve(NamedTuple):
+    """Working memory and results of one geodesic.
+
+    `vectors` (6, n): the covectors M gamma_s at start and end, then scratch; `squares` (2, n, n): a factor of W, and
+    M. Without a `bend` W is constant, and what bends curves is not even compiled.
+    """
+
+    memory: Array
+    vectors: Array
+    squares: Array
+    bend: Bend | None
 
 
 def metric(model: ControlAffineModel, degree: int = 5) -> tuple[Metric, Curve]:
@@ -79,9 +88,16 @@ def metric(model: ControlAffineModel, degree: int = 5) -> tuple[Metric, Curve]:
     program, memory = assemble(_lower([model.W, *first, *second]), model.states)
     n, K = len(model.states), degree - 1
     R = K * n
-    shapes = ((2, K, n), (6, n), (2, n, n), (2, R, R), (2, R), (2, n, n), (n, n))
+    shapes = ((2, K, n), (2, R, R), (2, R), (2, n, n), (n, n))
+    bend = Bend(*map(np.zeros, shapes)) if moving else None
     space = Metric(np.array(moving, dtype=np.int64), program, short, _polynomials(degree))
-    return space, Curve(memory, *(np.zeros(shape) for shape in shapes))
+    return space, Curve(memory, np.zeros((6, n)), np.zeros((2, n, n)), bend)
+
+
+def copied(curve: Curve) -> Curve:
+    """The same for another thread."""
+    bend = None if curve.bend is None else Bend(*(part.copy() for part in curve.bend))
+    return Curve(curve.memory.copy(), curve.vectors.copy(), curve.squares.copy(), bend)
 
 
 def _lower(matrices: list[Matrix]) -> list[Any]:
@@ -103,20 +119,26 @@ def _polynomials(degree: int) -> Array:
 
 
 @compiled
-def connect(metric: Any, curve: Any, p: Any, q: Any) -> tuple[int, float]:
-    """(status, energy) of the geodesic from p to q; `curve` then holds the covectors at its ends."""
+def connect(metric: Any, curve: Any, bend: Any, p: Any, q: Any) -> tuple[int, float]:
+    """(status, energy) of the geodesic from p to q; `curve`, which has the `bend`, holds the covectors at its ends."""
     straight = _straight(metric, curve, p, q)
     if not np.isfinite(straight):
         return NOT_POSITIVE, straight
     status, energy = FOUND, straight
-    if metric.moving.shape[0] == 0 or straight == 0.0:
-        return status, energy
-    for _ in range(2):
-        status, energy = _newton(metric, curve, p, q, straight)
-        if status == FOUND:
-            break
-        curve.a[:] = 0.0  # once more from the segment; nothing of a failure is kept
+    if bend is not None:
+        for _ in range(2 if straight > 0.0 else 0):
+            status, energy = _newton(metric, curve, p, q, straight)
+            if status == FOUND:
+                break
+            forget(bend)  # once more from the segment; nothing of a failure is kept
     return status, energy
+
+
+@compiled
+def forget(bend: Any) -> None:
+    """The next geodesic starts from the segment."""
+    if bend is not None:
+        bend.a[:] = 0.0
 
 
 @compiled
@@ -157,19 +179,20 @@ def _straight(metric: Any, curve: Any, p: Any, q: Any) -> float:
 @compiled
 def _newton(metric: Any, curve: Any, p: Any, q: Any, most: float) -> tuple[int, float]:
     """Newton from the coefficients of `curve`, never to an energy above `most`."""
-    a, before, step = curve.a[0], curve.a[1], curve.columns[1]
+    a, before, step = curve.bend.a[0], curve.bend.a[1], curve.bend.columns[1]
     n = p.shape[0]
     energy, share, halvings = most, 1.0, 0
     for count in range(_MOST_STEPS):
         reached, uneven = _expand(metric, curve, p, q)
         if reached <= energy * (1 + _ROUNDING):
             energy, share, halvings = reached, 1.0, 0
-            if not _definite(curve.large):
+            if not _definite(curve.bend.large):
                 return NOT_FOUND, energy
-            solve(curve.large[1], curve.columns[0], step)
-            if dot(curve.columns[0], step) <= _STATIONARY * energy:
+            solve(curve.bend.large[1], curve.bend.columns[0], step)
+            if dot(curve.bend.columns[0], step) <= _STATIONARY * energy:
                 return (UNRESOLVED if uneven > _UNEVEN * energy else FOUND), energy
-            before[:] = a
+            for k in range(a.shape[0]):
+                copy(before[k], a[k])
         elif count == 0 or halvings == _HALVINGS:
             return NOT_FOUND, energy
         else:
@@ -206,10 +229,16 @@ def _definite(large: Any) -> bool:
 @compiled
 def _expand(metric: Any, curve: Any, p: Any, q: Any) -> tuple[float, float]:
     """Energy, and the variation of the squared speed; gradient and Hessian by the coefficients go into `curve`."""
-    n, K, Q, table, a = p.shape[0], curve.a.shape[1], metric.table.shape[1], metric.table, curve.a[0]
+    n, K, Q, table, a = (
+        p.shape[0],
+        curve.bend.a.shape[1],
+        metric.table.shape[1],
+        metric.table,
+        curve.bend.a[0],
+    )
     x, v, m = curve.vectors[2], curve.vectors[3], curve.vectors[4]
-    curve.columns[0] = 0.0
-    curve.large[0] = 0.0
+    curve.bend.columns[0] = 0.0
+    curve.bend.large[0] = 0.0
     energy, least, largest = 0.0, np.inf, 0.0
     for j in range(Q):
         for i in range(n):
@@ -222,16 +251,16 @@ def _expand(metric: Any, curve: Any, p: Any, q: Any) -> tuple[float, float]:
             return np.nan, np.nan
         solve(curve.squares[0], v, m)
         if j == 0:
-            curve.vectors[0] = m
+            copy(curve.vectors[0], m)
         density = dot(v, m)
         least, largest = min(least, density), max(largest, density)
         energy += table[1, j] * density
         _local(metric, curve, m)
         _gather(metric, curve, j, m)
-    curve.vectors[1] = m
+    copy(curve.vectors[1], m)
     for r in range(K * n):
         for c in range(r):
-            curve.large[0, c, r] = curve.large[0, r, c]
+            curve.bend.large[0, c, r] = curve.bend.large[0, r, c]
     return energy, largest - least
 
 
@@ -247,14 +276,14 @@ def _local(metric: Any, curve: Any, m: Any) -> None:
         solve(L, unit, M[i])
     for i in range(moving):
         place += triangle
-        _times(curve.memory, metric.program.outputs, place, m, curve.mixed[0, i])
-        solve(L, curve.mixed[0, i], curve.mixed[1, i])
+        _times(curve.memory, metric.program.outputs, place, m, curve.bend.mixed[0, i])
+        solve(L, curve.bend.mixed[0, i], curve.bend.mixed[1, i])
     for i in range(moving):
         for j in range(i + 1):
             place += triangle
             _times(curve.memory, metric.program.outputs, place, m, unit)
-            value = 2 * dot(curve.mixed[0, i], curve.mixed[1, j]) - dot(unit, m)
-            curve.second[i, j] = curve.second[j, i] = value
+            value = 2 * dot(curve.bend.mixed[0, i], curve.bend.mixed[1, j]) - dot(unit, m)
+            curve.bend.second[i, j] = curve.bend.second[j, i] = value
 
 
 @compiled
@@ -273,9 +302,9 @@ def _times(memory: Any, outputs: Any, place: int, m: Any, w: Any) -> None:
 @compiled
 def _gather(metric: Any, curve: Any, node: int, m: Any) -> None:
     """Adds the node's share to the gradient, and to the block-lower triangle of the Hessian."""
-    n, K, moving, table = m.shape[0], curve.a.shape[1], metric.moving.shape[0], metric.table
-    gradient, Hessian = curve.columns[0], curve.large[0]
-    M, W_m, M_W_m = curve.squares[1], curve.mixed[0], curve.mixed[1]
+    n, K, moving, table = m.shape[0], curve.bend.a.shape[1], metric.moving.shape[0], metric.table
+    gradient, Hessian = curve.bend.columns[0], curve.bend.large[0]
+    M, W_m, M_W_m = curve.squares[1], curve.bend.mixed[0], curve.bend.mixed[1]
     for k in range(K):
         phi, slope = table[1, node] * table[2 + k, node], table[1, node] * table[2 + K + k, node]
         for i in range(n):
@@ -293,14 +322,14 @@ def _gather(metric: Any, curve: Any, node: int, m: Any) -> None:
                     Hessian[k * n + at, l * n + c] -= 2 * phi * slope_l * M_W_m[a, c]
                     Hessian[k * n + c, l * n + at] -= 2 * slope * phi_l * M_W_m[a, c]
                 for b in range(moving):
-                    Hessian[k * n + at, l * n + metric.moving[b]] += phi * phi_l * curve.second[a, b]
+                    Hessian[k * n + at, l * n + metric.moving[b]] += phi * phi_l * curve.bend.second[a, b]
 
 
 @entry
 def solve_all(metric: Any, curve: Any, p: Any, q: Any, status: Any, energy: Any) -> None:
     """Geodesics from p (N, n) to q (N, n), each one the warm start of the next: status and energy (N,)."""
     for i in range(p.shape[0]):
-        status[i], energy[i] = connect(metric, curve, p[i], q[i])
+        status[i], energy[i] = connect(metric, curve, curve.bend, p[i], q[i])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -327,5 +356,5 @@ def geodesic(space: Metric, memory: Curve, p: Array, q: Array) -> Geodesic:
         reason=REASONS.get(int(status[0]), ""),
         energy=float(energy[0]),
         covectors=memory.vectors[:2].copy(),
-        coefficients=memory.a[0].copy(),
+        coefficients=np.zeros((0, len(p))) if memory.bend is None else memory.bend.a[0].copy(),
     )

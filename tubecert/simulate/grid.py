@@ -21,7 +21,7 @@ MOST_STEPS = 4_000_000
 
 
 def corners(problem: LoopProblem) -> tuple[Array, Index]:
-    """Times (C,) that must be ends of steps, and which of them are samples of a computer."""
+    """Times (C,) that must be ends of steps, and the numbers of the computer's samples at them, or -1."""
     end = problem.horizon
     period = sample_period(problem)
     ticks = np.array([0.0])
@@ -36,10 +36,10 @@ def corners(problem: LoopProblem) -> tuple[Array, Index]:
     every = np.unique(np.minimum(every, end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
-    ticking = np.zeros(len(t), dtype=np.int64)
+    samples = np.full(len(t), -1)
     if period is not None:
-        ticking[nearest(t, ticks)] = 1
-    return t, ticking
+        samples[nearest(t, ticks)] = np.arange(len(ticks))
+    return t, samples
 
 
 def _kinks(knots: Knots | None) -> Array:
@@ -75,7 +75,7 @@ def sample_period(problem: LoopProblem) -> float | None:
 
 def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     """The steps of a level, each level with twice as many as the one before, and their distinct lengths (Q,)."""
-    t, ticking = corners(problem)
+    t, samples = corners(problem)
     spans = np.diff(t)
     counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
     if counts.sum() > MOST_STEPS:
@@ -86,9 +86,9 @@ def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
     distinct, which = np.unique(length, return_inverse=True)
     exact_length = np.repeat(spans / counts, counts)
-    marks = np.zeros((len(start) + 1, 3), dtype=np.int64)
-    marks[:-1, 0], marks[:, 2] = which, -1
-    marks[first, 1] = ticking
+    marks = np.full((len(start) + 1, 3), -1)
+    marks[:-1, 0], marks[-1, 0] = which, 0
+    marks[first, 1] = samples
     marks[first[nearest(t, problem.times)], 2] = np.arange(len(problem.times))
     times = np.stack([np.append(start, problem.horizon), np.append(exact_length, 0.0)], axis=1)
     return Grid(times, marks, course(problem, start, exact_length)), distinct
@@ -138,9 +138,11 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
     return exact_flows(found, B, lengths)
 
 
-def computer(problem: LoopProblem) -> Computer:
-    """The computer of the loop; ValueError if the sample time is no multiple of the control period."""
+def computer(problem: LoopProblem) -> Computer | None:
+    """The computer of the loop, if there is one; ValueError if the sample time is no multiple of the control period."""
     gains, rate = problem.gains, problem.control_rate
+    if sample_period(problem) is None:
+        return None
     dt = 0.0 if rate is None else 1.0 / rate
     every, weight, growth = 1, 0.0, 1.0
     if gains is not None and KINDS[problem.controller] == SAMPLED:

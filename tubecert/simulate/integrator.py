@@ -65,6 +65,7 @@ class Ladder:
         self.problem = problem
         self.field, self.point = field(problem.model, base, problem.degree)
         self.computer = grid.computer(problem)
+        self.holds = self.computer is not None and self.computer.holds
         self._levels: dict[int, Loop] = {}
 
     def level(self, number: int, disturbance: Disturbance) -> Loop:
@@ -77,7 +78,7 @@ class Ladder:
         if number not in self._levels:
             steps, lengths = grid.steps(self.problem, number)
             fast = grid.fast_part(self.problem, lengths, number)
-            self._levels[number] = Loop(self.field, acting, fast, self.computer, steps)
+            self._levels[number] = Loop(self.field, acting, fast, self.computer, self.holds, steps)
         return self._levels[number]._replace(force=acting)
 
 
@@ -191,22 +192,19 @@ def run(loop: Loop, point: Point, starts: Array, outputs: int) -> Output:
     from tubecert.simulate import stepping
 
     N = len(starts)
-    out = stepping.output(N, outputs, *point.B.shape)
+    out, stop = stepping.output(N, outputs, *point.B.shape), np.zeros(1)
     chunk = max(1, min(_CHUNK, -(-N // _cores())))
 
     def work(first: int) -> None:
         last = min(first + chunk, N)
-        stepping.run(first, last, loop, starts, stepping.work(point), out)
+        stepping.run(first, last, loop, starts, stepping.work(point, stop), out)
 
-    firsts = range(0, N, chunk)
-    if len(firsts) == 1:
-        work(0)
-        return out
     pool = ThreadPoolExecutor(_cores())
     try:
-        for _ in pool.map(work, firsts):
+        for _ in pool.map(work, range(0, N, chunk)):
             pass
     finally:
+        stop[:] = 1.0  # of an interruption: the lanes under way end at their next step
         pool.shutdown(cancel_futures=True)
     return out
 

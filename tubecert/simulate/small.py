@@ -55,6 +55,13 @@ def dot(a: Any, b: Any) -> float:
 
 
 @compiled
+def copy(a: Any, b: Any) -> None:
+    """Writes b into a. (For an assignment of slices numba also compiles the words of an error: four seconds.)"""
+    for i in range(a.shape[0]):
+        a[i] = b[i]
+
+
+@compiled
 def clip(s: Any, radius: float) -> None:
     """Moves s to the nearest point of the ball."""
     size = np.sqrt(dot(s, s))

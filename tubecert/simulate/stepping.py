@@ -14,12 +14,12 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled, entry
-from tubecert.simulate.computer import Computer, adapt, control
-from tubecert.simulate.fast import ADAPTIVE, NONE, SAMPLED, Fast, Inner, advance, inner, size
+from tubecert.simulate.computer import Computer, sample
+from tubecert.simulate.fast import ADAPTIVE, NONE, Fast, Inner, advance, inner, size
 from tubecert.simulate.feedback import Field, Force, Point, evaluate
-from tubecert.simulate.geodesic import FOUND, Curve
+from tubecert.simulate.geodesic import FOUND, copied, forget
 from tubecert.simulate.program import Index
-from tubecert.simulate.small import dot
+from tubecert.simulate.small import copy, dot
 
 DIVERGED = 20
 _FAR = 1e6
@@ -29,8 +29,8 @@ PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h")
 class Grid(NamedTuple):
     """Steps: `times` (S + 1, 2) are start and length in s, the last of length 0.
 
-    `marks` (S + 1, 3): the number of the length, 1 where a computer samples, and the number of the output time at
-    which the step starts, or -1. `plan` (S + 1, 3, 2 n + m): x*, f(x*) + B(x*)u* and u* at start, middle and end of
+    `marks` (S + 1, 3): the number of the length, and those of the computer's sample and of the output time at which the
+    step starts, or -1. `plan` (S + 1, 3, 2 n + m): x*, f(x*) + B(x*)u* and u* at start, middle and end of
     every step.
     """
 
@@ -40,12 +40,13 @@ class Grid(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """Everything that a compiled lane reads."""
+    """Everything that a compiled lane reads; `holds`: the computer holds the whole controller."""
 
     field: Field
     force: Force
     fast: Fast
-    computer: Computer
+    computer: Computer | None
+    holds: bool
     grid: Grid
 
 
@@ -53,8 +54,8 @@ class Work(NamedTuple):
     """What a compiled lane writes to while it runs.
 
     `vectors` (6, n): x, where a stage is, and the four slopes w = f + B(u* + k + h); `h` (4, m) and `B` (4, n, m) of
-    the stages; `y` (2, Y): the fast part at the start and at the end of a flow; `inputs` (2, m): u as held, and
-    scratch.
+    the stages; `y` (2, Y): the fast part at the start and at the end of a flow; `inputs` (2, m): what is held, and u;
+    `sizes` (7,): what the peaks are taken of; `stop` (1,): not 0 if all lanes shall end now.
     """
 
     vectors: Array
@@ -63,6 +64,8 @@ class Work(NamedTuple):
     y: Array
     inputs: Array
     gram: Array
+    sizes: Array
+    stop: Array
     point: Point
     inner: Inner
 
@@ -79,15 +82,15 @@ class Output(NamedTuple):
     ends: Array
 
 
-def work(point: Point) -> Work:
-    """Fresh working memory of one thread; that of an evaluation is copied."""
+def work(point: Point, stop: Array) -> Work:
+    """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
     n, m = point.B.shape
     fresh = Point(
         point.memory.copy(),
         np.zeros(n),
         np.zeros((n, m)),
         np.zeros((3, m)),
-        Curve(*(part.copy() for part in point.curve)),
+        copied(point.curve),
     )
     return Work(
         np.zeros((6, n)),
@@ -96,6 +99,8 @@ def work(point: Point) -> Work:
         np.zeros((2, size(n, m))),
         np.zeros((2, m)),
         np.zeros((m, m)),
+        np.zeros(len(PEAKS)),
+        stop,
         fresh,
         inner(n, m),
     )
@@ -111,16 +116,21 @@ def output(lanes: int, K: int, n: int, m: int) -> Output:
 @entry
 def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> None:
     """Runs the lanes first..last-1 from `starts` (N, n)."""
-    grid, fast, field = loop.grid, loop.fast, loop.field
-    final = grid.times.shape[0] - 1
-    flows = fast.kind != NONE and not loop.computer.holds
-    x, at, y, v = work.vectors[0], work.vectors[1], work.y[0], work.y.shape[1] - work.vectors.shape[1]
+    grid, fast, point, holds = loop.grid, loop.fast, work.point, loop.holds
+    flows = fast.kind != NONE and not holds
+    x, at, y, end, v = (
+        work.vectors[0],
+        work.vectors[1],
+        work.y[0],
+        work.y[1],
+        work.y.shape[1] - starts.shape[1],
+    )
     for lane in range(first, last):
-        x[:] = starts[lane]
+        copy(x, starts[lane])
         work.y[:] = 0.0
-        work.point.curve.a[:] = 0.0
-        ticks, status = 0, FOUND
-        for s in range(final + 1):
+        forget(point.curve.bend)
+        status = FOUND
+        for s in range(grid.times.shape[0]):
             t, length = grid.times[s]
             for stage in range(5):
                 half = 0.5 if 0 < stage < 3 else 1.0
@@ -129,29 +139,31 @@ def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> N
                 if stage > 0 and flows:
                     _polynomials(work.h, work.B, stage, work.inner)
                     which, first_entry = 2 * grid.marks[s, 0] + side - 1, 0 if stage == 4 else v
-                    advance(fast, share, which, y, work.inner, first_entry, work.y[1])
+                    advance(fast, share, which, y, work.inner, first_entry, end)
                 if stage == 4:
                     break
-                _stage_state(work, stage, share, flows)
-                whole = stage == 0 or not loop.computer.holds
+                if work.stop[0] != 0.0:
+                    return
+                _stage_state(work.vectors, end, stage, share, flows)
                 plan = grid.plan[s, side]
-                status, energy = evaluate(field, loop.force, lane, t + share, at, plan, whole, work.point)
+                whole = stage == 0 or not holds
+                status, energy = evaluate(loop.field, loop.force, lane, t + share, at, plan, whole, point)
                 if not _near(at, plan):
                     status = DIVERGED
                 if status != FOUND:
                     break
+                f, B, inputs, held = point.f, point.B, point.inputs, work.inputs[0]
                 if stage == 0:
-                    if grid.marks[s, 1] == 1 and loop.computer.holds:
-                        control(fast, loop.computer, ticks, x, plan, work.point, y, work.inputs[0], work.gram)
-                    elif grid.marks[s, 1] == 1 and fast.kind == SAMPLED:
-                        adapt(fast, loop.computer, work.point.B, y, work.gram)
-                    ticks += grid.marks[s, 1]
-                    _record(lane, grid.marks[s, 2], t, np.sqrt(max(energy, 0.0)), plan, loop, work, out)
-                _keep(stage, plan, loop.computer.holds, work)
+                    count, place, distance = grid.marks[s, 1], grid.marks[s, 2], np.sqrt(max(energy, 0.0))
+                    if count >= 0:
+                        sample(fast, loop.computer, count, x, plan, f, B, inputs, y, held, work.gram)
+                    _sizes(fast.kind, holds, x, plan, y, inputs, work.inputs, work.sizes)
+                    _record(lane, place, t, distance, x, y, inputs, work.sizes, out)
+                _keep(plan, holds, held, f, B, inputs, work.h[stage], work.B[stage], work.vectors[2 + stage])
             if status != FOUND:
                 out.ends[lane, 0], out.ends[lane, 1] = status, t
                 break
-            _finish(work, length, flows)
+            _finish(work.vectors, work.y, length, flows)
 
 
 @compiled
@@ -163,40 +175,42 @@ def _near(x: Any, plan: Any) -> bool:
 
 
 @compiled
-def _stage_state(work: Any, stage: int, share: float, flows: bool) -> None:
+def _stage_state(vectors: Any, y: Any, stage: int, share: float, flows: bool) -> None:
     """Where the stage is: x, the slope of the stage before, and what u_a has added meanwhile."""
-    n, v = work.vectors.shape[1], work.y.shape[1] - work.vectors.shape[1]
+    n = vectors.shape[1]
+    v = y.shape[0] - n
     for i in range(n):
-        work.vectors[1, i] = work.vectors[0, i]
+        vectors[1, i] = vectors[0, i]
         if stage > 0:
-            work.vectors[1, i] += share * work.vectors[1 + stage, i]
+            vectors[1, i] += share * vectors[1 + stage, i]
             if flows:
-                work.vectors[1, i] += work.y[1, v + i]
+                vectors[1, i] += y[v + i]
 
 
 @compiled
-def _finish(work: Any, length: float, flows: bool) -> None:
+def _finish(vectors: Any, y: Any, length: float, flows: bool) -> None:
     """The end of the step becomes the start of the next."""
-    n, v = work.vectors.shape[1], work.y.shape[1] - work.vectors.shape[1]
+    n = vectors.shape[1]
+    v = y.shape[1] - n
     for i in range(n):
-        slope = work.vectors[2, i] + 2 * work.vectors[3, i] + 2 * work.vectors[4, i] + work.vectors[5, i]
-        work.vectors[0, i] += length / 6 * slope + (work.y[1, v + i] if flows else 0.0)
-    if flows:
-        work.y[0, :v] = work.y[1, :v]
+        slope = vectors[2, i] + 2 * vectors[3, i] + 2 * vectors[4, i] + vectors[5, i]
+        vectors[0, i] += length / 6 * slope + (y[1, v + i] if flows else 0.0)
+    for i in range(v if flows else 0):
+        y[0, i] = y[1, i]
 
 
 @compiled
-def _keep(stage: int, plan: Any, holds: bool, work: Any) -> None:
-    """w = f + B(u* + k + h) of the stage, without u_a; h and B."""
-    point, n, m = work.point, work.vectors.shape[1], work.h.shape[1]
-    u = work.inputs[1]
-    for j in range(m):
-        work.h[stage, j] = point.inputs[0, j]
-        u[j] = point.inputs[0, j] + (work.inputs[0, j] if holds else plan[2 * n + j] + point.inputs[1, j])
+def _keep(
+    plan: Any, holds: bool, held: Any, f: Any, B: Any, inputs: Any, stage_h: Any, stage_B: Any, slope: Any
+) -> None:
+    """h and B of the stage, and its slope w = f + B(u* + k + h), without u_a."""
+    n, m = B.shape
     for i in range(n):
+        slope[i] = f[i]
         for j in range(m):
-            work.B[stage, i, j] = point.B[i, j]
-        work.vectors[2 + stage, i] = point.f[i] + dot(point.B[i], u)
+            stage_h[j], stage_B[i, j] = inputs[0, j], B[i, j]
+            u = held[j] if holds else plan[2 * n + j] + inputs[1, j]
+            slope[i] += B[i, j] * (u + inputs[0, j])
 
 
 @compiled
@@ -226,31 +240,39 @@ def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float,
 
 
 @compiled
-def _record(
-    lane: int, place: int, t: float, distance: float, plan: Any, loop: Any, work: Any, out: Any
-) -> None:
-    """Peaks at the start of the step, and the values if it is an output time."""
-    n, m, kind, holds = work.vectors.shape[1], work.h.shape[1], loop.fast.kind, loop.computer.holds
-    x, y, h, k, u = work.vectors[0], work.y[0], work.point.inputs[0], work.point.inputs[1], work.inputs[1]
-    sizes = np.zeros(7)
-    sizes[0] = distance * distance
+def _sizes(kind: int, holds: bool, x: Any, plan: Any, y: Any, inputs: Any, own: Any, sizes: Any) -> None:
+    """What the peaks are taken of, but for the distance; k becomes what acts if a computer holds it."""
+    n, m = x.shape[0], inputs.shape[1]
+    h, k, u = inputs[0], inputs[1], own[1]
+    sizes[:] = 0.0
     for i in range(n):
         sizes[1] += (x[i] - plan[i]) ** 2
     for j in range(m):
         if holds:
-            k[j] = work.inputs[0, j] - plan[2 * n + j] - y[n + m + j]
+            k[j] = own[0, j] - plan[2 * n + j] - y[n + m + j]
         u[j] = plan[2 * n + j] + k[j] + y[n + m + j]
         if kind >= ADAPTIVE:  # or sampled
             sizes[5] += (y[n + j] - h[j]) ** 2
     sizes[2], sizes[3], sizes[4], sizes[6] = dot(u, u), dot(k, k), dot(y[:n], y[:n]), dot(h, h)
+    for q in range(1, 7):
+        sizes[q] = np.sqrt(sizes[q])
+
+
+@compiled
+def _record(
+    lane: int, place: int, t: float, distance: float, x: Any, y: Any, inputs: Any, sizes: Any, out: Any
+) -> None:
+    """Peaks at the start of the step, and the values if it is an output time."""
+    n, m = x.shape[0], inputs.shape[1]
+    sizes[0] = distance
     for q in range(7):
-        value = np.sqrt(sizes[q])
-        if value > out.peaks[lane, q, 0]:
-            out.peaks[lane, q, 0], out.peaks[lane, q, 1] = value, t
+        if sizes[q] > out.peaks[lane, q, 0]:
+            out.peaks[lane, q, 0], out.peaks[lane, q, 1] = sizes[q], t
     if place >= 0:
         values = out.values[lane, place]
-        values[:n], values[n : 2 * n] = x, y[:n]
+        copy(values[:n], x)
+        copy(values[n : 2 * n], y[:n])
         for j in range(m):
-            values[2 * n + j], values[2 * n + m + j] = k[j], y[n + m + j]
-            values[2 * n + 2 * m + j], values[2 * n + 3 * m + j] = y[n + j], h[j]
+            values[2 * n + j], values[2 * n + m + j] = inputs[1, j], y[n + m + j]
+            values[2 * n + 2 * m + j], values[2 * n + 3 * m + j] = y[n + j], inputs[0, j]
         values[2 * n + 4 * m] = distance

@@ -1,0 +1,117 @@
+"""Compilation of the loops: told while it lasts, kept where there is a folder; runs end when the user interrupts."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from fractions import Fraction
+
+import numba
+import numpy as np
+import pytest
+from numba.core import caching
+
+from tubecert.expression import sin, symbol
+from tubecert.model import ControlAffineModel
+from tubecert.simulate.compiled import COMPILING, KERNELS, compiled, entry, told
+from tubecert.simulate.integrator import integrate
+from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.trajectory.plan import constant_plan
+
+X, T = symbol("x1"), symbol("t")
+
+
+def fresh_kernel():
+    """A kernel that no cache has, and that needs another one."""
+
+    @compiled
+    def doubled(x):
+        return 2 * x
+
+    @entry
+    def kernel(x):
+        return doubled(x) + 1
+
+    return kernel
+
+
+def nowhere(monkeypatch):
+    """No folder can be written to: not the package's, not the user's."""
+    monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    with pytest.raises(RuntimeError, match="cannot cache"):
+        numba.njit(cache=True)(lambda x: x)
+
+
+def test_kernels_compile_where_nothing_can_be_kept(monkeypatch):
+    nowhere(monkeypatch)
+    kernel = fresh_kernel()
+    assert kernel(20.0) == 41.0
+    assert not kernel.stats.cache_path
+
+
+def test_compilation_is_told(monkeypatch):
+    nowhere(monkeypatch)
+    heard = []
+    kernel = fresh_kernel()
+    with told(lambda *words: heard.append(words)):
+        kernel(1.0)
+        assert heard == []  # kernels of others do not count
+        kernel.py_func.__module__ = f"{entry.__module__}.x"
+        kernel(np.float32(1))
+        kernel(1.0)
+    assert [words[:2] for words in heard] == [(COMPILING, 1)]
+    kernel(np.int8(1))
+    assert len(heard) == 1
+    with told(None):
+        kernel(np.int16(1))
+
+
+def test_every_file_with_a_kernel_counts_for_the_cache():
+    from importlib import import_module
+    from pathlib import Path
+
+    package = Path(import_module("tubecert.simulate").__file__).parent
+    found = {path.stem for path in package.glob("*.py") if "compiled import" in path.read_text("utf-8")}
+    assert found - {"monte_carlo", "campaign"} <= set(KERNELS)
+
+
+def test_an_interruption_ends_runs_that_would_take_minutes():
+    """The lanes resolve 2e4 rad/s over 1000 s; Ctrl-C comes after a moment."""
+    model = ControlAffineModel(
+        states=("x1",),
+        inputs=("u",),
+        f=(-X,),
+        B=((2 + sin(X),),),
+        W=(((2 + sin(X)) ** 2,),),
+        rate=Fraction(1),
+        h=None,
+    )
+    problem = LoopProblem(
+        model=model,
+        plan=constant_plan([Fraction(0)], [Fraction(0)], None),
+        controller="l1",
+        horizon=1000.0,
+        times=np.linspace(0, 1000, 3),
+        gains=Gains(bandwidth=5.0, projection_radius=50.0, adaptation_rate=1e8),
+    )
+    h = Disturbance.from_expressions((sin(T),), model, 4)
+    starts = np.full((4, 1), 0.1)
+    integrate(_short(problem), starts, h, tolerance=1.0)  # compiles
+    pressed = []
+
+    def press():
+        pressed.append(time.perf_counter())
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    timer = threading.Timer(0.5, press)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        integrate(problem, starts, h, tolerance=1e-12)
+    assert time.perf_counter() - pressed[0] < 2.0
+
+
+def _short(problem):
+    from dataclasses import replace
+
+    return replace(problem, horizon=1e-4, times=np.array([0.0, 1e-4]))
