@@ -176,6 +176,7 @@ def _certificate(
 
 def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: Step | None) -> Campaign:
     from tubecert.simulate.campaign import simulate
+    from tubecert.simulate.compiled import told
     from tubecert.simulate.setting import Choice, loop_of, setting_of
 
     numbers = wishes.numbers
@@ -184,7 +185,10 @@ def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: S
     choice = Choice(source=wishes.gains, **gains)
     rate = numbers["control_rate"]
     loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in wishes.controllers]
-    return simulate(setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report)
+    with told(report):
+        return simulate(
+            setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report
+        )
 
 
 def _report(data: Mapping[str, Any], folder: str, files: int, output: Output) -> None:
