@@ -1,37 +1,32 @@
-"""Bounds over boxes: what a matrix of terms can be on a box, and tests that hold on all of it or not.
+"""Terms over boxes: what a list of terms can be on a box, by expansions of second order.
 
-On a box with centre c and radii r: G(x) = G(c) + sum_i (x_i - c_i) G_i(c) + rest, |rest| <= 1/2 sum r_i r_j sup|G_ij|.
-Norms and largest eigenvalues are convex, so the affine part is examined at its corners only; variables in which
-every entry is affine are replaced by their ends, exactly. Terms with kinks: mean value form, then natural extension.
+On a box with centre c and radii r, d = x - c: G(x) = G(c) + sum d_i G_i(c) + 1/2 sum d_i d_j G_ij(c) + rest with
+|rest| <= 1/2 sum r_i r_j sup|G_ij - G_ij(c)|. With s_i = d_i^2 that is affine in every pair (d_i, s_i), and the pair
+lies in the hull of (-r, r^2), (-r/2, 0), (r/2, 0), (r, r^2) (edges: tangents of the parabola, and its chord). Norms and
+largest eigenvalues are convex, so products of these vertices are all there is to examine. Where they are too many,
+s_i = r_i^2/2 +- r_i^2/2. Variables in which every entry is affine are replaced by their ends, exactly. Terms with
+kinks: mean value form, then natural extension.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from itertools import product
 from typing import Protocol
 
-from flint import arb, arb_mat
+from flint import arb
 
-from tubecert.recheck.balls import (
-    Ball,
-    Balls,
-    between,
-    exact,
-    is_indefinite,
-    is_positive,
-    magnitude,
-    spectral_norm,
-    whitening,
-)
-from tubecert.recheck.terms import NOUGHT, Program, Rows, Term, in_order, names, slopes
+from tubecert.recheck.balls import Ball, between, magnitude
+from tubecert.recheck.terms import NOUGHT, Program, Term, in_order, names, slopes
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]
 
 _CORNERS = 5  # variables whose corners are all tried
+_VERTICES = 64  # of which curvature may take its share
+_STRAIGHT = ((-1.0, 0.0), (1.0, 0.0))
+_CURVED = ((-1.0, 1.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,19 +54,46 @@ class Test(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Expansion:
-    """Entries near the centre of a box, row by row: value, steps to the corners, bounds of the rest."""
+    """Entries near the centre of a box, row by row, as a polynomial in d_i/r_i; `rest` bounds what is left.
+
+    `steps[i]` belongs to d_i/r_i, `squares[i]` to (d_i/r_i)^2, `mixed` to products of two different ones.
+    """
 
     value: list[Ball]
     steps: list[list[Ball]]
+    squares: dict[int, list[Ball]]
+    mixed: dict[tuple[int, int], list[Ball]]
     rest: list[Ball]
 
     def corners(self) -> Iterator[list[Ball]]:
-        """The affine part at every corner."""
-        for signs in product((-1, 1), repeat=len(self.steps)):
+        """The polynomial at vertices whose hull contains all its values."""
+        ends = [_CURVED if i in self.squares else _STRAIGHT for i in range(len(self.steps))]
+        for vertex in product(*ends):
             corner = self.value
-            for sign, step in zip(signs, self.steps, strict=True):
-                corner = [x + s if sign > 0 else x - s for x, s in zip(corner, step, strict=True)]
+            for i, (d, s) in enumerate(vertex):
+                corner = _added(corner, d, self.steps[i])
+                if s:
+                    corner = _added(corner, s, self.squares[i])
+            for (i, j), bend in self.mixed.items():
+                corner = _added(corner, vertex[i][0] * vertex[j][0], bend)
             yield corner
+
+    def ranges(self) -> list[Ball]:
+        """An enclosure of every entry."""
+        found = []
+        for k, (value, r) in enumerate(zip(self.value, self.rest, strict=True)):
+            size = sum((magnitude(e[k]) for e in (*self.steps, *self.mixed.values())), start=r)
+            total = value + between(-size, size)
+            found.append(sum((between(0, q[k]) for q in self.squares.values()), start=total))
+        return found
+
+
+def _added(corner: list[Ball], factor: float, step: list[Ball]) -> list[Ball]:
+    if factor == 1:
+        return [x + s for x, s in zip(corner, step, strict=True)]
+    if factor == -1:
+        return [x - s for x, s in zip(corner, step, strict=True)]
+    return [x + factor * s for x, s in zip(corner, step, strict=True)]
 
 
 class Field:
@@ -123,10 +145,7 @@ class Field:
             return plain
         found: list[Ball] | None = None
         for e in self.expand(box)[0]:
-            part = [
-                x + sum((between(-magnitude(s[k]), magnitude(s[k])) for s in e.steps), start=between(-r, r))
-                for k, (x, r) in enumerate(zip(e.value, e.rest, strict=True))
-            ]
+            part = e.ranges()
             found = part if found is None else [x.union(y) for x, y in zip(found, part, strict=True)]
         assert found is not None
         return [x.intersection(y) if x.overlaps(y) else x for x, y in zip(found, plain, strict=True)]
@@ -146,7 +165,7 @@ class Field:
         if not self._order:
             wide = [hi - lo for lo, hi in box]
             value = self.at(whole)
-            return [Expansion(value, [], [arb(0)] * len(value))], wide, wide
+            return [Expansion(value, [], {}, {}, [arb(0)] * len(value))], wide, wide
         found = []
         for ends in product((0, 1), repeat=len(self._affine)):
             point, range_ = list(mid), list(whole)
@@ -178,177 +197,40 @@ class Field:
             else:
                 rest = [r + magnitude(s) for r, s in zip(rest, step, strict=True)]
                 caused[i] += size
-        if self._pairs:
-            bent = self._curvature.run([*box, *more])
-            for start, a, b in self._pairs:
-                i, j = self._curved[a], self._curved[b]
-                weight = radius[i] * radius[j] * (0.5 if i == j else 1)
-                part = [weight * magnitude(x) for x in bent[start : start + count]]
-                rest = [r + p for r, p in zip(rest, part, strict=True)]
-                size = sum(float(p.upper()) for p in part)
-                caused[i] += size
-                if i != j:
-                    caused[j] += size
-        return Expansion(value, steps, [r.upper() for r in rest])
+        squares: dict[int, list[Ball]] = {}
+        mixed: dict[tuple[int, int], list[Ball]] = {}
+        bends = self._bends(point, box, radius) if self._pairs else ()
+        vertices = 2 ** (len(steps) + len(self._affine))
+        for a, b, near, far in bends:
+            size = [magnitude(q) for q in near]
+            share: float = 1  # of what bends at the centre: it goes into the rest
+            if a == b and a < len(steps) and 2 * vertices <= _VERTICES:
+                squares[a], share = near, 0
+                vertices *= 2
+            elif a == b:  # between 0 and all of it
+                value, share = [x + q / 2 for x, q in zip(value, near, strict=True)], 0.5
+            elif b < len(steps):
+                mixed[a, b], share = near, 0
+            rest = [r + f + share * q for r, f, q in zip(rest, far, size, strict=True)]
+            loss = share or 0.25 * (a == b)  # the hull of a parabola is that much larger
+            wide = sum(float(f) + loss * float(q) for f, q in zip(far, size, strict=True))
+            for i in {a, b}:
+                caused[self._curved[i]] += wide
+        return Expansion(value, steps, squares, mixed, [r.upper() for r in rest])
 
-
-class NormsBelow:
-    """sum_k |G_k(x)| <= limit, spectral norms (of a column: the Euclidean norm)."""
-
-    def __init__(self, matrices: Sequence[Rows], limit: Fraction, values: Values | None = None) -> None:
-        self._shapes = [(len(g), len(g[0])) for g in matrices]
-        self._field = Field([e for g in matrices for row in g for e in row], values)
-        self.variables = self._field.variables
-        self._limit = exact(limit)
-
-    def with_values(self, values: Values) -> NormsBelow:
-        """The same with other numbers for the same names."""
-        other = NormsBelow.__new__(NormsBelow)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
-
-    def over(self, box: Box) -> Found:
-        """The norms of the affine part at its corners, and of the rest."""
-        found, caused, spread = self._field.expand(box)
-        proven = all(
-            self._norms(corner) + rest <= self._limit
-            for e in found
-            for rest in [self._norms(e.rest)]
-            for corner in e.corners()
-        )
-        return Found(proven, caused, spread)
-
-    def bound(self, box: Box) -> Ball:
-        """An upper bound on a box."""
-        found, _, _ = self._field.expand(box)
-        tops = [self._norms(corner) + self._norms(e.rest) for e in found for corner in e.corners()]
-        return max(tops[1:], key=float, default=tops[0]).max(tops[0]).upper() if _finite(tops) else arb("nan")
-
-    def broken(self, point: Sequence[Ball]) -> bool:
-        """Whether the columns of the matrices alone are too long at a point."""
-        total = arb(0)
-        for matrix in self._split(self._field.at(point)):
-            v = _long_direction(matrix)
-            image = [sum((x * y for x, y in zip(row, v, strict=True)), start=arb(0)) for row in matrix]
-            size = arb(sum(x * x for x in v)) * (1 + 1e-12)
-            if not size > 0:
-                continue
-            total = total + (sum((x * x for x in image), start=arb(0)) / size).nonnegative_part().sqrt()
-        return bool(total > self._limit)
-
-    def _split(self, entries: Sequence[Ball]) -> list[Balls]:
-        matrices, start = [], 0
-        for p, q in self._shapes:
-            matrices.append([list(entries[start + i * q : start + (i + 1) * q]) for i in range(p)])
-            start += p * q
-        return matrices
-
-    def _norms(self, entries: Sequence[Ball]) -> Ball:
-        return sum((spectral_norm(matrix) for matrix in self._split(entries)), start=arb(0))
-
-
-def _finite(values: Sequence[Ball]) -> bool:
-    return all(value.is_finite() for value in values)
-
-
-def _long_direction(a: Balls) -> list[float]:
-    """A vector that a matrix makes long, a proposal in floats."""
-    m = [[float(x.mid()) for x in row] for row in a]
-    v = [1.0 / (1 + j) for j in range(len(m[0]))]
-    for _ in range(30):
-        image = [sum(x * y for x, y in zip(row, v, strict=True)) for row in m]
-        back = [sum(m[i][j] * image[i] for i in range(len(m))) for j in range(len(v))]
-        size = max((abs(x) for x in back), default=0.0)
-        if not 0 < size < float("inf"):
-            break
-        v = [x / size for x in back]
-    return v
-
-
-class PositiveDefinite:
-    """S(x) > 0, with a congruence that makes `unit` (by default S) near the identity at the centre of each box."""
-
-    def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
-        self._n = len(S)
-        self._field = Field([S[i][j] for i in range(self._n) for j in range(self._n)], values)
-        self.variables = self._field.variables
-        self._unit = None if unit is None else Program([e for row in unit for e in row], self._inputs)
-
-    @property
-    def _inputs(self) -> tuple[str, ...]:
-        return (*self.variables, *self._field.values)
-
-    def with_values(self, values: Values) -> PositiveDefinite:
-        """The same with other numbers for the same names."""
-        other = PositiveDefinite.__new__(PositiveDefinite)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
-
-    def over(self, box: Box) -> Found:
-        """Every corner of the affine part, minus the row sums of what the rest can be."""
-        found, caused, spread = self._field.expand(box)
-        t = self._congruence(box, found[0].value)
-        sizes = [[abs(x) for x in row] for row in t]
-        T, size = arb_mat(t), arb_mat(sizes)
-        turned, size_turned = T.transpose(), size.transpose()
-        for e in found:
-            rest = size * arb_mat(self._n, self._n, e.rest) * size_turned
-            drop = [sum(rest[i, j] for j in range(self._n)) for i in range(self._n)]
-            for corner in e.corners():
-                S = (T * arb_mat(self._n, self._n, corner) * turned).tolist()
-                for i in range(self._n):
-                    S[i][i] = S[i][i] - drop[i]
-                if not is_positive(S):
-                    return Found(False, caused, spread)
-        return Found(True)
-
-    def broken(self, point: Sequence[Ball]) -> bool:
-        """Whether S is proven to have a negative eigenvalue at a point."""
-        S = self._rows(self._field.at(point))
-        t = arb_mat(self._congruence_of([[float(x.mid()) for x in row] for row in S]))
-        moved: Balls = (t * arb_mat(S) * t.transpose()).tolist()
-        return is_indefinite(moved) or is_indefinite(S)
-
-    def _congruence(self, box: Box, fallback: Sequence[Ball]) -> list[list[float]]:
-        unit = fallback
-        if self._unit is not None:
-            centre = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
-            unit = self._unit.run([*centre, *self._field.values.values()])
-        return self._congruence_of([[float(x.mid()) for x in row] for row in self._rows(unit)])
-
-    @staticmethod
-    def _congruence_of(rows: list[list[float]]) -> list[list[float]]:
-        return whitening(rows)
-
-    def _rows(self, entries: Sequence[Ball]) -> Balls:
-        return [list(entries[i * self._n : (i + 1) * self._n]) for i in range(self._n)]
-
-
-class NotNegative:
-    """e(x) >= 0 for one term."""
-
-    def __init__(self, e: Term, values: Values | None = None, *, strict: bool = False) -> None:
-        self._field = Field([e], values)
-        self.variables = self._field.variables
-        self._strict = strict
-
-    def with_values(self, values: Values) -> NotNegative:
-        """The same with other numbers for the same names."""
-        other = NotNegative.__new__(NotNegative)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
-
-    def over(self, box: Box) -> Found:
-        """The least corner, minus what the rest can be."""
-        found, caused, spread = self._field.expand(box)
-        least = [corner[0] - e.rest[0] for e in found for corner in e.corners()]
-        proven = all(x > 0 if self._strict else x >= 0 for x in least)
-        return Found(proven, caused, spread)
-
-    def broken(self, point: Sequence[Ball]) -> bool:
-        """Whether it is negative (strict: or zero) at a point."""
-        value = self._field.at(point)[0]
-        return bool(value <= 0 if self._strict else value < 0)
+    def _bends(
+        self, point: list[Ball], box: list[Ball], radius: list[Ball]
+    ) -> Iterator[tuple[int, int, list[Ball], list[Ball]]]:
+        """For every two curved variables: r_i r_j G_ij at the centre (half of it if i = j), and how it varies."""
+        more = list(self.values.values())
+        centre, whole = self._curvature.run([*point, *more]), self._curvature.run([*box, *more])
+        count = len(self._program)
+        for start, a, b in self._pairs:
+            weight = radius[self._curved[a]] * radius[self._curved[b]] * (0.5 if a == b else 1)
+            near, far = centre[start : start + count], whole[start : start + count]
+            yield (
+                a,
+                b,
+                [weight * x for x in near],
+                [magnitude(weight * (y - x)) for x, y in zip(near, far, strict=True)],
+            )

@@ -190,7 +190,7 @@ def _tube(case: Case) -> Iterator[Claim]:
     yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",
         (*case.over_tube, lower, upper),
-        lambda: start.radius(s, case.curve, place.rho, lower, upper),
+        lambda: start.radius(place, lower, upper),
         _SHARP,
     )
     yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))

@@ -14,7 +14,7 @@ from fractions import Fraction
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.boxes import Box, Field, Found, NormsBelow, NotNegative, PositiveDefinite, Test
+from tubecert.recheck.boxes import Box, Field, Found, Test
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import CLOCK, Curve
 from tubecert.recheck.lipschitz import LipschitzBelow
@@ -27,6 +27,7 @@ from tubecert.recheck.metric import (
     together,
     upper_bound,
 )
+from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import TIME, System
 from tubecert.recheck.terms import (
     NOUGHT,
@@ -46,6 +47,7 @@ from tubecert.recheck.terms import (
 )
 from tubecert.recheck.tube import Tube
 
+_FIRST = 500  # boxes before another way is tried
 MU, _CURVE_MU, _LINE_MU = "mu#", "p#", "q#"  # no state can have these names
 
 
@@ -107,7 +109,17 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction) -> Outc
 
 
 def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
-    return prove(NormsBelow(matrices, limit), place.tube(), place.budget)
+    test = NormsBelow(matrices, limit)
+    found = prove(test, place.tube(), min(place.budget, _FIRST))
+    if found.verdict != "undecided" or place.budget <= _FIRST:
+        return found
+    if len(matrices) == 1 and len(matrices[0][0]) == 1 and not place.curve.moves:
+        from tubecert.recheck.multiplier import column_below
+
+        eased = column_below(place, [row[0] for row in matrices[0]], limit)
+        if eased is not None and eased.holds:
+            return eased
+    return prove(test, place.tube(), place.budget)
 
 
 def _columns(s: System) -> list[Matrix]:

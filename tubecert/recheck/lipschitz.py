@@ -13,7 +13,8 @@ from fractions import Fraction
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.boxes import Box, Found, NormsBelow
+from tubecert.recheck.boxes import Box, Found
+from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import (
     Matrix,
     Rows,

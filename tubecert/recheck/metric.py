@@ -12,9 +12,9 @@ from itertools import combinations, islice
 from flint import arb
 
 from tubecert.recheck.balls import exact
-from tubecert.recheck.boxes import NotNegative, PositiveDefinite
 from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
 from tubecert.recheck.identity import vanish
+from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.system import TIME, Duty, System, along
 from tubecert.recheck.terms import (
     NOUGHT,

@@ -11,16 +11,19 @@ from fractions import Fraction
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root
-from tubecert.recheck.boxes import NormsBelow
 from tubecert.recheck.constants import Place
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
-from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
+from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.system import TIME, System
 from tubecert.recheck.terms import NOUGHT, Program, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube
 
 _PIECES = (1, 16, 128, 1024, 4096)
+_SHARES = 12
+_SHARPER = 1 + Fraction(1, 10**15)
+_GAP = 1 + Fraction(1, 500)  # more than the producer's gap
 _ALONG = "r#"  # no state can have this name
 
 
@@ -37,15 +40,59 @@ def _delta(s: System, curve: Curve) -> list[Term]:
     return [number(q) - x for q, x in zip(s.x0, curve.start, strict=True)]
 
 
-def radius(s: System, curve: Curve, rho: Fraction, lower: Fraction, upper: Fraction) -> Outcome:
-    """rho >= sqrt(A/a)|x0 - x*(0)| + eps + rho_a."""
-    if lower <= 0 or rho <= 0:
-        return stated(False, "the radius or the lower bound of the metric is not positive")
-    room, needed = exact(rho - s.epsilon - s.rho_a), root(exact(upper / lower)) * offset(s, curve)
+def radius(place: Place, lower: Fraction, upper: Fraction) -> Outcome:
+    """rho >= sqrt(A/a)|x0 - x*(0)| + eps + rho_a for the true a and A over O(rho).
+
+    What is printed are bounds, rounded outward. Where rho is too small for them it may still serve for the true values:
+    then bounds that are as much sharper as needed are proven here.
+    """
+    s, rho = place.system, place.rho
+    if lower <= 0 or upper <= 0 or rho <= 0:
+        return stated(False, "the radius or a bound of the metric is not positive")
+    room, distance = exact(rho - s.epsilon - s.rho_a), offset(s, place.curve)
+    needed = root(exact(upper / lower)) * distance
     if room >= needed:
         return CONFIRMED
     why = f"{float(needed.mid()) + float(s.epsilon + s.rho_a):.9g} is needed"
-    return Outcome(verdict="contradicted" if room < needed else "undecided", why=why)
+    if room <= 0 or not needed.is_finite():
+        return Outcome(verdict="contradicted" if room < 0 or distance > 0 else "undecided", why=why)
+    # A/a is too large by this factor
+    excess = Fraction(float((needed / room * (needed / room)).upper())) * _SHARPER
+    sharp = _sharpened(place, lower, upper, excess)
+    if sharp.holds:
+        return sharp
+    # if bounds that are weaker by the gap are false at points, rho is too small for the values at these points
+    if excess > _GAP**2 and all(
+        item.verdict == "contradicted" for item in _bounds(place, lower * _GAP, upper / _GAP)
+    ):
+        return Outcome(verdict="contradicted", why=why)
+    return Outcome(verdict="undecided", why=f"{why} for the bounds of the metric that are printed")
+
+
+def _sharpened(place: Place, lower: Fraction, upper: Fraction, excess: Fraction) -> Outcome:
+    """Whether a larger lower and a smaller upper bound, closer by the factor `excess` together, can be proven.
+
+    What the one cannot bear the other has to: their shares are bisected.
+    """
+    low, high = Fraction(0), Fraction(1)
+    boxes = 0
+    for _ in range(_SHARES):
+        share = (low + high) / 2
+        raised = 1 + (excess - 1) * share
+        below, above = _bounds(place, lower * raised, upper * raised / excess)
+        boxes += below.boxes + above.boxes
+        if below.holds and above.holds:
+            return Outcome(verdict="confirmed", boxes=boxes)
+        if below.holds == above.holds:
+            break
+        low, high = (share, high) if below.holds else (low, share)
+    return Outcome(verdict="undecided", boxes=boxes)
+
+
+def _bounds(place: Place, lower: Fraction, upper: Fraction) -> tuple[Outcome, Outcome]:
+    """M >= lower I and M <= upper I over the tube."""
+    system, budget = place.system, place.budget
+    return lower_bound(system, lower, place.tube(), budget), upper_bound(system, upper, place.tube(), budget)
 
 
 def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:

@@ -274,6 +274,10 @@ class Program:
                 self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
         self._outputs = [place[term] for term in outputs]
 
+    def __len__(self) -> int:
+        """The number of outputs."""
+        return len(self._outputs)
+
     def run(self, values: Sequence[Ball]) -> list[Ball]:
         """Enclosures of the outputs."""
         memory = self._start.copy()

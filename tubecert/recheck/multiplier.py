@@ -1,0 +1,114 @@
+"""Norms of columns over a ball around a point, where the ball's own constraint carries the proof.
+
+For the largest |G|^2 over |x - x*| <= rho boxes alone are poor: near the sphere a box always has corners outside. With
+any L >= 0, t^2 - |G|^2 - L (rho^2 - |x - x*|^2) >= 0 on a box proves |G| <= t for its points in the ball, and with the
+multiplier of the maximum the left-hand side has no slope along the sphere. L is a proposal: an ascent in floats.
+A box is examined by a lower bound of the quadratic form about its centre, one variable at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, magnitude
+from tubecert.recheck.boxes import Box, Found
+from tubecert.recheck.constants import Place
+from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.terms import NOUGHT, Program, Term, names, number, slopes, variable
+
+_ASCENTS = 60
+
+
+def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
+    """|G| <= limit over O(rho) of a plan that stays where it is; None if there is no multiplier that helps."""
+    square = sum((e * e for e in column), start=NOUGHT)
+    variables = tuple(sorted(names([square])))
+    centre = dict(zip(place.system.states, place.curve.start, strict=True))
+    if not variables or not set(variables) <= set(centre):
+        return None
+    own = [centre[v] for v in variables]
+    share = _multiplier(
+        square, variables, [float(x.mid()) for x in Program(own, ()).run(())], float(place.rho)
+    )
+    if share is None:
+        return None
+    offsets = [variable(v) - x for v, x in zip(variables, own, strict=True)]
+    inside = number(place.rho**2) - sum((d * d for d in offsets), start=NOUGHT)
+    test = QuadraticNotNegative(number(limit**2) - square - number(share) * inside)
+    return prove(test, place.tube(), place.budget)
+
+
+def _multiplier(square: Term, variables: tuple[str, ...], centre: list[float], rho: float) -> Fraction | None:
+    """L with grad |G|^2 = 2 L (x - x*) at the largest |G|^2 on the sphere that is found."""
+    program = Program([square, *(slopes([square], v)[0] for v in variables)], variables)
+    best = -math.inf
+    share = 0.0
+    for start in range(2 * len(variables)):
+        d = [0.1 * rho] * len(variables)
+        d[start // 2] = rho if start % 2 else -rho
+        value, product = -math.inf, 0.0
+        for _ in range(_ASCENTS):
+            found = [
+                float(y.mid()) for y in program.run([arb(c + x) for c, x in zip(centre, d, strict=True)])
+            ]
+            size = math.hypot(*found[1:])
+            if not 0 < size < math.inf:
+                break
+            value, product = found[0], sum(g * x for g, x in zip(found[1:], d, strict=True))
+            d = [rho * g / size for g in found[1:]]
+        if value > best:
+            best, share = value, product / (2 * rho * rho)
+    return Fraction(share) if 0 < share < math.inf else None
+
+
+class QuadraticNotNegative:
+    """e(x) >= 0, by its gradient at the centre of a box and its curvature over the box.
+
+    Off the diagonal, 2 |d_i d_j| <= d_i^2 r_j/r_i + d_j^2 r_i/r_j; what remains is g d + h d^2/2 in each variable,
+    whose least value for |d| <= r is known exactly. Curvature upward is never paid for.
+    """
+
+    def __init__(self, e: Term) -> None:
+        self.variables = tuple(sorted(names([e])))
+        first = [slopes([e], v)[0] for v in self.variables]
+        self._centre = Program([e, *first], self.variables)
+        self._pairs = [(i, j) for i in range(len(first)) for j in range(i, len(first))]
+        self._bends = Program(
+            [slopes([first[i]], self.variables[j])[0] for i, j in self._pairs], self.variables
+        )
+
+    def over(self, box: Box) -> Found:
+        """The least value of the quadratic form."""
+        middle = [arb(min(max(0.5 * lo + 0.5 * hi, lo), hi)) for lo, hi in box]
+        radius = [(arb(hi) - c).max(c - arb(lo)).upper() for (lo, hi), c in zip(box, middle, strict=True)]
+        value, *slope = self._centre.run(middle)
+        bends = self._bends.run([arb(lo).union(arb(hi)) for lo, hi in box])
+        steepest = [r * g for r, g in zip(radius, slope, strict=True)]  # in units of the box: |d| <= 1
+        bend = [arb(0)] * len(box)
+        for (i, j), h in zip(self._pairs, bends, strict=True):
+            size = radius[i] * radius[j] * h
+            if i == j:
+                bend[i] = bend[i] + size
+            else:
+                bend[i], bend[j] = bend[i] - magnitude(size), bend[j] - magnitude(size)
+        least = [_least(g, h) for g, h in zip(steepest, bend, strict=True)]
+        total = value + sum(least, start=arb(0))
+        causes = [max(0.0, -float(x.lower())) if x.is_finite() else math.inf for x in least]
+        return Found(bool(total >= 0), causes, [0.0] * len(box))
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """A multiplier that does not serve refutes nothing."""
+        del point
+        return False
+
+
+def _least(g: Ball, h: Ball) -> Ball:
+    """A lower bound of g d + h d^2/2 for |d| <= 1, close to the least value where g and h are thin."""
+    slope, bend = magnitude(g), h.lower()
+    if bend >= slope and bend > 0:
+        return (-slope * slope / (2 * bend)).lower()
+    return (bend / 2 - slope).lower()

@@ -1,0 +1,177 @@
+"""Statements that hold on all of a box or not: norms below a limit, definiteness, a sign.
+
+Each examines the vertices of an expansion of second order (`boxes`), and adds what the rest can be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from flint import arb, arb_mat
+
+from tubecert.recheck.balls import Ball, Balls, exact, is_indefinite, is_positive, spectral_norm, whitening
+from tubecert.recheck.boxes import Box, Field, Found, Values
+from tubecert.recheck.terms import Program, Rows, Term
+
+
+class NormsBelow:
+    """sum_k |G_k(x)| <= limit, spectral norms (of a column: the Euclidean norm)."""
+
+    def __init__(self, matrices: Sequence[Rows], limit: Fraction, values: Values | None = None) -> None:
+        self._shapes = [(len(g), len(g[0])) for g in matrices]
+        self._field = Field([e for g in matrices for row in g for e in row], values)
+        self.variables = self._field.variables
+        self._limit = exact(limit)
+
+    def with_values(self, values: Values) -> NormsBelow:
+        """The same with other numbers for the same names."""
+        other = NormsBelow.__new__(NormsBelow)
+        other.__dict__.update(self.__dict__)
+        other._field = self._field.with_values(values)
+        return other
+
+    def over(self, box: Box) -> Found:
+        """The norms of the affine part at its corners, and of the rest."""
+        found, caused, spread = self._field.expand(box)
+        proven = all(
+            self._norms(corner) + rest <= self._limit
+            for e in found
+            for rest in [self._norms(e.rest)]
+            for corner in e.corners()
+        )
+        return Found(proven, caused, spread)
+
+    def bound(self, box: Box) -> Ball:
+        """An upper bound on a box."""
+        found, _, _ = self._field.expand(box)
+        tops = [self._norms(corner) + self._norms(e.rest) for e in found for corner in e.corners()]
+        return max(tops[1:], key=float, default=tops[0]).max(tops[0]).upper() if _finite(tops) else arb("nan")
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """Whether the columns of the matrices alone are too long at a point."""
+        total = arb(0)
+        for matrix in self._split(self._field.at(point)):
+            v = _long_direction(matrix)
+            image = [sum((x * y for x, y in zip(row, v, strict=True)), start=arb(0)) for row in matrix]
+            size = arb(sum(x * x for x in v)) * (1 + 1e-12)
+            if not size > 0:
+                continue
+            total = total + (sum((x * x for x in image), start=arb(0)) / size).nonnegative_part().sqrt()
+        return bool(total > self._limit)
+
+    def _split(self, entries: Sequence[Ball]) -> list[Balls]:
+        matrices, start = [], 0
+        for p, q in self._shapes:
+            matrices.append([list(entries[start + i * q : start + (i + 1) * q]) for i in range(p)])
+            start += p * q
+        return matrices
+
+    def _norms(self, entries: Sequence[Ball]) -> Ball:
+        return sum((spectral_norm(matrix) for matrix in self._split(entries)), start=arb(0))
+
+
+def _finite(values: Sequence[Ball]) -> bool:
+    return all(value.is_finite() for value in values)
+
+
+def _long_direction(a: Balls) -> list[float]:
+    """A vector that a matrix makes long, a proposal in floats."""
+    m = [[float(x.mid()) for x in row] for row in a]
+    v = [1.0 / (1 + j) for j in range(len(m[0]))]
+    for _ in range(30):
+        image = [sum(x * y for x, y in zip(row, v, strict=True)) for row in m]
+        back = [sum(m[i][j] * image[i] for i in range(len(m))) for j in range(len(v))]
+        size = max((abs(x) for x in back), default=0.0)
+        if not 0 < size < float("inf"):
+            break
+        v = [x / size for x in back]
+    return v
+
+
+class PositiveDefinite:
+    """S(x) > 0, with a congruence that makes `unit` (by default S) near the identity at the centre of each box."""
+
+    def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
+        self._n = len(S)
+        self._field = Field([S[i][j] for i in range(self._n) for j in range(self._n)], values)
+        self.variables = self._field.variables
+        self._unit = None if unit is None else Program([e for row in unit for e in row], self._inputs)
+
+    @property
+    def _inputs(self) -> tuple[str, ...]:
+        return (*self.variables, *self._field.values)
+
+    def with_values(self, values: Values) -> PositiveDefinite:
+        """The same with other numbers for the same names."""
+        other = PositiveDefinite.__new__(PositiveDefinite)
+        other.__dict__.update(self.__dict__)
+        other._field = self._field.with_values(values)
+        return other
+
+    def over(self, box: Box) -> Found:
+        """Every corner of the affine part, minus the row sums of what the rest can be."""
+        found, caused, spread = self._field.expand(box)
+        t = self._congruence(box, found[0].value)
+        sizes = [[abs(x) for x in row] for row in t]
+        T, size = arb_mat(t), arb_mat(sizes)
+        turned, size_turned = T.transpose(), size.transpose()
+        for e in found:
+            rest = size * arb_mat(self._n, self._n, e.rest) * size_turned
+            drop = [sum(rest[i, j] for j in range(self._n)) for i in range(self._n)]
+            for corner in e.corners():
+                S = (T * arb_mat(self._n, self._n, corner) * turned).tolist()
+                for i in range(self._n):
+                    S[i][i] = S[i][i] - drop[i]
+                if not is_positive(S):
+                    return Found(False, caused, spread)
+        return Found(True)
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """Whether S is proven to have a negative eigenvalue at a point."""
+        S = self._rows(self._field.at(point))
+        t = arb_mat(self._congruence_of([[float(x.mid()) for x in row] for row in S]))
+        moved: Balls = (t * arb_mat(S) * t.transpose()).tolist()
+        return is_indefinite(moved) or is_indefinite(S)
+
+    def _congruence(self, box: Box, fallback: Sequence[Ball]) -> list[list[float]]:
+        unit = fallback
+        if self._unit is not None:
+            centre = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
+            unit = self._unit.run([*centre, *self._field.values.values()])
+        return self._congruence_of([[float(x.mid()) for x in row] for row in self._rows(unit)])
+
+    @staticmethod
+    def _congruence_of(rows: list[list[float]]) -> list[list[float]]:
+        return whitening(rows)
+
+    def _rows(self, entries: Sequence[Ball]) -> Balls:
+        return [list(entries[i * self._n : (i + 1) * self._n]) for i in range(self._n)]
+
+
+class NotNegative:
+    """e(x) >= 0 for one term."""
+
+    def __init__(self, e: Term, values: Values | None = None, *, strict: bool = False) -> None:
+        self._field = Field([e], values)
+        self.variables = self._field.variables
+        self._strict = strict
+
+    def with_values(self, values: Values) -> NotNegative:
+        """The same with other numbers for the same names."""
+        other = NotNegative.__new__(NotNegative)
+        other.__dict__.update(self.__dict__)
+        other._field = self._field.with_values(values)
+        return other
+
+    def over(self, box: Box) -> Found:
+        """The least corner, minus what the rest can be."""
+        found, caused, spread = self._field.expand(box)
+        least = [corner[0] - e.rest[0] for e in found for corner in e.corners()]
+        proven = all(x > 0 if self._strict else x >= 0 for x in least)
+        return Found(proven, caused, spread)
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """Whether it is negative (strict: or zero) at a point."""
+        value = self._field.at(point)[0]
+        return bool(value <= 0 if self._strict else value < 0)
