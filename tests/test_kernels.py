@@ -243,3 +243,15 @@ def test_least_solution_is_the_least_prefixed_point():
     value = least_solution(Interval(2.0), Interval(0.4, 1.2))
     assert value.lo <= Fraction(2) / Fraction(6, 10)
     assert np.isinf(value.hi)
+
+
+@pytest.mark.parametrize("w", [0.4, 1.0, 160.0])
+def test_an_undecided_sign_of_q_costs_next_to_nothing(w):
+    """h = b sin t has s0 = s1 = b: with c = 1 its q is 0 up to a rounding, and J is s1/(c w) all the same."""
+    b = Interval(0.01 * (1 - 1e-12), 0.01 * (1 + 1e-12))
+    c, omega = Interval(1 - 1e-15, 1 + 1e-15), Interval(w)
+    found = tight_kernel(c, omega, b, b)
+    exact = float(tight_kernel(scalar(1.0), scalar(w), scalar(0.01), scalar(0.01)))
+    assert found.lo <= exact * (1 + 1e-12)
+    assert exact <= found.hi * (1 + 1e-12)
+    assert found.hi <= exact * (1 + 1e-9)

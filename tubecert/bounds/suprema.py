@@ -42,6 +42,7 @@ from tubecert.trajectory.defect import Defect
 from tubecert.tube import Tube
 
 MU = "mu#"  # no state can have this name
+_FEW = 20_000  # boxes
 Report = Callable[[str, int, float, float], None]
 
 
@@ -152,8 +153,12 @@ class Suprema:
         return self._constant(self._over_tube("contraction_excess", Pencil(self.model.F, [self.model.W])))
 
     def input_gain_least(self) -> Constant:
-        """inf over the tube of the smallest singular value of Theta B."""
-        found = self._over_tube("input_gain_least", LeastInputGain(self.model.B, self.model.W))
+        """inf over the tube of the smallest singular value of Theta B.
+
+        Only the formulas as printed use it, and its bound converges linearly: it is not worth many boxes.
+        """
+        few = replace(self.effort, budget=min(self.effort.budget, _FEW))
+        found = self._over_tube("input_gain_least", LeastInputGain(self.model.B, self.model.W), few)
         root = sqrt(Interval(max(0.0, -found.above), max(0.0, -found.below)))
         return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
 

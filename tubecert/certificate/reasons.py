@@ -31,6 +31,8 @@ EXPLAINED = {
     "distance": "the distance bound sup D(t) must stay below dbar",
     "sampled": "the distance bound with sampled adaptation must stay below dbar",
     "as-printed": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
+    "nothing found": "gains that seem to serve were found, but none could be proven to; the constants may be too wide "
+    "(lower --gap), or the margins too thin for the arithmetic",
 }
 
 
@@ -100,7 +102,7 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...], gain
         message = EXPLAINED.get(item.claim, item.claim)
         if item.allowed is not None and item.needed is not None:
             message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
-        elif item.claim != "as-printed":
+        elif item.claim not in ("as-printed", "nothing found"):
             low, high = float(item.margin.lo), float(item.margin.hi)
             message += f": its margin lies in [{low:.3g}, {high:.3g}]"
             message += gain if item.claim in {"26c", "distance", "sampled"} else ""

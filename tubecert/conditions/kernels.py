@@ -65,9 +65,12 @@ def _tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
     slow = s1 / (c * w)
     q = c * s0 - s1
     peak = slow + q * exp(-(c * s0 / q) * log1p_ratio((w - c) * s0 / q)) / (c * w)
-    # slow <= J <= s0 kappa + slow in every case: limits the damage where the sign of q is undecided
-    peak = confined(peak, slow, s0 * kappa(c, w) + slow)
-    return choose(minimum(c, w) * s0 - s1, peak, slow)
+    # In every case slow <= J <= slow + s0 kappa, and J <= slow + max(0, r)/(c w) with r = min(c, w) s0 - s1:
+    # q (q/p)^(c/(w-c)) is q times a number below 1 if c < w, and q (p/q)^(c/(c-w)) <= p otherwise. These limit the
+    # damage where the sign of q is undecided.
+    room = minimum(c, w) * s0 - s1
+    peak = confined(peak, slow, slow + minimum(s0 * kappa(c, w), maximum(number(0.0, slow), room) / (c * w)))
+    return choose(room, peak, slow)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
