@@ -285,7 +285,7 @@ def test_an_aperiodic_uncertainty_needs_a_horizon():
     with pytest.raises(SpecError, match="horizon") as caught:
         run(text)
     assert caught.value.findings[0].code == "TC204"
-    with_horizon = edited(text, ("input: [0]}", "input: [0], horizon: 2}"))
+    with_horizon = edited(text, ("input: [0]}", "input: [0], horizon: 20}"))
     assert run(with_horizon)["verdict"] == "certified"
 
 
@@ -297,7 +297,7 @@ def test_an_undefined_expression_is_located_with_a_point(expression):
         run(edited(THREE, ("    - -x2\n", f"    - {expression}\n")))
     (finding,) = caught.value.findings
     assert finding.code == "TC201"
-    assert finding.location.line == 12
+    assert finding.location.line == 13
     assert "x1 =" in finding.message or "x2 =" in finding.message
 
 
