@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 import time
@@ -9,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
@@ -19,6 +20,9 @@ from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, TargetError
 from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
+
+if TYPE_CHECKING:
+    from tubecert.spec import Spec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +48,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     system = spec.load(given["spec"])
     if given["metric"] is not None:
         system = with_metric(system, str(given["metric"]))
+    kept = _kept_place(given, system, place)
     from tubecert import pipeline  # numpy and the rest, once the input is known to be readable
     from tubecert.report import progress
 
@@ -56,7 +61,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
     if not place.is_stdout:
         certificate.write(place.target, sealed)
-    metric = _kept_metric(result, place)
+    metric = _kept_metric(result, kept)
     write_pages(pages, sealed)
     _report(sealed, place, {"metric": metric, "pages": pages}, output)
     return certificate.exit_code(result)
@@ -84,14 +89,8 @@ def _place(given: Mapping[str, Any]) -> Place:
         given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.certificate.json"
     )
     certificate.check_target(target)
-    for what, source in (("specification", given["spec"]), ("metric file", given["metric"])):
-        if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
-            finding = Finding(
-                code="TC120",
-                message=f"{target} is the {what} itself and would be overwritten",
-                help="choose another file with -o FILE",
-            )
-            raise TargetError([finding])
+    if target != certificate.STDOUT:
+        _spare(target, {"specification": given["spec"], "metric file": given["metric"]})
     return Place(target=target)
 
 
@@ -105,14 +104,55 @@ def _pages(given: Mapping[str, Any], place: Place) -> list[str]:
     return pages
 
 
-def _kept_metric(result: Mapping[str, Any], place: Place) -> str | None:
-    """The file beside the certificate in which a synthesised metric was kept, None if there is none."""
-    if place.is_stdout or "synthesis" not in result or result.get("metric", {}).get("verdict") != "certified":
+def _spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
+    """Raise `TargetError` for a target that would take the place of an input."""
+    for what, source in inputs.items():
+        if source is not None and certificate.same_file(target, source):
+            raise _refused(f"{target} is the {what} itself and would be overwritten")
+
+
+def _kept_place(given: Mapping[str, Any], system: Spec, place: Place) -> str | None:
+    """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
+
+    Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
+    """
+    table = system.trajectory.table
+    plan = None if table is None else Path(given["spec"]).parent / table.file
+    if place.is_stdout:
+        return None
+    _spare(place.target, {"plan": plan})
+    if system.metric is not None or system.synthesis is None:
+        return None
+    name = Path(place.target).name.removesuffix(".json").removesuffix(".certificate")
+    target = str(Path(place.target).with_name(f"{name}.metric.json"))
+    certificate.check_target(target)
+    _spare(target, {"specification": given["spec"], "plan": plan})
+    if Path(target).exists() and not _synthesised(target):
+        raise _refused(
+            f"{target} was not written by tubecert and would be overwritten by the metric that is synthesised"
+        )
+    return target
+
+
+def _synthesised(path: str) -> bool:
+    """Whether a file is a metric that tubecert wrote: it can write it again."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and "solver" in content and "verified_on" in content
+
+
+def _refused(message: str) -> TargetError:
+    return TargetError([Finding(code="TC120", message=message, help="choose another file with -o FILE")])
+
+
+def _kept_metric(result: Mapping[str, Any], target: str | None) -> str | None:
+    """The file in which a synthesised metric was kept, None if there is none."""
+    if target is None or "synthesis" not in result or result.get("metric", {}).get("verdict") != "certified":
         return None
     from tubecert.pipeline import metric_file
 
-    name = Path(place.target).name.removesuffix(".json").removesuffix(".certificate")
-    target = str(Path(place.target).with_name(f"{name}.metric.json"))
     content = metric_file(result["safe_set"], result["metric"], result["synthesis"]["solver"])
     certificate.write(target, content)
     return target
@@ -132,9 +172,9 @@ def _report(sealed: Mapping[str, Any], place: Place, files: Mapping[str, Any], o
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
-    json = output.json or place.is_stdout
-    terminal = (Terminal.stderr if json else Terminal.stdout)(color=output.color)
-    if json:
+    as_json = output.json or place.is_stdout
+    terminal = (Terminal.stderr if as_json else Terminal.stdout)(color=output.color)
+    if as_json:
         write_stdout(certificate.dump(sealed))
         if not output.quiet:
             terminal.show(console.verdict_line(sealed["result"]))

@@ -40,6 +40,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert import spec
 
     system = spec.load(given["spec"])
+    table = system.trajectory.table
+    if table is not None and certificate.same_file(target, Path(given["spec"]).parent / table.file):
+        raise TargetError([Finding(code="TC120", message=f"{target} is the plan itself")])
     wanted = _wanted(system, given, values)
     from tubecert import pipeline
     from tubecert.report import progress

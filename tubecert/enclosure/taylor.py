@@ -26,6 +26,7 @@ from tubecert.expression import ZERO, Expression, derivatives, free_symbols, top
 
 Matrix = Sequence[Sequence[Expression]]
 _MOST_VERTICES = 8  # variables expanded into vertices; more are bounded by their slopes
+_LEAST_RADIUS = 1e-140  # a larger radius is a valid one, and the product of two must not underflow
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,7 @@ class MatrixFunction:
         count, dim = lo.shape
         column = {v: i for i, v in enumerate(self.variables)}
         centre = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
-        radius = np.nextafter(np.maximum(hi - centre, centre - lo), np.inf)
+        radius = np.maximum(np.nextafter(np.maximum(hi - centre, centre - lo), np.inf), _LEAST_RADIUS)
         corners = [column[v] for v in self._affine]
         curved = [column[v] for v in self._curved]
         # all combinations of ends of the affine variables, stacked as (A N, d)
@@ -165,7 +166,7 @@ class MatrixFunction:
             slack = 4e-16 * (len(parts) + 2) * sum(parts[1:], start=parts[0])
             mids.append(_fold(lifted, len(choices), count))
             rads.append(
-                _fold(np.broadcast_to((rad + slack) * (1 + 1e-15), lifted.shape), len(choices), count)
+                _fold(np.broadcast_to((rad + slack) * (1 + 4e-15), lifted.shape), len(choices), count)
             )
             full = np.broadcast_to((rest * (1 + 1e-14))[:, None], (dim, *lifted.shape))
             folded = [_fold(part, len(choices), count) for part in full]

@@ -26,7 +26,7 @@ from tubecert.metric.synthesis.problem import Floor
 from tubecert.metric.synthesis.rounding import VerifiedMetric
 from tubecert.metric.synthesis.routes import routes
 from tubecert.metric.verify import MetricProof, verify_metric
-from tubecert.model import build, rank_decision
+from tubecert.model import build, place, rank_decision
 from tubecert.pipeline.options import Options, Progress, Step
 from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
@@ -71,12 +71,15 @@ class SynthesisRun:
         """The metric that was asked for, or why there is none."""
         rank = rank_decision(self.model, self.spec.safe_set, self.effort)
         if rank.verdict != "proven":
-            return self._failed(
-                "B could not be proven to have full rank on the safe set", "shrink the safe set"
-            )
-        if (mode := self._excluding_mode()) is not None:
-            lower = f"ask for a rate below {mode.bound:.6g}"
-            return self._failed(mode.words(self.spec.states), lower, verdict="refuted")
+            reason = "B could not be proven to have full rank on the safe set"
+            if rank.verdict == "refuted":
+                reason = f"B loses rank in the safe set at {place(rank.at)}"
+            return self._failed(reason, "shrink the safe set", verdict=rank.verdict)
+        rate = self.wanted.rate
+        if rate is not None and (mode := self._limiting_mode(rate)) is not None:
+            lower = f"ask for a rate below {mode.bound:.6g}" if mode.bound > 0 else "give it an input"
+            verdict = "refuted" if mode.excludes(rate) else "undecided"
+            return self._failed(mode.words(self.spec.states), lower, verdict=verdict)
         try:
             best = self._best()
         except ValueError as error:  # what C3 forbids
@@ -104,7 +107,7 @@ class SynthesisRun:
             return found
         limit = self.limit or 2 * found.condition_number.above
         wide = self.ladder.largest_rate(limit, least=wanted.rate)
-        return self._at_rate(wide or found, wanted.rate)
+        return (wide and self._at_rate(wide, wanted.rate)) or found
 
     def _at_rate(self, metric: VerifiedMetric, rate: Fraction) -> VerifiedMetric | None:
         """The same metric with the rate that was asked for: what it supports beyond is its margin."""
@@ -176,8 +179,12 @@ class SynthesisRun:
         tube = self.spec.tube
         if tube.epsilon is None or tube.rho_a is None:
             return row
+        try:
+            spec = self._with(metric)
+        except SpecError:  # too long to be written: the last choice, see `_written`
+            return row
         self._tell(f"rate {float(metric.rate):.4g}: certifying")
-        result = self.certify(self._with(metric), _COARSE)
+        result = self.certify(spec, _COARSE)
         distance = result.get("distance", {})
         least = distance.get("least_adaptation") or {}
         return replace(
@@ -197,7 +204,12 @@ class SynthesisRun:
 
     def _written(self, metric: VerifiedMetric) -> Synthesised:
         """The metric as a file will hold it: read back, and proven as read."""
-        spec = self._with(metric)
+        try:
+            spec = self._with(metric)
+        except SpecError as error:
+            return self._failed(
+                f"the metric cannot be written: {error.findings[0].message}", "ask for a lower degree"
+            )
         model = build(spec)
         # expressions are equal if they are the same nodes: then they are the functions of the proof
         same = (metric.rate, metric.dual_metric) == (model.rate, model.W)
@@ -234,7 +246,7 @@ class SynthesisRun:
         rate = self.wanted.rate
         if rate is not None:
             found = self.ladder.metric(rate)
-            if found is not None:
+            if found is not None and not self._allowed(found):
                 number = found.condition_number.above
                 return self._failed(
                     f"the least condition number found at rate {float(rate):g} is {number:.5g}, above the limit",
@@ -242,10 +254,9 @@ class SynthesisRun:
                 )
         return self._failed(f"no metric was found{self._tried()}", self._remedies(rate))
 
-    def _excluding_mode(self) -> UncontrollableMode | None:
-        """The mode that excludes the rate, if one is asked for."""
-        rate = self.wanted.rate
-        return None if rate is None else uncontrollable_mode(self.model, self._equilibria(), rate)
+    def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
+        """The mode that leaves nothing above the rate, if there is one."""
+        return uncontrollable_mode(self.model, self._equilibria(), rate)
 
     def _tried(self) -> str:
         attempts = self.ladder.attempts

@@ -74,7 +74,7 @@ class Synthesised:
     """What became of a synthesis.
 
     `verdict`: certified (then `spec` has the metric and `file` is the metric file's content), refuted (no metric has
-    the rate, see `reason`), or undecided.
+    the rate, or B loses rank, see `reason`), or undecided.
     """
 
     verdict: str

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
@@ -20,22 +21,29 @@ from tubecert.expression.matrix import null_space
 from tubecert.model import ControlAffineModel
 
 Rows = list[list[Fraction]]
+_DIGITS = (12, 6, 4, 3, 2)  # of a bound that is tried: repeated modes are known to few
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncontrollableMode:
     """A mode s of the linearisation at a (forced) equilibrium that no input reaches: no metric has a rate above -Re s.
 
-    That it excludes the rate that was asked for is proven in rational arithmetic; the mode itself is rounded.
+    `limit` is -Re s rounded up, or the rate that was asked for if that is all that is known: that no metric has a rate
+    above it is proven in rational arithmetic. The mode itself is rounded.
     """
 
     at: tuple[Fraction, ...]
     mode: complex
+    limit: Fraction
 
     @property
     def bound(self) -> float:
         """The rate that it allows, in 1/s."""
-        return -self.mode.real
+        return float(self.limit)
+
+    def excludes(self, rate: Fraction) -> bool:
+        """Whether no metric has this rate; at the limit itself C2 may hold, with nothing to spare for a proof."""
+        return rate > self.limit
 
     def words(self, states: Sequence[str]) -> str:
         """The reason, for a report."""
@@ -45,18 +53,18 @@ class UncontrollableMode:
         )
         return (
             f"the linearisation at {place} has the uncontrollable mode {s}: no metric has a rate above "
-            f"{self.bound:.6g}"
+            f"{self.bound:.12g}"
         )
 
 
 def uncontrollable_mode(
     model: ControlAffineModel, points: Sequence[Sequence[Fraction]], rate: Fraction
 ) -> UncontrollableMode | None:
-    """The mode that excludes `rate`, at one of the points that are exact (forced) equilibria; None if there is none."""
+    """The mode that leaves nothing above `rate`, at one of the points that are exact (forced) equilibria, if any."""
     worst: UncontrollableMode | None = None
     for point in points:
         mode = _at(model, tuple(point), rate)
-        if mode is not None and (worst is None or mode.bound < worst.bound):
+        if mode is not None and (worst is None or mode.limit < worst.limit):
             worst = mode
     return worst
 
@@ -71,12 +79,33 @@ def _at(model: ControlAffineModel, point: tuple[Fraction, ...], rate: Fraction) 
     if not Z:
         return None
     A_c = _restricted(A, Z)
-    modes = np.linalg.eigvals(np.array([[float(q) for q in row] for row in A_c]))
-    slowest = complex(modes[np.argmax(modes.real)])
-    shifted = [[q + (rate if i == j else 0) for j, q in enumerate(row)] for i, row in enumerate(A_c)]
-    if is_hurwitz(shifted):
+    try:
+        modes = np.linalg.eigvals(np.array([[float(q) for q in row] for row in A_c]))
+    except (OverflowError, np.linalg.LinAlgError):  # numbers beyond floats have no name for a report
         return None
-    return UncontrollableMode(at=point, mode=slowest)
+    slowest = complex(modes[np.argmax(modes.real)])
+    if not _limits(A_c, rate):
+        return None
+    rounded = [r for r in _near(-slowest.real) if r < rate and _limits(A_c, r)]
+    return UncontrollableMode(at=point, mode=slowest, limit=min([rate, *rounded]))
+
+
+def _limits(A_c: Rows, rate: Fraction) -> bool:
+    """Whether some mode decays at most at this rate: no metric has a larger one. Exact."""
+    return not is_hurwitz(
+        [[q + (rate if i == j else 0) for j, q in enumerate(row)] for i, row in enumerate(A_c)]
+    )
+
+
+def _near(value: float) -> list[Fraction]:
+    """Decimals at or slightly above a number that is known roughly."""
+    if not isfinite(value):
+        return []
+    found = [Fraction(0)]
+    for digits in _DIGITS:
+        unit = Fraction(10) ** (floor(log10(abs(value) or 1.0)) - digits + 1)
+        found += [round(Fraction(value) / unit) * unit, ceil(Fraction(value) / unit) * unit]
+    return found
 
 
 def _linearised(model: ControlAffineModel, values: dict[str, Expression]) -> tuple[Rows, Rows] | None:
