@@ -30,6 +30,7 @@ REASONS = {
 }
 _EXTRA_NODES = 2
 _STATIONARY = 1e-20  # of the energy: what one more Newton step would gain
+_LAST = 1e-11  # of the energy: after a full step that gains as little, the next would gain about its square
 _MOST_STEPS = 30
 _HALVINGS = 10
 _SHIFTS = 20
@@ -186,10 +187,14 @@ def _newton(metric: Any, curve: Any, p: Any, q: Any, most: float) -> tuple[int, 
         reached, uneven = _expand(metric, curve, p, q)
         if reached <= energy * (1 + _ROUNDING):
             energy, share, halvings = reached, 1.0, 0
-            if not _definite(curve.bend.large):
+            shift = _shift(curve.bend.large)
+            if not np.isfinite(shift):
                 return NOT_FOUND, energy
             solve(curve.bend.large[1], curve.bend.columns[0], step)
-            if dot(curve.bend.columns[0], step) <= _STATIONARY * energy:
+            gain = dot(curve.bend.columns[0], step)
+            if gain <= (_LAST if shift == 0.0 else _STATIONARY) * energy:
+                if gain > _STATIONARY * energy:
+                    energy -= _leave(metric, curve, p, q, 0.5 * gain)
                 return (UNRESOLVED if uneven > _UNEVEN * energy else FOUND), energy
             for k in range(a.shape[0]):
                 copy(before[k], a[k])
@@ -203,6 +208,25 @@ def _newton(metric: Any, curve: Any, p: Any, q: Any, most: float) -> tuple[int, 
 
 
 @compiled
+def _leave(metric: Any, curve: Any, p: Any, q: Any, gain: float) -> float:
+    """Takes the last step: what depends on it are the covectors at both ends."""
+    a, step, table = curve.bend.a[0], curve.bend.columns[1], metric.table
+    v, n, K = curve.vectors[3], p.shape[0], a.shape[0]
+    for r in range(step.shape[0]):
+        a[r // n, r % n] -= step[r]
+    for end in range(2):
+        place = -end  # the first and the last node
+        for i in range(n):
+            v[i] = q[i] - p[i]
+            for k in range(K):
+                v[i] += a[k, i] * table[2 + K + k, place]
+        if not _weight(metric, curve, metric.short, p if end == 0 else q):
+            return np.nan
+        solve(curve.squares[0], v, curve.vectors[end])
+    return gain
+
+
+@compiled
 def _largest(A: Any) -> float:
     """The largest size of an entry."""
     found = 0.0
@@ -213,17 +237,17 @@ def _largest(A: Any) -> float:
 
 
 @compiled
-def _definite(large: Any) -> bool:
-    """Factors the Hessian, shifted until it is positive definite; False if no shift serves."""
+def _shift(large: Any) -> float:
+    """Factors the Hessian, shifted until it is positive definite: by how much, inf if no shift serves."""
     R, shift = large.shape[1], 0.0
     for _ in range(_SHIFTS):
         if factor(large[0], large[1]):
-            return True
+            return shift
         more = max(shift, 1e-3 * _largest(large[0]))
         for r in range(R):
             large[0, r, r] += more
         shift += more
-    return False
+    return np.inf
 
 
 @compiled

@@ -199,6 +199,9 @@ def run(loop: Loop, point: Point, starts: Array, outputs: int) -> Output:
         last = min(first + chunk, N)
         stepping.run(first, last, loop, starts, stepping.work(point, stop), out)
 
+    stepping.run(
+        0, 0, loop, starts, stepping.work(point, stop), out
+    )  # compiles, in a thread that Ctrl-C ends
     pool = ThreadPoolExecutor(_cores())
     try:
         for _ in pool.map(work, range(0, N, chunk)):
