@@ -28,7 +28,8 @@ _LARGEST_ANGLE: Final = 1e6  # beyond it the quadrant test below would need more
 
 def down(x: ArrayLike) -> Array:
     """A float64 below x, one or two units in the last place; below inf the greatest number."""
-    return np.minimum(x - _step(x), _GREATEST)
+    value = np.asarray(x, dtype=np.float64)
+    return np.minimum(value - _step(value), _GREATEST)
 
 
 def up(x: ArrayLike) -> Array:
@@ -37,12 +38,12 @@ def up(x: ArrayLike) -> Array:
     |x| 2**-52 is at least one unit in the last place, exactly as long as it is no subnormal number; there the least
     positive number makes up for its rounding. A fifth of the time of `nextafter`.
     """
-    return np.maximum(x + _step(x), -_GREATEST)
+    value = np.asarray(x, dtype=np.float64)
+    return np.maximum(value + _step(value), -_GREATEST)
 
 
-def _step(x: ArrayLike) -> Array:
-    step = np.abs(np.asarray(x, dtype=np.float64)) * _UNIT + _LEAST
-    return np.asarray(np.minimum(step, _MOST))
+def _step(x: Array) -> Array:
+    return np.asarray(np.minimum(np.abs(x) * _UNIT + _LEAST, _MOST))
 
 
 class Interval:
