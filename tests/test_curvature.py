@@ -25,7 +25,7 @@ from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, exp, norm, sin, sqrt, symbol
 from tubecert.expression.matrix import combine, identity, multiply, transpose
 
-QUICK = settings(max_examples=25, deadline=None)
+QUICK = settings(max_examples=20, deadline=None)
 HALF, QUARTER = Fraction(1, 2), Fraction(1, 4)
 Power = tuple[int, ...]
 
@@ -201,6 +201,18 @@ def test_roundings_of_products_and_sums_are_covered():
             assert min(corners) >= min(low for low, _ in reach)
 
 
+def test_boxes_of_one_unit_in_the_last_place_reach_both_ends():
+    """Their centre is one of the ends: the radius is the distance to the other."""
+    for lo in (1.0, float(np.nextafter(1.0, 2.0)), -1.5):
+        hi = float(np.nextafter(lo, np.inf))
+        e = x - Fraction(lo)
+        found = MatrixFunction([[[10**10 * e + e**2]]]).expand(np.array([[lo]]), np.array([[hi]]))
+        for end in (lo, hi):
+            d = Fraction(end) - Fraction(lo)
+            assert -support(found, 0, {(0, 0): Fraction(-1)}) <= 10**10 * d + d**2
+            assert 10**10 * d + d**2 <= support(found, 0, {(0, 0): Fraction(1)})
+
+
 def test_what_a_sum_over_vertices_swallows_is_in_the_slack():
     """Twelve products of 0.9 half ulps are lost beside one of 1: more than the radii were rounded up by."""
     dim = 8
@@ -252,7 +264,7 @@ def bottom(e):
     return float((e.mid[0] - e.rad[0] - e.rest[0].sum(axis=0)).min())
 
 
-x, y, z, mu = (symbol(name) for name in ("x", "y", "z", "mu"))
+x, y, z = (symbol(name) for name in "xyz")
 # function, box, its least and largest value, and how much its bounds from below and above may lose: squares are bounded
 # without loss where they grow away from the centre of the box
 TIGHT = {
@@ -262,6 +274,7 @@ TIGHT = {
     "two squares": (x**2 - y**2 / 2, [(-1, 1), (-2, 2)], (-2, 1), (0, 0)),
     "a product among squares": (8 * x * y + x**2 + y**2, [(-1, 1), (-1, 1)], (-6, 10), (2, 0)),
     "the same, other sign": (-8 * x * y + x**2 + y**2, [(-1, 1), (-1, 1)], (-6, 10), (2, 0)),
+    "sides of unequal length": (8 * x * y + x**2 + y**2, [(-1, 1), (-2, 2)], (-11, 21), (5, 0)),
     "at the ends of an affine variable": (z * x**2, [(-1, 1), (-3, 5)], (-3, 5), (0, 0)),
 }
 
@@ -506,3 +519,54 @@ def test_first_order_and_natural_enclosures_keep_no_curvature():
         values = function.floats(grid)[0]
         assert bottom(found) <= values.min()
         assert values.max() <= top(found)
+
+
+def diagonal(a, b):
+    return ((a, ZERO), (ZERO, b))
+
+
+def weighted(N, D):
+    return Pencil(N, [D], extra={"mu": 2.0}, weights=lambda lo, hi: (lo[:, 0],))
+
+
+def beside(N, D):
+    return ProjectedPencil(
+        diagonal(N, ZERO), diagonal(D, ONE), diagonal(ZERO, ONE), diagonal(ONE, ZERO), inputs=1
+    )
+
+
+BOWL, HILL = 1 + x**2, 2 - x**2
+TIGHT_USERS = {
+    "norm": (SumOfNorms([[[x**2]]]), 1.0),
+    "norms": (SumOfNorms([[[x**2]], [[-(x**2)]]]), 2.0),
+    "numerator": (Pencil([[x**2]], [[[ONE]]]), 1.0),
+    "negative numerator": (Pencil([[-BOWL]], [[[ONE]]]), -1.0),
+    "denominator at its ends": (Pencil([[ONE]], [[[HILL]]]), 1.0),
+    "denominator at its centre": (Pencil([[ONE]], [[[BOWL]]]), 1.0),
+    "denominator of a negative value": (Pencil([[-ONE]], [[[BOWL]]]), -0.5),
+    "weighted numerator": (weighted([[x**2]], [[ONE]]), 1.0),
+    "weighted denominator": (weighted([[ONE]], [[HILL]]), 1.0),
+    "sum": (SumOfPencils([[[x**2]], [[-(x**2)]]], [[ONE]]), 2.0),
+    "sum's denominator": (SumOfPencils([[[ONE]], [[-ONE]]], [[HILL]]), 2.0),
+    "length": (MetricNorm([[x**2]], [[ONE]]), 1.0),
+    "length in a metric": (MetricNorm([[ONE]], [[4 - 3 * x**2]]), 1.0),
+    "projected numerator": (beside(x**2, ONE), 1.0),
+    "projected denominator": (beside(ONE, HILL), 1.0),
+    "projected denominator of a negative value": (beside(-ONE, BOWL), -0.5),
+}
+
+
+@pytest.mark.parametrize("name", TIGHT_USERS)
+def test_no_user_forgets_the_rest(name):
+    """Values at the ends or the centre of the box that its vertices alone do not show."""
+    objective, most = TIGHT_USERS[name]
+    free = len(objective.variables) - 1
+    lo, hi = np.array([[-1.0] + [1.0] * free]), np.array([[1.0] + [2.0] * free])
+    for target in (np.inf, -np.inf, most - 0.3, most - 1e-3, most - 1e-9):
+        assert objective.upper(lo, hi, target).upper[0] >= most - 1e-12
+    for half in (1e-3, 1e-4):
+        for at in (-1.0, 0.0, 1.0):
+            near, far = lo.copy(), hi.copy()
+            near[0, 0], far[0, 0] = at - half, at + half
+            goal = most + 0.05 + 4 * half
+            assert objective.upper(near, far, goal).upper[0] <= goal
