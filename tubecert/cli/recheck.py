@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
-from tubecert.errors import ExitCode, TubecertError
-from tubecert.findings import Finding
+from tubecert.errors import ExitCode
 from tubecert.recheck.document import MOST_BYTES, read, wrong
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
 
@@ -27,7 +26,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     numbers.check()
     name = str(given["certificate"])
     text = _text(name)
-    note = _belongs(text, name, str(given["spec"])) if given["spec"] is not None else ""
+    note = belongs(read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
     with _progress(output) as report:
         found = recheck(text, name, BUDGET if budget is None else budget, report)
     shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
@@ -91,43 +90,6 @@ def _line(name: str, outcome: Any, *, verbose: bool) -> str:
     work = f"  ({outcome.boxes} boxes)" if verbose and outcome.boxes else ""
     why = "" if outcome.holds else f": {outcome.why}"
     return f"  {outcome.verdict:<12}  {name}{work}{why}"
-
-
-def _belongs(text: str, name: str, path: str) -> str:
-    """Whether the certificate is of the specification at `path`; raises `TubecertError` TC604 if not."""
-    from tubecert import spec as specification
-
-    shown = read(text, name)["result"]["spec"]
-    overrides = read(text, name)["result"]["overrides"].mapping()
-    canonical = specification.canonical(specification.load(path))
-    effective = dict(shown["effective"].mapping())
-    own, other = dict(canonical), dict(effective)
-    for key in ("epsilon", "rho_a"):
-        if key in overrides:
-            own["tube"] = {**own["tube"], key: effective["tube"].get(key)}
-    if "metric" in overrides:
-        own.pop("metric", None)
-        other.pop("metric", None)
-    different = sorted(key for key in {*own, *other} if own.get(key) != other.get(key))
-    if different:
-        raise _ForeignError(
-            [
-                Finding(
-                    code="TC604",
-                    message=f"{name} does not belong to {path}: {', '.join(different)} differ",
-                    help="certify again, or give the specification that was certified",
-                )
-            ]
-        )
-    digest = "sha256:" + hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    same = digest == shown["file_hash"].text()
-    return f"belongs to {path}" + ("" if same else " (the text of the file has changed, the system has not)")
-
-
-class _ForeignError(TubecertError):
-    """The certificate is of another specification (exit code 1)."""
-
-    exit_code = ExitCode.NOT_CERTIFIED
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ A ball that is not a number bounds nothing: every comparison with it is false, s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from flint import arb, arb_mat, fmpq
@@ -15,6 +15,7 @@ Ball = arb
 Balls = list[list[arb]]  # a matrix
 
 _SQUARINGS = 7  # of a matrix, to propose its largest eigenvalue: its power of 2^7
+_HALVINGS = 120
 _INFLATIONS = (1e-13, 1e-10, 1e-7, 1e-4, 1e-2)
 
 
@@ -137,17 +138,35 @@ def spectral_norm(a: Balls) -> arb:
     return length([x for row in a for x in row]).upper()
 
 
-def least_eigenvalue(a: Balls) -> arb:
-    """A lower bound of the smallest eigenvalue of a symmetric matrix; not a number if none was found."""
-    n = len(a)
-    top = spectral_norm(a)
-    rest = _largest([[float(((top if i == j else 0) - a[i][j]).mid()) for j in range(n)] for i in range(n)])
-    guess = float(top) - rest
-    for inflation in _INFLATIONS:
-        low = arb(guess) - abs(float(top)) * inflation
-        if is_positive([[a[i][j] - (low if i == j else 0) for j in range(n)] for i in range(n)]):
-            return low.lower()
-    return arb("nan")
+def sharp_norm(a: Balls) -> arb:
+    """An upper bound of the spectral norm, as close as the precision allows."""
+    m = arb_mat(a)
+    gram = (m.transpose() * m).tolist()
+    top = length([x for row in a for x in row]).upper()
+    return _bisected(lambda t: is_positive(_shifted(t * t, gram)), top, arb(0)).upper()
+
+
+def sharp_least(a: Balls) -> arb:
+    """A lower bound of the smallest eigenvalue of a symmetric matrix, as close as the precision allows."""
+    size = length([x for row in a for x in row]).upper()
+    minus = [[-x for x in row] for row in a]
+    return -_bisected(lambda t: is_positive(_shifted(t, minus)), 2 * size, -2 * size)
+
+
+def _shifted(t: arb, a: Balls) -> Balls:
+    """t I - a."""
+    return [[(t if i == j else 0) - x for j, x in enumerate(row)] for i, row in enumerate(a)]
+
+
+def _bisected(serves: Callable[[arb], bool], high: arb, low: arb) -> arb:
+    """The least t that is found to serve; not a number if `high` does not (a little above it is tried)."""
+    high = (high * (1 + arb(2) ** -20)).mid() + arb(2) ** -60
+    if not serves(high):
+        return arb("nan")
+    for _ in range(_HALVINGS):
+        middle = ((low + high) / 2).mid()
+        low, high = (low, middle) if serves(middle) else (middle, high)
+    return high
 
 
 def _largest(a: list[list[float]]) -> float:

@@ -202,7 +202,7 @@ class Field:
         bends = self._bends(point, box, radius) if self._pairs else ()
         vertices = 2 ** (len(steps) + len(self._affine))
         for a, b, near, far in bends:
-            size = [magnitude(q) for q in near]
+            bend = [magnitude(q) for q in near]
             share: float = 1  # of what bends at the centre: it goes into the rest
             if a == b and a < len(steps) and 2 * vertices <= _VERTICES:
                 squares[a], share = near, 0
@@ -211,9 +211,9 @@ class Field:
                 value, share = [x + q / 2 for x, q in zip(value, near, strict=True)], 0.5
             elif b < len(steps):
                 mixed[a, b], share = near, 0
-            rest = [r + f + share * q for r, f, q in zip(rest, far, size, strict=True)]
+            rest = [r + f + share * q for r, f, q in zip(rest, far, bend, strict=True)]
             loss = share or 0.25 * (a == b)  # the hull of a parabola is that much larger
-            wide = sum(float(f) + loss * float(q) for f, q in zip(far, size, strict=True))
+            wide = sum(float(f) + loss * float(q) for f, q in zip(far, bend, strict=True))
             for i in {a, b}:
                 caused[self._curved[i]] += wide
         return Expansion(value, steps, squares, mixed, [r.upper() for r in rest])

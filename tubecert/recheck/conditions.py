@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from fractions import Fraction
+from functools import lru_cache
 
-from flint import arb
+from flint import arb, ctx
 
-from tubecert.recheck.balls import Ball, exact, larger, least_eigenvalue, root, smaller, spectral_norm
+from tubecert.recheck.balls import Ball, exact, larger, root, sharp_least, sharp_norm, smaller
 from tubecert.recheck.filtering import Distance, paper_kernel, tight_kernel
 from tubecert.recheck.system import System
 
+_BITS = 160  # of what is kept between conditions
 _RISES = 100
 _INFLATION = 1 + Fraction(1, 10**30)  # far above the rounding of the balls that it is used with
 _SETTLED = Fraction(1, 10**29)
@@ -118,11 +120,20 @@ def predictor(s: System, gains: Gains) -> Predictor:
         )
     if given is None:
         raise ValueError("an automatic predictor needs its gain")
-    A = [[exact(e) for e in row] for row in given]
-    n = len(A)
-    moved = [[e + (omega if i == j else 0) for j, e in enumerate(row)] for i, row in enumerate(A)]
-    Q = [[-(A[i][j] + A[j][i]) for j in range(n)] for i in range(n)]
-    return Predictor(spectral_norm(A), spectral_norm(moved), least_eigenvalue(Q))
+    return _matrix_predictor(tuple(map(tuple, given)), gains.bandwidth)
+
+
+@lru_cache(maxsize=256)
+def _matrix_predictor(given: tuple[tuple[Fraction, ...], ...], omega: Fraction) -> Predictor:
+    """The predictor of a general A_m."""
+    n = len(given)
+    with ctx.workprec(_BITS):
+        A = [[exact(e) for e in row] for row in given]
+        moved = [
+            [exact(e + (omega if i == j else 0)) for j, e in enumerate(row)] for i, row in enumerate(given)
+        ]
+        Q = [[exact(-(given[i][j] + given[j][i])) for j in range(n)] for i in range(n)]
+        return Predictor(sharp_norm(A), sharp_norm(moved), sharp_least(Q))
 
 
 def prediction_error(n: Numbers, R: Ball, s1: Ball, q: Ball) -> Ball:

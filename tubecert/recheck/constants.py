@@ -392,8 +392,8 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
 
 def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     s = place.system
-    if name in s.declared and s.declared[name] != limit:
-        return stated(False, f"it is not the declared {float(s.declared[name]):g}")
+    if name in s.declared and s.declared[name] > limit:
+        return stated(False, f"it is below the declared {float(s.declared[name]):g}")
     if s.h is None:
         return stated(name in s.declared, "it is neither declared nor derived")
     if name == "h_x":

@@ -1,0 +1,281 @@
+"""Recheck on certificates of every kind: starts, predictors, plans, projections, declared bounds, gains asked for."""
+
+import copy
+import json
+from fractions import Fraction
+
+import pytest
+from typer.testing import CliRunner
+
+from tubecert import certificate, pipeline, spec
+from tubecert.cli.app import app
+from tubecert.errors import ExitCode
+from tubecert.recheck.run import recheck
+
+BASE = """
+tubecert: 1
+name: small
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + y", "-y + 0.3*sin(x)"]
+  B: [[0], [1]]
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t) + 0.05*x"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+initial_state: {at: [0.05, 0]}
+metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+adaptation: {A_m: -10}
+"""
+TWO_INPUTS = """
+tubecert: 1
+name: two_inputs
+system:
+  states: [p, v, w]
+  inputs: [a, b]
+  f: ["-p + v", "-v + p*w", "-w"]
+  B: [[0, 0], [1, 0.5], ["0.2", 1]]
+safe_set: {p: [-0.5, 0.5], v: [-0.5, 0.5], w: [-0.5, 0.5]}
+uncertainty: {h: ["0.05*sin(t)", "0.02*cos(2*t)"]}
+trajectory: {kind: equilibrium, at: [0, 0, 0], input: [0, 0]}
+initial_state: {at: [0.02, 0, 0]}
+metric: {rate: 0.7, dual_metric: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+tube: {epsilon: 0.1, rho_a: 0.1}
+adaptation: {A_m: -10}
+"""
+
+
+def replaced(text, *changes):
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+H, START = 'h: ["0.1*sin(t) + 0.05*x"]', "initial_state: {at: [0.05, 0]}"
+PLAN, LOOP = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}", "A_m: -10"
+KINDS = {
+    "start within a radius": (BASE, (START, "initial_state: {within: 0.03}")),
+    "start on the plan": (BASE, (START, "initial_state: {at: [0, 0]}")),
+    "matrix A_m": (BASE, (LOOP, "A_m: [[-10, 1], [0, -12]]")),
+    "automatic A_m": (BASE, (LOOP, "A_m: auto")),
+    "smooth projection": (BASE, (LOOP, "A_m: -10, projection: {smooth: 0.1}")),
+    "declared bounds only": (BASE, (H, "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")),
+    "declared beside derived": (BASE, (H, H + ", bounds: {h: 0.2}")),
+    "an h with a kink": (BASE, (H, 'h: ["0.1*norm(x, y) + 0.05*abs(x)"]')),
+    "the paper's kernel": (BASE, (LOOP, LOOP + "}\nconditions: {kernel: paper")),
+    "declared bounds of the metric": (BASE, ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1.2}, ")),
+    "a plan of expressions": (
+        BASE,
+        (
+            PLAN,
+            'trajectory: {kind: expressions, x: ["0.1*sin(t)", "0.1*sin(t) + 0.1*cos(t)"], '
+            'u: ["0.2*cos(t) - 0.3*sin(0.1*sin(t))"], horizon: 3}',
+        ),
+        (START, "initial_state: {at: [0.05, 0.1]}"),
+    ),
+    "two inputs": (TWO_INPUTS,),
+    "two inputs, matrix A_m": (TWO_INPUTS, (LOOP, "A_m: [[-10, 1, 0], [0, -12, 0], [0, 2, -9]]")),
+}
+
+
+def certified(text, path="small.yaml", **options):
+    options = {"conditions": "all", **options}
+    system = spec.load_text(text, str(path))
+    return json.loads(
+        certificate.dump(certificate.seal(pipeline.certify(system, pipeline.Options(**options)), {}))
+    )
+
+
+def examine(document, budget=20_000):
+    return recheck(json.dumps(document), "certificate", budget)
+
+
+def failing(found):
+    return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_certificate_is_confirmed(kind):
+    text, *changes = KINDS[kind]
+    document = certified(replaced(text, *changes))
+    assert document["result"]["verdict"] == "certified", document["result"]["reasons"]
+    found = examine(document)
+    assert failing(found) == []
+    assert found.exit_code == ExitCode.CERTIFIED
+
+
+def claims_more(document):
+    """One claim after another made a little stronger than what is true."""
+    constants, metric = document["result"]["constants"], document["result"]["metric"]
+    for name in ("drift_on_plan", "feedback_gain", "h", "h_t", "initial_distance", "B"):
+        if constants[name]["above"] > 0:
+            constants[name]["above"] *= 0.98
+            constants[name]["below"] *= 0.9
+            yield name
+            constants[name]["above"] /= 0.98
+    metric["margin"][0] *= 4
+    metric["margin"][1] *= 5
+    yield "margin"
+
+
+@pytest.mark.parametrize("kind", ["start within a radius", "an h with a kink", "two inputs"])
+def test_no_kind_of_certificate_may_claim_more(kind):
+    text, *changes = KINDS[kind]
+    document = certified(replaced(text, *changes))
+    for name in claims_more(document):
+        document["hash"] = certificate.seal(document["result"], {})["hash"]
+        found = examine(document, 1_000)
+        assert found.exit_code in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED), name
+        assert failing(found), name
+
+
+def test_gains_that_were_asked_for():
+    enough = certified(BASE, bandwidth=Fraction(300), adaptation_rate=Fraction(10**12))
+    assert enough["result"]["verdict"] == "certified"
+    assert failing(examine(enough)) == []
+    little = certified(BASE, bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1), conditions="26")
+    assert little["result"]["verdict"] == "refuted"
+    assert examine(little).exit_code == ExitCode.NOT_CERTIFIED
+    section = enough["result"]["conditions_26"]
+    section["bandwidth"] = 2.0
+    enough["result"]["proof"]["conditions_26"]["bandwidth"] = enough["result"]["overrides"]["bandwidth"] = 2.0
+    enough["hash"] = certificate.seal(enough["result"], {})["hash"]
+    assert any("(26a)" in claim for claim, _ in failing(examine(enough)))
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict", "code"),
+    [
+        (("safe_set: {x: [-1, 1]", "safe_set: {x: [-0.2, 1]"), "refuted", ExitCode.NOT_CERTIFIED),
+        (("rate: 0.8", "rate: 1.4"), "refuted", ExitCode.NOT_CERTIFIED),
+        (("0.05*x", "500*y"), "undecided", ExitCode.UNDECIDED),
+    ],
+    ids=["the tube leaves the set", "the metric fails", "nothing found"],
+)
+def test_what_is_not_certified_is_never_certified(change, verdict, code):
+    document = certified(replaced(BASE, change))
+    assert document["result"]["verdict"] == verdict
+    found = examine(document)
+    assert found.exit_code == code
+    assert failing(found) == []
+
+
+def test_a_radius_is_proven_with_sharper_bounds_where_those_that_are_printed_fall_short():
+    """What is printed is rounded outward: rho may be a little less than it asks for, but not less than the truth."""
+    document = certified(BASE, conditions="distance")
+    needed = Fraction(str(document["result"]["tube"]["rho"]))
+    for factor, verdict in ((Fraction(100001, 100000), "confirmed"), (Fraction(98, 100), "contradicted")):
+        changed = copy.deepcopy(document)
+        result = changed["result"]
+        for name, side, scale in (("lower", "below", 0.999), ("upper", "above", 1.001)):
+            entry = result["constants"][name]
+            entry[side] *= scale
+            result["metric"][name] = [entry["below"], entry["above"]]
+        rho = needed * factor
+        result["tube"] |= {"rho": float(rho), "rho_r": float(rho - Fraction("0.1"))}
+        changed["hash"] = certificate.seal(result, {})["hash"]
+        (claim,) = [item for item in examine(changed).claims if item.name.startswith("rho = ")]
+        assert claim.outcome.verdict == verdict, claim
+
+
+# -- which file a certificate belongs to ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def files(tmp_path):
+    def write(text, **options):
+        path, target = tmp_path / "small.yaml", tmp_path / "small.certificate.json"
+        path.write_text(text, encoding="utf-8")
+        target.write_text(json.dumps(certified(text, path, **options)), encoding="utf-8")
+        return path, target
+
+    return write
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ["recheck", "-q", *map(str, arguments)])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("name: small", "name: other"), "name"),
+        (("adaptation:", "simulation: {duration: 3}\nadaptation:"), "simulation"),
+        (("adaptation:", "expect: {verdict: certified}\nadaptation:"), "expect"),
+        (("inputs: [u]", "inputs: [u]\n  units: {x: m}"), "system.units"),
+    ],
+)
+def test_what_no_claim_rests_on_makes_no_other_system(files, change, words):
+    path, target = files(BASE)
+    path.write_text(replaced(BASE, change), encoding="utf-8")
+    done = command(target, "--spec", path)
+    assert done.exit_code == 0, done.stderr
+    assert f"nothing rests on what differs: {words}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("0.3*sin", "0.31*sin"), "system"),
+        (("[-1, 1], y", "[-1, 1.1], y"), "safe_set"),
+        (("0.05*x", "0.06*x"), "uncertainty"),
+        (("0.05, 0", "0.051, 0"), "initial_state"),
+        (("rate: 0.8", "rate: 0.81"), "metric"),
+        (("epsilon: 0.2", "epsilon: 0.21"), "tube"),
+        (("A_m: -10", "A_m: -11"), "adaptation"),
+    ],
+)
+def test_what_claims_rest_on_makes_another_system(files, change, words):
+    path, target = files(BASE)
+    path.write_text(replaced(BASE, change), encoding="utf-8")
+    done = command(target, "--spec", path)
+    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert "TC604" in done.stderr
+    assert f"small.yaml: {words} differ" in " ".join(done.stderr.split())
+
+
+def test_what_the_command_line_replaced_is_said(files):
+    path, target = files(BASE, epsilon=Fraction("0.3"))
+    done = command(target, "--spec", path)
+    assert done.exit_code == 0, done.stderr
+    assert "with epsilon given on the command line" in done.stdout
+
+
+def test_a_synthesised_metric_belongs_to_the_file_that_asked_for_it(tmp_path):
+    text = replaced(
+        BASE,
+        ('metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}', "metric: {synthesise: {rate: 0.5}}"),
+    )
+    path = tmp_path / "small.yaml"
+    path.write_text(text, encoding="utf-8")
+    target = tmp_path / "out.json"
+    arguments = ["certify", str(path), "--conditions", "distance", "-q", "-o", str(target)]
+    made = CliRunner().invoke(app, arguments)
+    assert made.exit_code == 0, made.output
+    done = command(target, "--spec", path)
+    assert done.exit_code == 0, done.output
+    assert "the metric was synthesised for it" in done.stdout
+    path.write_text(text.replace("0.3*sin", "0.4*sin"), encoding="utf-8")
+    assert "TC604" in command(target, "--spec", path).stderr
+
+
+def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
+    rows = ["t,x,y,u", "0,0,0,0", "1,0,0,0", "2,0,0,0"]
+    plan = tmp_path / "plan.csv"
+    plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    path, target = tmp_path / "small.yaml", tmp_path / "small.certificate.json"
+    text = replaced(BASE, (PLAN, "trajectory: {kind: csv, file: plan.csv, interpolation: hold}"))
+    path.write_text(text, encoding="utf-8")
+    options = pipeline.Options(conditions="distance")
+    result = pipeline.certify(spec.load(path), options)
+    assert result["verdict"] == "certified", result["reasons"]
+    target.write_text(certificate.dump(certificate.seal(result, {})), encoding="utf-8")
+    assert command(target, "--spec", path).exit_code == 0
+    plan.write_text("\n".join(rows).replace("1,0,0,0", "1.0,0,0,0") + "\n", encoding="utf-8")
+    assert command(target, "--spec", path).exit_code == 0
+    plan.write_text("\n".join(rows).replace("1,0,0,0", "1,0,0,0.01") + "\n", encoding="utf-8")
+    done = command(target, "--spec", path)
+    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert "the knots of plan.csv" in " ".join(done.stderr.split())
