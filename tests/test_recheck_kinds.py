@@ -150,9 +150,9 @@ def test_gains_that_were_asked_for():
     [
         (("safe_set: {x: [-1, 1]", "safe_set: {x: [-0.2, 1]"), "refuted", ExitCode.NOT_CERTIFIED),
         (("rate: 0.8", "rate: 1.4"), "refuted", ExitCode.NOT_CERTIFIED),
-        (("0.05*x", "500*y"), "undecided", ExitCode.UNDECIDED),
+        (("metric: {", "metric: {bounds: {lower: 0.4, upper: 1}, "), "refuted", ExitCode.NOT_CERTIFIED),
     ],
-    ids=["the tube leaves the set", "the metric fails", "nothing found"],
+    ids=["the tube leaves the set", "the metric fails", "declared bounds of the metric fail"],
 )
 def test_what_is_not_certified_is_never_certified(change, verdict, code):
     document = certified(replaced(BASE, change))
@@ -160,6 +160,12 @@ def test_what_is_not_certified_is_never_certified(change, verdict, code):
     found = examine(document)
     assert found.exit_code == code
     assert failing(found) == []
+
+
+def test_what_was_left_undecided_stays_so():
+    document = certified(BASE, formulas="as-printed")
+    assert document["result"]["verdict"] == "undecided"
+    assert examine(document).exit_code == ExitCode.UNDECIDED
 
 
 def test_a_radius_is_proven_with_sharper_bounds_where_those_that_are_printed_fall_short():

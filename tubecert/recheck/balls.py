@@ -16,6 +16,7 @@ Balls = list[list[arb]]  # a matrix
 
 _SQUARINGS = 7  # of a matrix, to propose its largest eigenvalue: its power of 2^7
 _HALVINGS = 120
+_NUDGE = 2.0**-30
 _INFLATIONS = (1e-13, 1e-10, 1e-7, 1e-4, 1e-2)
 
 
@@ -117,8 +118,16 @@ def is_positive(a: Balls) -> bool:
 
 
 def is_indefinite(a: Balls) -> bool:
-    """Whether a symmetric matrix is proven to have a negative eigenvalue."""
-    return bool(pivots(a)[-1] < 0)
+    """Whether a symmetric matrix is proven to have a negative eigenvalue.
+
+    Where a pivot is near zero, a little is added to the diagonal: that makes no eigenvalue smaller.
+    """
+    if pivots(a)[-1] < 0:
+        return True
+    more = max(abs(float(x.mid())) for row in a for x in row) * _NUDGE
+    return math.isfinite(more) and bool(
+        pivots([[x + more if i == j else x for j, x in enumerate(row)] for i, row in enumerate(a)])[-1] < 0
+    )
 
 
 def spectral_norm(a: Balls) -> arb:

@@ -67,16 +67,22 @@ class Expansion:
 
     def corners(self) -> Iterator[list[Ball]]:
         """The polynomial at vertices whose hull contains all its values."""
-        ends = [_CURVED if i in self.squares else _STRAIGHT for i in range(len(self.steps))]
-        for vertex in product(*ends):
-            corner = self.value
-            for i, (d, s) in enumerate(vertex):
-                corner = _added(corner, d, self.steps[i])
-                if s:
-                    corner = _added(corner, s, self.squares[i])
-            for (i, j), bend in self.mixed.items():
-                corner = _added(corner, vertex[i][0] * vertex[j][0], bend)
-            yield corner
+        yield from self._corners(0, self.value, self.steps)
+
+    def _corners(self, i: int, value: list[Ball], steps: list[list[Ball]]) -> Iterator[list[Ball]]:
+        """Variable i at each of its vertices; its products with later ones become a part of their steps."""
+        if i == len(steps):
+            yield value
+            return
+        for d, s in _CURVED if i in self.squares else _STRAIGHT:
+            corner = _added(value, d, steps[i])
+            if s:
+                corner = _added(corner, s, self.squares[i])
+            later = [
+                _added(step, d, self.mixed[i, j]) if (i, j) in self.mixed else step
+                for j, step in enumerate(steps)
+            ]
+            yield from self._corners(i + 1, corner, later)
 
     def ranges(self) -> list[Ball]:
         """An enclosure of every entry."""

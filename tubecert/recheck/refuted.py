@@ -18,7 +18,9 @@ from tubecert.recheck.curve import Segment
 from tubecert.recheck.document import Node, digest
 from tubecert.recheck.gains import SECTIONS, is_certified
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.terms import Program, Rows, scaled, times, turned
+from tubecert.recheck.terms import Matrix, Program, Rows, plus, scaled, times, turned, unit_matrix
+
+_DECLARED = "declared bounds of the metric"
 
 
 def of_others(case: Case) -> Iterator[Claim]:
@@ -40,10 +42,12 @@ def of_others(case: Case) -> Iterator[Claim]:
 
 def _refutation(case: Case, name: str, reason: Node) -> Outcome:
     s, at = case.system, reason.get("at")
-    if name.startswith("metric, ") and at is not None:
+    if (name.startswith("metric, ") or name == _DECLARED) and at is not None:
         point = [exact(value) for value in at["x"].numbers()]
         if len(point) != len(s.states) or not _inside(case, point):
             return metric.stated(False, "the witness does not lie in the safe set")
+        if name == _DECLARED:
+            return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
         if name == "metric, C1":
             return _if(is_indefinite(_value(case, s.W, point)))
         if name == "metric, C2":
@@ -60,6 +64,22 @@ def _refutation(case: Case, name: str, reason: Node) -> Outcome:
     if section in SECTIONS:
         return _gains_fail(case, case.result[section])
     return Outcome(verdict="undecided", why="refutations of this kind are not examined")
+
+
+def _declared_bounds(case: Case) -> list[Matrix]:
+    """Matrices that are positive semidefinite where the declared bounds of M hold: I/a - W and A W - I."""
+    bounds, s = case.effective["metric"].get("bounds"), case.system
+    if bounds is None:
+        return []
+    eye, found = unit_matrix(len(s.states)), []
+    lower, upper = (
+        None if (node := bounds.get(key)) is None else node.number() for key in ("lower", "upper")
+    )
+    if lower is not None and lower > 0:
+        found.append(plus(scaled(1 / lower, eye), s.W, -1))
+    if upper is not None:
+        found.append(plus(scaled(upper, s.W), eye, -1))
+    return found
 
 
 def _if(holds: bool) -> Outcome:
