@@ -133,6 +133,7 @@ def test_every_page_has_meaning_formula_and_source(topic):
     assert max(map(len, page.text().splitlines())) <= 130
     if isinstance(page, pages.CodePage):
         assert page.wrong != page.right
+        assert "\\" not in page.text()  # an escape of TOML that no quotes resolved
         assert f"Right:\n    {page.right.splitlines()[0]}" in run("explain", topic).stdout
 
 
