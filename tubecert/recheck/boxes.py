@@ -18,7 +18,8 @@ from typing import Protocol
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, magnitude
-from tubecert.recheck.terms import NOUGHT, Program, Term, in_order, names, slopes
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import NOUGHT, Term, in_order, names, slopes
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]

@@ -15,11 +15,13 @@ from flint import ctx
 
 from tubecert.recheck import consistency, gains, geodesics, metric, start
 from tubecert.recheck.balls import exact
-from tubecert.recheck.conditions import USED, Gains, Numbers, Setting
-from tubecert.recheck.constants import OVER_TUBE, Place, bounded, contained, half_width
+from tubecert.recheck.conditions import USED, Numbers, Setting
+from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import Node, digest
+from tubecert.recheck.place import Place
+from tubecert.recheck.predictor import Gains
 from tubecert.recheck.system import TIME, Duty, System, read_curve, read_system
 
 _BITS = 64  # for boxes

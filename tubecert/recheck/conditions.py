@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from fractions import Fraction
-from functools import lru_cache
 
-from flint import arb, ctx
+from flint import arb
 
-from tubecert.recheck.balls import Ball, exact, larger, root, sharp_least, sharp_norm, smaller
+from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.filtering import Distance, paper_kernel, tight_kernel
+from tubecert.recheck.predictor import Gains, predictor
 from tubecert.recheck.system import System
 
-_BITS = 160  # of what is kept between conditions
 _RISES = 100
 _INFLATION = 1 + Fraction(1, 10**30)  # far above the rounding of the balls that it is used with
 _SETTLED = Fraction(1, 10**29)
@@ -79,61 +78,6 @@ class Setting:
         """R_H >= sqrt(1 + nu) Dh; R_H >= Dh where the estimate is clipped."""
         layer = Fraction(0) if clipped or self.system.smooth is None else self.system.smooth
         return R_H > 0 and bool(exact(R_H * R_H) >= exact(1 + layer) * self.n.h * self.n.h)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gains:
-    """The gains of A and B: omega, Gamma, the g of A_m = -g I (None: the matrix of the specification), R_H."""
-
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction | None
-    projection_radius: Fraction
-
-    @property
-    def sensible(self) -> bool:
-        """Whether all are positive."""
-        return min(self.bandwidth, self.adaptation_rate, self.projection_radius, self.predictor_gain or 1) > 0
-
-
-@dataclass(frozen=True, slots=True)
-class Predictor:
-    """|A_m|, |A_m + omega I| and lmin(Q), Q = -(A_m + A_m')."""
-
-    norm: Ball
-    shifted: Ball
-    q: Ball
-
-
-def predictor(s: System, gains: Gains) -> Predictor:
-    """The predictor of the loop; not numbers if the gains name another one than the specification."""
-    omega, given, g = exact(gains.bandwidth), s.A_m, gains.predictor_gain
-    if g is not None:
-        same = given is None or all(
-            e == (-g if i == j else 0) for i, row in enumerate(given) for j, e in enumerate(row)
-        )
-        nothing = arb("nan")
-        return (
-            Predictor(exact(g), abs(omega - exact(g)), exact(2 * g))
-            if same
-            else Predictor(nothing, nothing, nothing)
-        )
-    if given is None:
-        raise ValueError("an automatic predictor needs its gain")
-    return _matrix_predictor(tuple(map(tuple, given)), gains.bandwidth)
-
-
-@lru_cache(maxsize=256)
-def _matrix_predictor(given: tuple[tuple[Fraction, ...], ...], omega: Fraction) -> Predictor:
-    """The predictor of a general A_m."""
-    n = len(given)
-    with ctx.workprec(_BITS):
-        A = [[exact(e) for e in row] for row in given]
-        moved = [
-            [exact(e + (omega if i == j else 0)) for j, e in enumerate(row)] for i, row in enumerate(given)
-        ]
-        Q = [[exact(-(given[i][j] + given[j][i])) for j in range(n)] for i in range(n)]
-        return Predictor(sharp_norm(A), sharp_norm(moved), sharp_least(Q))
 
 
 def prediction_error(n: Numbers, R: Ball, s1: Ball, q: Ball) -> Ball:
@@ -214,7 +158,7 @@ def _error(setting: Setting, gains: Gains, Y: Ball) -> Ball:
     return gain * Dxt / root(exact(gains.adaptation_rate))
 
 
-def _speed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
+def speed_needed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
     """phi + DB [du dbar + min(Dh + R_H, error)]."""
     n = setting.n
     return n.drift_on_plan + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
@@ -229,7 +173,7 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
     if not (
         (n.h_t + n.h_x * Y) / omega <= S
         and _error(setting, gains, Y) <= e
-        and _speed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y
+        and speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y
     ):
         return None
     return Distance(
@@ -251,9 +195,9 @@ def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
 
     def needed(Y: Ball) -> Ball:
         S, e = (n.h_t + n.h_x * Y) / omega, _error(setting, gains, Y)
-        return _speed(setting, gains.projection_radius, larger(n.h_initial, S) + e)
+        return speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e)
 
-    Y = _risen(needed)
+    Y = risen(needed)
     more = exact(_INFLATION)
     return DistanceProof(
         speed=Y,
@@ -262,7 +206,7 @@ def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
     )
 
 
-def _risen(needed: Callable[[Ball], Ball]) -> Ball:
+def risen(needed: Callable[[Ball], Ball]) -> Ball:
     """A number just above the least fixed point of a rising function: iterated, extrapolated, inflated; a proposal."""
     Y = arb(0)
     for _ in range(_RISES):
@@ -283,68 +227,3 @@ def _risen(needed: Callable[[Ball], Ball]) -> Ball:
 def margin(setting: Setting, supremum: Ball) -> Ball:
     """(dbar - sup)/dbar."""
     return 1 - supremum / setting.reach
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampledGains:
-    """The gains of C: Ts, omega, g, R_H."""
-
-    sample_time: Fraction
-    bandwidth: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
-
-    @property
-    def sensible(self) -> bool:
-        """Whether all are positive."""
-        return min(self.sample_time, self.bandwidth, self.predictor_gain, self.projection_radius) > 0
-
-
-@dataclass(frozen=True, slots=True)
-class _Sampled:
-    H1: Ball
-    S_T: Ball
-    d1: Ball
-
-
-def _sampled(setting: Setting, gains: SampledGains, Y: Ball) -> _Sampled:
-    """H1, S_T, d1 of (4.6)-(4.9) at one Y."""
-    n, lam = setting.n, setting.rate
-    Ts, omega, g = exact(gains.sample_time), exact(gains.bandwidth), exact(gains.predictor_gain)
-    s1 = n.h_t + n.h_x * Y
-    b = smaller(n.B_pinv * n.B_x, n.B_pinv_x * n.B) * n.h
-    m = smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
-    H1 = smaller(n.h, n.h_initial + s1 * Ts)
-    S_T = s1 * Ts / (-(-omega * Ts).expm1()) + m * (s1 + b * Y)
-    share = -(-lam * Ts).expm1()
-    d1 = n.initial_distance * (1 - share) + (n.metric_input_gain * H1 + n.plan_defect_metric) * share / lam
-    return _Sampled(H1, S_T, d1)
-
-
-def sampled_margin(setting: Setting, gains: SampledGains, speed: Ball | None) -> tuple[Ball, Ball]:
-    """The margin of theorem C at Y = `speed` (None: the least one), and the ultimate radius; not numbers if Y fails."""
-    n, nothing = setting.n, (arb("nan"), arb("nan"))
-    if not gains.sensible or not setting.radius_serves(gains.projection_radius, clipped=True):
-        return nothing
-
-    def needed(Y: Ball) -> Ball:
-        state = _sampled(setting, gains, Y)
-        return _speed(setting, gains.projection_radius, larger(state.H1, state.S_T))
-
-    Y = _risen(needed) if speed is None else speed
-    if not needed(Y) < Y:
-        return nothing
-    state = _sampled(setting, gains, Y)
-    bound = Distance(
-        d0=state.d1,
-        beta=n.metric_input_gain,
-        H0=state.H1,
-        S=state.S_T,
-        e=arb(0),
-        delta=n.plan_defect_metric,
-        rate=setting.rate,
-        omega=exact(gains.bandwidth),
-        horizon=setting.horizon,
-    )
-    top = larger(larger(n.initial_distance, state.d1), bound.supremum())
-    return margin(setting, top), bound.ultimate() / root(n.lower)

@@ -16,7 +16,8 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Field
-from tubecert.recheck.terms import Program, Term, names, number, replaced, slopes, variable
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import Term, names, number, replaced, slopes, variable
 
 CLOCK = "s#"  # no state can have this name
 Ends = list[tuple[float, float]]

@@ -13,19 +13,18 @@ from flint import arb
 from tubecert.recheck.balls import Ball, exact, root
 from tubecert.recheck.conditions import (
     DistanceProof,
-    Gains,
-    SampledGains,
     Setting,
     derived,
     distance_bound,
     margin,
     margins_26,
     own_distance_proof,
-    sampled_margin,
 )
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node, wrong
 from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.predictor import Gains
+from tubecert.recheck.sampling import SampledGains, sampled_margin
 from tubecert.recheck.system import System
 
 SECTIONS = ("conditions_26", "distance", "sampled")

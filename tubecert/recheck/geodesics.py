@@ -14,9 +14,9 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact, spectral_norm
 from tubecert.recheck.boxes import Box, Field, Found
-from tubecert.recheck.constants import Place
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.metric import stated, together
+from tubecert.recheck.place import Place
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import all_zero, matrix_slopes
 

@@ -14,13 +14,13 @@ from flint import arb
 from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
 from tubecert.recheck.identity import vanish
+from tubecert.recheck.program import Program
 from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.system import TIME, Duty, System, along
 from tubecert.recheck.terms import (
     NOUGHT,
     UNIT,
     Matrix,
-    Program,
     Rows,
     Term,
     in_order,

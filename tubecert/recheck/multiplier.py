@@ -16,9 +16,10 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, magnitude
 from tubecert.recheck.boxes import Box, Found
-from tubecert.recheck.constants import Place
 from tubecert.recheck.cover import Outcome, prove
-from tubecert.recheck.terms import NOUGHT, Program, Term, names, number, slopes, variable
+from tubecert.recheck.place import Place
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import NOUGHT, Term, names, number, slopes, variable
 
 _ASCENTS = 60
 

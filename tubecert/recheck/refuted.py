@@ -18,7 +18,8 @@ from tubecert.recheck.curve import Segment
 from tubecert.recheck.document import Node, digest
 from tubecert.recheck.gains import SECTIONS, is_certified
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.terms import Matrix, Program, Rows, plus, scaled, times, turned, unit_matrix
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
 _DECLARED = "declared bounds of the metric"
 

@@ -11,13 +11,14 @@ from fractions import Fraction
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root
-from tubecert.recheck.constants import Place
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
 from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
+from tubecert.recheck.place import Place
+from tubecert.recheck.program import Program
 from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.system import TIME, System
-from tubecert.recheck.terms import NOUGHT, Program, Term, matrix_replaced, matrix_slopes, number, variable
+from tubecert.recheck.terms import NOUGHT, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube
 
 _PIECES = (1, 16, 128, 1024, 4096)

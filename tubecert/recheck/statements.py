@@ -12,7 +12,8 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, Balls, exact, is_indefinite, is_positive, spectral_norm, whitening
 from tubecert.recheck.boxes import Box, Field, Found, Values
-from tubecert.recheck.terms import Program, Rows, Term
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import Rows, Term
 
 
 class NormsBelow:

@@ -11,10 +11,7 @@ from fractions import Fraction
 from itertools import count
 from weakref import WeakValueDictionary
 
-from flint import arb
-
 from tubecert.expression import Expression, topological
-from tubecert.recheck.balls import Ball, between, exact, length, power
 
 Rows = Sequence[Sequence["Term"]]
 Matrix = list[list["Term"]]
@@ -38,7 +35,7 @@ class Term:
 
     def __add__(self, other: Term) -> Term:
         if self.op == other.op == "const":
-            return number(_number(self) + _number(other))
+            return number(number_of(self) + number_of(other))
         if self is NOUGHT:
             return other
         if other is NOUGHT:
@@ -47,7 +44,7 @@ class Term:
 
     def __mul__(self, other: Term) -> Term:
         if self.op == other.op == "const":
-            return number(_number(self) * _number(other))
+            return number(number_of(self) * number_of(other))
         if NOUGHT in (self, other):
             return NOUGHT
         if self is UNIT:
@@ -63,8 +60,8 @@ class Term:
         return NOUGHT if self is other else self + (-other)
 
     def __truediv__(self, other: Term) -> Term:
-        if other.op == "const" and _number(other) != 0:
-            return self * number(1 / _number(other))
+        if other.op == "const" and number_of(other) != 0:
+            return self * number(1 / number_of(other))
         return NOUGHT if self is NOUGHT else _make("div", self, other)
 
     def raised(self, exponent: int) -> Term:
@@ -72,7 +69,7 @@ class Term:
         if exponent in (0, 1):
             return self if exponent else UNIT
         if self.op == "const" and (exponent > 0 or self is not NOUGHT):
-            return number(_number(self) ** exponent)
+            return number(number_of(self) ** exponent)
         return _make("pow", self, value=exponent)
 
 
@@ -80,7 +77,8 @@ def _age(term: Term) -> int:
     return term.serial
 
 
-def _number(term: Term) -> Fraction:
+def number_of(term: Term) -> Fraction:
+    """The number that a constant term is."""
     assert isinstance(term.value, Fraction)
     return term.value
 
@@ -249,67 +247,3 @@ def unit_matrix(n: int) -> Matrix:
 def all_zero(a: Rows) -> bool:
     """Whether every entry is the constant 0."""
     return all(e is NOUGHT for row in a for e in row)
-
-
-class Program:
-    """Terms as a straight line of steps, run on balls."""
-
-    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
-        order = in_order(outputs)
-        place = {term: k for k, term in enumerate(order)}
-        column = {name: k for k, name in enumerate(inputs)}
-        self._start: list[arb] = [arb(0)] * len(order)
-        self._inputs: list[tuple[int, int]] = []
-        self._steps: list[tuple[int, Callable[[list[arb], int], arb] | str, list[int], int]] = []
-        for k, term in enumerate(order):
-            if term.op == "const":
-                self._start[k] = exact(_number(term))
-            elif term.op == "pi":
-                self._start[k] = arb.pi()
-            elif term.op == "symbol":
-                self._inputs.append((k, column[str(term.value)]))
-            else:
-                index = term.value if isinstance(term.value, int) else 0
-                kernel = term.op if term.op in ("add", "mul") else _KERNELS[term.op]
-                self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
-        self._outputs = [place[term] for term in outputs]
-
-    def __len__(self) -> int:
-        """The number of outputs."""
-        return len(self._outputs)
-
-    def run(self, values: Sequence[Ball]) -> list[Ball]:
-        """Enclosures of the outputs."""
-        memory = self._start.copy()
-        for k, column in self._inputs:
-            memory[k] = values[column]
-        for k, kernel, args, index in self._steps:
-            if kernel == "mul":
-                memory[k] = memory[args[0]] * memory[args[1]]
-            elif kernel == "add":
-                memory[k] = memory[args[0]] + memory[args[1]]
-            else:
-                assert not isinstance(kernel, str)
-                memory[k] = kernel([memory[i] for i in args], index)
-        return [memory[k] for k in self._outputs]
-
-
-def _direction(args: list[Ball], index: int) -> Ball:
-    size = length(args)
-    if not size > 0:
-        return between(-1, 1)
-    value = args[index] / size
-    return value.intersection(between(-1, 1)) if value.overlaps(between(-1, 1)) else value
-
-
-_KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
-    "div": lambda a, _: a[0] / a[1],
-    "pow": lambda a, n: power(a[0], n),
-    "sqrt": lambda a, _: a[0].sqrt(),
-    "sin": lambda a, _: a[0].sin(),
-    "cos": lambda a, _: a[0].cos(),
-    "tan": lambda a, _: a[0].tan(),
-    "exp": lambda a, _: a[0].exp(),
-    "norm": lambda a, _: length(a),
-    "direction": _direction,
-}

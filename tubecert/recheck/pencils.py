@@ -1,0 +1,182 @@
+"""Statements about pencils over boxes: slopes of M, the feedback gain, the least gain of the inputs.
+
+Implements: theory (2.4), (2.7), (2.8). Weights and shares are proposed at the centre of each box; that they serve is
+proven on all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from flint import arb, arb_mat
+
+from tubecert.recheck.balls import Ball, exact, is_indefinite, is_positive, spectral_norm
+from tubecert.recheck.boxes import Box, Field, Found
+from tubecert.recheck.program import Program
+from tubecert.recheck.statements import PositiveDefinite
+from tubecert.recheck.system import System
+from tubecert.recheck.terms import Rows, number, plus, variable
+
+MU, _CURVE_MU, _LINE_MU = "mu#", "p#", "q#"  # no state can have these names
+
+
+class SlopesBelow:
+    """The sum of the largest |eigenvalues| of the pencils (N_k, D) is at most `limit`.
+
+    The share of each N_k is proposed at the centre of the box; that it serves is proven: share D +- N_k > 0.
+    """
+
+    def __init__(self, matrices: Sequence[Rows], D: Rows, limit: Fraction) -> None:
+        self._limit = exact(limit)
+        self._values = {"share#": arb(0)}
+        share = variable("share#")
+        tests = []
+        for N in matrices:
+            for sign in (1, -1):
+                S = [
+                    [share * d + number(sign) * e for d, e in zip(dr, nr, strict=True)]
+                    for dr, nr in zip(D, N, strict=True)
+                ]
+                tests.append(PositiveDefinite(S, D, self._values))
+        self.variables = tuple(sorted({v for test in tests for v in test.variables}))
+        self._tests = [(test, [self.variables.index(v) for v in test.variables]) for test in tests]
+
+    def over(self, box: Box) -> Found:
+        """Every share on the whole box."""
+        at = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
+        least = [self._least(k, at) for k in range(len(self._tests) // 2)]
+        rest = self._limit - sum(least, start=arb(0))
+        total = sum(least, start=arb(0))
+        caused, spread = [hi - lo for lo, hi in box], [hi - lo for lo, hi in box]
+        if not rest > 0:
+            return Found(False, caused, spread)
+        for k, value in enumerate(least):
+            even = arb(1) / len(least) if len(least) == 1 or not total > 0 else value / total
+            share = (value + rest * even).lower()
+            for test, columns in self._tests[2 * k : 2 * k + 2]:
+                own = test.with_values({"share#": share})
+                found = own.over([box[i] for i in columns])
+                if not found.proven:
+                    for c, i in enumerate(columns):
+                        caused[i], spread[i] = found.caused[c], found.spread[c]
+                    return Found(False, caused, spread)
+        return Found(True)
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """Whether one matrix alone takes more than the limit."""
+        return any(
+            test.with_values({"share#": self._limit}).broken([point[i] for i in columns])
+            for test, columns in self._tests
+        )
+
+    def _least(self, k: int, at: Sequence[Ball]) -> Ball:
+        """About the least share of one matrix at a point: by bisection, a proposal."""
+        low, high = 0.0, float(self._limit)
+        for _ in range(30 if len(self._tests) > 2 else 0):
+            middle = 0.5 * (low + high)
+            box_tests = self._tests[2 * k : 2 * k + 2]
+            serves = not any(
+                test.with_values({"share#": arb(middle)}).broken([at[i] for i in columns])
+                for test, columns in box_tests
+            )
+            low, high = (low, middle) if serves else (middle, high)
+        return arb(low)
+
+
+class GainBelow:
+    """t (B B'/mu + mu W) - F > 0 on boxes of states and mu; 1/mu is replaced by a tangent, which lies below it."""
+
+    def __init__(self, s: System, limit: Fraction) -> None:
+        mu, p, q = (variable(name) for name in (MU, _CURVE_MU, _LINE_MU))
+        inverse = q - mu * p  # 2/m - mu/m^2 <= 1/mu
+        bound = [
+            [number(limit) * (inverse * b + mu * w) for b, w in zip(br, wr, strict=True)]
+            for br, wr in zip(s.BBt, s.W, strict=True)
+        ]
+        unit = [
+            [q * b + w / q for b, w in zip(br, wr, strict=True)] for br, wr in zip(s.BBt, s.W, strict=True)
+        ]
+        self._test = PositiveDefinite(plus(bound, s.F, -1), unit, _tangent(1.0))
+        self.variables = self._test.variables
+        self._place = self.variables.index(MU) if MU in self.variables else None
+        centre = [exact((lo + hi) / 2) for lo, hi in (s.safe_set[name] for name in s.states)]
+        entries = Program([e for row in s.W for e in row], s.states).run(centre)
+        self._size = float(limit) * sum(abs(float(e.mid())) for e in entries)
+
+    def over(self, box: Box) -> Found:
+        """With the tangent at the geometric middle of mu."""
+        if self._place is None:
+            return self._test.over(box)
+        lo, hi = box[self._place]
+        low = max(lo, 0.0)
+        middle = (low * hi) ** 0.5 if low > 0 else hi
+        found = self._test.with_values(_tangent(middle)).over(
+            [*box[: self._place], (low, hi), *box[self._place + 1 :]]
+        )
+        if not found.proven and hi > low:  # the gap of the tangent, where B B'/mu and mu W are of one size
+            ratio = (hi - middle) / middle if low > 0 else 1.0
+            found.caused[self._place] = ratio**2 * middle * self._size
+        return found
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """At a point the tangent at mu itself is exact."""
+        if self._place is None:
+            return self._test.broken(point)
+        mu = float(point[self._place])
+        return mu > 0 and self._test.with_values(_tangent(mu)).broken(
+            [*point[: self._place], arb(mu), *point[self._place + 1 :]]
+        )
+
+
+def _tangent(m: float) -> dict[str, Ball]:
+    return {_CURVE_MU: 1 / (arb(m) * arb(m)), _LINE_MU: 2 / arb(m)}
+
+
+class LeastGain:
+    """smin(Theta B) >= limit: for any G, u'B'M B u >= |G B u|^2/lmax(G W G'); G is taken from the centre of the box."""
+
+    def __init__(self, s: System, limit: Fraction) -> None:
+        self._n, self._m = len(s.states), len(s.inputs)
+        self._field = Field([*(e for row in s.W for e in row), *(e for row in s.B for e in row)])
+        self.variables = self._field.variables
+        self._square = exact(limit**2)
+
+    def over(self, box: Box) -> Found:
+        """(G B)'(G B)/limit^2 >= lmax(G W G') on the box."""
+        W, B = self._matrices(self._field.hull(box))
+        wide = [hi - lo for lo, hi in box]
+        G = self._weights([arb(0.5 * lo + 0.5 * hi) for lo, hi in box])
+        if G is None:
+            return Found(False, wide, wide)
+        top = spectral_norm((G * W * G.transpose()).tolist())
+        image = G * B
+        gram = (image.transpose() * image).tolist()
+        for i in range(self._m):
+            gram[i][i] = gram[i][i] - top * self._square
+        return Found(is_positive(gram), wide, wide)
+
+    def broken(self, point: Sequence[Ball]) -> bool:
+        """B'M B - limit^2 at a point."""
+        W, B = self._matrices(self._field.at(point))
+        try:
+            gram = (B.transpose() * W.solve(B)).tolist()
+        except ZeroDivisionError:
+            return False
+        for i in range(self._m):
+            gram[i][i] = gram[i][i] - self._square
+        return is_indefinite(gram)
+
+    def _matrices(self, entries: Sequence[Ball]) -> tuple[arb_mat, arb_mat]:
+        split = self._n * self._n
+        return arb_mat(self._n, self._n, entries[:split]), arb_mat(self._n, self._m, entries[split:])
+
+    def _weights(self, centre: Sequence[Ball]) -> arb_mat | None:
+        """(B'M B)^-1 B'M at a point, rounded to floats."""
+        W, B = self._matrices(self._field.at(centre))
+        try:
+            half = W.solve(B)
+            G = (B.transpose() * half).solve(half.transpose())
+        except ZeroDivisionError:
+            return None
+        return arb_mat([[float(x.mid()) for x in row] for row in G.tolist()])

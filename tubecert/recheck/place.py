@@ -1,0 +1,59 @@
+"""Where claims are examined: the tube around the plan, or the plan itself, part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball
+from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.curve import CLOCK, Curve
+from tubecert.recheck.metric import time_range, together
+from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
+from tubecert.recheck.system import TIME, System
+from tubecert.recheck.terms import Matrix, Rows, matrix_replaced
+from tubecert.recheck.tube import Tube
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A system with its plan and radius; `budget` boxes for each claim."""
+
+    system: System
+    curve: Curve
+    rho: Fraction
+    budget: int
+
+    def tube(self, extra: dict[str, tuple[Fraction, Fraction]] | None = None) -> Tube:
+        """O(rho), with the times that matter for h."""
+        s = self.system
+        time = time_range(s)
+        free = {**(extra or {}), **({} if time is None else {TIME: time})}
+        return Tube(self.curve, self.rho, s.states, s.inputs, free)
+
+    def on_plan(self, rows: Rows) -> Matrix:
+        """A matrix along the plan."""
+        s = self.system
+        return matrix_replaced(
+            rows, dict(zip((*s.states, *s.inputs), (*self.curve.x, *self.curve.u), strict=True))
+        )
+
+    def along(self, test: Callable[[], NormsBelow | PositiveDefinite | NotNegative]) -> Outcome:
+        """A test in s on every part of the plan."""
+        whole = test()
+        outcomes: list[Outcome] = []
+        for part in self.curve.parts:
+            own = whole.with_values(part.values)
+            domain = Boxed({CLOCK: (arb(0), part.length)})
+            outcomes.append(prove(own, domain, self.budget))
+            if not outcomes[-1].holds:
+                break
+        return together(outcomes)
+
+    @property
+    def numbers(self) -> dict[str, Ball]:
+        """The numbers of one part, for a test that is made once for all of them."""
+        return self.curve.parts[0].values

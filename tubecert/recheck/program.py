@@ -1,0 +1,74 @@
+"""Terms as straight lines of steps on balls, and the kernels of the operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, between, exact, length, power
+from tubecert.recheck.terms import Term, in_order, number_of
+
+
+class Program:
+    """Terms as a straight line of steps, run on balls."""
+
+    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
+        order = in_order(outputs)
+        place = {term: k for k, term in enumerate(order)}
+        column = {name: k for k, name in enumerate(inputs)}
+        self._start: list[arb] = [arb(0)] * len(order)
+        self._inputs: list[tuple[int, int]] = []
+        self._steps: list[tuple[int, Callable[[list[arb], int], arb] | str, list[int], int]] = []
+        for k, term in enumerate(order):
+            if term.op == "const":
+                self._start[k] = exact(number_of(term))
+            elif term.op == "pi":
+                self._start[k] = arb.pi()
+            elif term.op == "symbol":
+                self._inputs.append((k, column[str(term.value)]))
+            else:
+                index = term.value if isinstance(term.value, int) else 0
+                kernel = term.op if term.op in ("add", "mul") else _KERNELS[term.op]
+                self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
+        self._outputs = [place[term] for term in outputs]
+
+    def __len__(self) -> int:
+        """The number of outputs."""
+        return len(self._outputs)
+
+    def run(self, values: Sequence[Ball]) -> list[Ball]:
+        """Enclosures of the outputs."""
+        memory = self._start.copy()
+        for k, column in self._inputs:
+            memory[k] = values[column]
+        for k, kernel, args, index in self._steps:
+            if kernel == "mul":
+                memory[k] = memory[args[0]] * memory[args[1]]
+            elif kernel == "add":
+                memory[k] = memory[args[0]] + memory[args[1]]
+            else:
+                assert not isinstance(kernel, str)
+                memory[k] = kernel([memory[i] for i in args], index)
+        return [memory[k] for k in self._outputs]
+
+
+def _direction(args: list[Ball], index: int) -> Ball:
+    size = length(args)
+    if not size > 0:
+        return between(-1, 1)
+    value = args[index] / size
+    return value.intersection(between(-1, 1)) if value.overlaps(between(-1, 1)) else value
+
+
+_KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
+    "div": lambda a, _: a[0] / a[1],
+    "pow": lambda a, n: power(a[0], n),
+    "sqrt": lambda a, _: a[0].sqrt(),
+    "sin": lambda a, _: a[0].sin(),
+    "cos": lambda a, _: a[0].cos(),
+    "tan": lambda a, _: a[0].tan(),
+    "exp": lambda a, _: a[0].exp(),
+    "norm": lambda a, _: length(a),
+    "direction": _direction,
+}
