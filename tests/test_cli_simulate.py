@@ -158,6 +158,24 @@ def test_interruption_keeps_what_is_finished(files, monkeypatch):
     assert "4 of 9" in result.stdout
 
 
+def test_interrupted_writing_leaves_no_summary_of_earlier_files(files, monkeypatch):
+    assert command("--runs", "0").exit_code == 0
+
+    def figures(campaign):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(drawing, "figures", figures)
+    assert command("--runs", "0").exit_code == 130
+    names = {path.name for path in (files / "flat.simulation").iterdir()}
+    assert "runs.npz" in names
+    assert "summary.json" not in names
+
+
+def test_a_folder_that_stays_empty_does_not_stay(files):
+    assert command("--certificate", "none.json", "-o", "new").exit_code == 2
+    assert not (files / "new").exists()
+
+
 def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
     real = campaigns.integrate
 
@@ -195,7 +213,7 @@ def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
     [
         (["--controllers", "ccm,l2"], "is no controller"),
         (["--runs", "1.5"], "whole number"),
-        (["--runs", "-3"], "positive"),
+        (["--runs", "-3"], "-3 is not 0 or more"),
         (["--seed", "x"], "--seed"),
         (["--control-rate", "0"], "positive"),
         (["--duration", "9"], "the plan ends at 4 s"),

@@ -86,6 +86,11 @@ def test_init_where_nothing_can_be_written(target):
     assert "Traceback" not in result.output
 
 
+def test_init_names_the_file_that_it_wrote(folder):
+    run("init", "-o", "mine.yaml")
+    assert "tubecert certify mine.yaml" in (folder / "mine.yaml").read_text().splitlines()[0]
+
+
 def test_init_to_stdout(folder):
     result = run("init", "-o", "-")
     assert result.stdout == (PACKAGE / "templates" / "regulation.yaml").read_text("utf-8")
@@ -141,7 +146,7 @@ def test_every_page_has_meaning_formula_and_source(topic):
     ("asked", "head"),
     [
         *[("tc302", "TC302"), ("du", "feedback_gain (du)"), ("A", "upper (A)"), ("a", "lower (a)")],
-        *[("(26c)", "26c"), ("ccm_2", "CCM_2"), ("f(X)", "F(x)")],
+        *[("(26c)", "26c"), ("ccm_2", "CCM_2"), ("C2", "CCM_2"), ("f(X)", "F(x)")],
     ],
 )
 def test_topics_by_other_names(asked, head):

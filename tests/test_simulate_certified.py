@@ -122,6 +122,7 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
         assert chosen.origin == CHOSEN
     held = loop_of(where, "l1", Choice(), Fraction(1000))
     assert held.promise is None
+    assert "not for a controller that is held" in held.origin
     assert loop_of(where, "ccm", Choice()).promise is None
 
 

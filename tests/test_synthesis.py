@@ -355,6 +355,13 @@ def test_certify_synthesises_by_itself_and_keeps_the_metric(tmp_path):
     assert "uncontrollable mode" in done.output
 
 
+def test_a_plot_that_is_no_svg_is_refused(tmp_path):
+    done = synth(ROOT / "configs" / "two_state.yaml", "--rate", "1", "--plot", tmp_path / "sweep.pdf")
+    assert done.exit_code == 2
+    assert "drawn as SVG" in done.output
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_end_to_end_objective_compares_certificates(tmp_path):
     plot = tmp_path / "sweep.svg"
     spec = ROOT / "configs" / "two_state_orbit.yaml"

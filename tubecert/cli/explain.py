@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import SpecError
-from tubecert.expression import suggestion
+from tubecert.expression import near
 from tubecert.findings import Finding
 from tubecert.report import pages
 
@@ -18,11 +18,9 @@ def run(topic: str | None) -> None:
         return
     page = pages.find(topic)
     if page is None:
-        help = suggestion(topic, pages.topics(), what="topics") if topic.isascii() else ""
-        message = f"there is no page about {topic[:60]!r}"
-        raise SpecError(
-            [Finding(code="TC112", message=message, help=help or "tubecert explain lists all topics")]
-        )
+        meant = near(topic, pages.topics()) if topic.isascii() else ()
+        help = "".join(f"did you mean {word}? " for word in meant) + "tubecert explain lists all topics"
+        raise SpecError([Finding(code="TC112", message=f"there is no page about {topic[:60]!r}", help=help)])
     write_stdout(page.text() + "\n")
 
 

@@ -21,6 +21,7 @@ def run(template: str, target: str | None, *, quiet: bool) -> None:
         write_stdout(text)
         return
     name = f"{template}.yaml" if target is None else target
+    text = text.replace(f"tubecert certify {template}.yaml", f"tubecert certify {name}")
     _create(name, text)
     if not quiet:
         write_stdout(f"{name}: a specification that certifies as it is\n  tubecert certify {name}\n")

@@ -79,7 +79,15 @@ class Numbers:
     def __init__(self) -> None:
         self.findings: list[Finding] = []
 
-    def positive(self, option: str, text: str | None, *, below: int | None = None) -> Fraction | None:
+    def positive(
+        self,
+        option: str,
+        text: str | None,
+        *,
+        below: int | None = None,
+        wanted: str = "positive",
+        remedy: str = "> 0",
+    ) -> Fraction | None:
         """The exact number, > 0 (and < `below`); None if the option is absent or wrong."""
         if text is None:
             return None
@@ -92,16 +100,18 @@ class Numbers:
             self._fail("TC108", option, text, message=error.message, help=error.help, **place)
             return None
         if value <= 0:
-            self._range(option, text, "positive", "> 0")
+            self._range(option, text, wanted, remedy)
         elif below is not None and value >= below:
             self._range(option, text, f"below {below}", f"< {below}")
         else:
             return value
         return None
 
-    def count(self, option: str, text: str | None) -> int | None:
-        """A positive whole number; None if the option is absent or wrong."""
-        value = self.positive(option, text)
+    def count(
+        self, option: str, text: str | None, *, wanted: str = "positive", remedy: str = "> 0"
+    ) -> int | None:
+        """A positive whole number; None if the option is absent or wrong (then `wanted` tells what is right)."""
+        value = self.positive(option, text, wanted=wanted, remedy=remedy)
         if value is None or text is None:
             return None
         if value.denominator != 1:
@@ -111,7 +121,9 @@ class Numbers:
 
     def whole(self, option: str, text: str | None) -> int | None:
         """A whole number, 0 or more; None if the option is absent or wrong."""
-        return 0 if text is not None and text.strip() == "0" else self.count(option, text)
+        if text is not None and text.strip() == "0":
+            return 0
+        return self.count(option, text, wanted="0 or more", remedy="that is 0 or more")
 
     def check(self) -> None:
         """Raises `SpecError` with every problem met so far."""

@@ -66,12 +66,12 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     system = spec.load(given["spec"])
     wishes = _wishes(given, numbers, chosen, system)
     folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
-    from tubecert.simulate.output import check_folder, write
+    from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
 
-    check_folder(folder)
     terminal = Terminal.stderr(color=output.color)
-    with _progress(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    wanted = not (output.no_progress or output.quiet)
+    with prepared(folder), _progress(terminal, wanted=wanted) as report:
         system, sealed = _certificate(given, system, wishes, folder, report)
         campaign = _campaign(system, sealed, wishes, report)
         if report is not None:

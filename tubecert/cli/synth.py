@@ -37,6 +37,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         certificate.check_target(place)
         if place != certificate.STDOUT and certificate.same_file(place, given["spec"]):
             raise TargetError([Finding(code="TC120", message=f"{place} is the specification itself")])
+    if given["plot"] and Path(given["plot"]).suffix.lower() != ".svg":
+        message = f"cannot write {given['plot']}: the comparison is drawn as SVG"
+        raise TargetError([Finding(code="TC120", message=message, help="give a file FILE.svg")])
     from tubecert import spec
 
     system = spec.load(given["spec"])

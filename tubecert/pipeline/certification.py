@@ -212,11 +212,12 @@ class Certification:
         radii = {"epsilon": tube.epsilon, "rho_a": tube.rho_a, "rho": radius.rho}
         self.result["tube"] = {name: decimal_data(value) for name, value in radii.items()}
         lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
+        excess = f", by {contained.excess:.3g}" if contained.excess > 0 else ""
         self._stop(
             "assumption 1: the tube lies in the safe set",
             contained.verdict,
             f"the tube of radius {float(radius.rho):.6g} {lies} the safe set through the {contained.side} bound of "
-            f"{contained.state}, at t = {contained.t:.6g}, by {contained.excess:.3g}"
+            f"{contained.state}, at t = {contained.t:.6g}{excess}"
             if contained.state
             else "the curve between the plan's knots could not be bounded: two of its times may nearly coincide",
             Witness(t=contained.t, x=contained.x),

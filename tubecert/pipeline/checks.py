@@ -36,7 +36,9 @@ def missing_parts(spec: Spec) -> list[Finding]:
     """What a certification needs and a specification may lack."""
     missing = []
     if spec.metric is None and spec.synthesis is None:
-        remedy = "give metric.dual_metric and metric.rate, metric.synthesise, or --metric FILE"
+        remedy = (
+            "give metric.dual_metric and metric.rate, or metric.synthesise, or certify with --metric FILE"
+        )
         missing.append(("metric", remedy))
     if spec.tube.epsilon is None:
         missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))

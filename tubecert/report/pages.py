@@ -6,6 +6,7 @@ constants come from the table that reports read.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -121,6 +122,7 @@ def find(topic: str) -> Page | None:
     """The page of a code, an equation's tag, or a constant's name or symbol; case matters only where it has to."""
     wanted = topic.strip()
     wanted = wanted[1:-1] if wanted.startswith("(") else wanted
+    wanted = re.sub(r"^C([123])$", r"CCM_\1", wanted, flags=re.IGNORECASE)  # as reports call them
     tables: tuple[Mapping[str, Page], ...] = (codes(), constants(), equations())
     symbols: Mapping[str, Page] = {page.symbol: page for page in constants().values()}
     for table in (*tables, symbols):

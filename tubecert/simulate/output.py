@@ -25,21 +25,36 @@ from tubecert.simulate.summary import summary
 SUMMARY: Final = "summary.json"
 
 
-def check_folder(folder: str) -> None:
-    """Makes the folder and tries to write to it, before any work is done; raises `TargetError`."""
+@contextlib.contextmanager
+def prepared(folder: str) -> Iterator[None]:
+    """Makes the folder and tries to write to it, before any work is done; raises `TargetError`.
+
+    A folder that was made here and in which nothing was written does not stay.
+    """
     path = Path(folder)
     try:
+        new = not path.exists()
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
             pass
     except (OSError, ValueError) as error:
         raise _unwritable(folder, error) from None
+    try:
+        yield
+    finally:
+        if new:
+            with contextlib.suppress(OSError):  # it is not empty
+                path.rmdir()
 
 
 def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
-    """Writes every file, the summary last; returns their names. Raises `TargetError`."""
+    """Writes every file, the summary last, so that a folder with a summary is complete; returns their names.
+
+    Raises `TargetError`.
+    """
     written = []
     try:
+        (Path(folder) / SUMMARY).unlink(missing_ok=True)  # of earlier files, which are now replaced
         for name, data in _files(campaign, certificate):
             _replace(Path(folder) / name, data)
             written.append(name)

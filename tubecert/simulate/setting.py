@@ -137,6 +137,8 @@ def loop_of(
     """A loop with its gains; raises `TubecertError` if there are none for it."""
     gains, source, origin = _gains(setting, controller, choice)
     covered = controller in ADAPTIVE and control_rate is None and origin != CHOSEN
+    if source and control_rate is not None and origin != CHOSEN:
+        origin += ", but not for a controller that is held"
     problem = LoopProblem(
         model=setting.model,
         plan=setting.plan,

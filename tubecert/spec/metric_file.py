@@ -27,7 +27,7 @@ def with_metric(spec: Spec, path: str) -> Spec:
 
     Raises `TargetError` if the file cannot be read, `SpecError` with every problem in it.
     """
-    return _with(spec, read_source(path))
+    return _with(spec, read_source(path, "give the path of a metric file (tubecert synth writes them)"))
 
 
 def with_metric_text(spec: Spec, text: str, file: str) -> Spec:

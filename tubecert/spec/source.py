@@ -69,9 +69,9 @@ def displayed(line: str) -> str:
     return line if line.isprintable() else "".join(c if c.isprintable() else " " for c in line)
 
 
-def read_source(path: str) -> Source:
+def read_source(path: str, help: str = "give the path of a specification (a YAML file)") -> Source:
     """The file's text; raises `TargetError` if it cannot be read, `SpecError` if it breaks a limit."""
-    return decoded(path, read_bytes(path, "give the path of a specification (a YAML file)"))
+    return decoded(path, read_bytes(path, help))
 
 
 def read_bytes(path: str, help: str, limit: int = MAX_BYTES) -> bytes:
