@@ -116,7 +116,8 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
             model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
         )
     rate = float(model.rate)
-    precision, budget = 1e-2, min(effort.cheap, effort.budget)  # a first look, to see how sharp the next must be
+    # a first look, to see how sharp the next must be
+    precision, budget = 1e-2, min(effort.cheap, effort.budget)
     while True:
         sharp = Effort(gap=0.0, absolute=precision * rate, budget=budget, progress=effort.progress)
         found = supremum(objective, domain, sharp)
