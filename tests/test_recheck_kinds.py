@@ -10,7 +10,10 @@ from typer.testing import CliRunner
 from tubecert import certificate, pipeline, spec
 from tubecert.cli.app import app
 from tubecert.errors import ExitCode
+from tubecert.expression import parse, symbol
+from tubecert.recheck.identity import vanish
 from tubecert.recheck.run import recheck
+from tubecert.recheck.terms import from_expressions, matrix_replaced, number
 
 BASE = """
 tubecert: 1
@@ -55,7 +58,12 @@ def replaced(text, *changes):
 
 H, START = 'h: ["0.1*sin(t) + 0.05*x"]', "initial_state: {at: [0.05, 0]}"
 PLAN, LOOP = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}", "A_m: -10"
+WIGGLE = (
+    'trajectory: {kind: expressions, horizon: 3, x: ["0.1*sin(2*t)", "0.2*sin(t)*cos(t) + 0.2*cos(2*t)"], '
+    'u: ["-0.4*sin(2*t) + 0.2*cos(2*t) + 0.2*sin(t)*cos(t) + 0.2*cos(2*t) - 0.3*sin(0.1*sin(2*t))"]}'
+)
 KINDS = {
+    "a root on the plan": (BASE, ("0.3*sin(x)", "0.3*sin(x) + 0.1*sqrt(4 + x) - 0.18 - 0.02*exp(x)")),
     "start within a radius": (BASE, (START, "initial_state: {within: 0.03}")),
     "start on the plan": (BASE, (START, "initial_state: {at: [0, 0]}")),
     "matrix A_m": (BASE, (LOOP, "A_m: [[-10, 1], [0, -12]]")),
@@ -285,3 +293,61 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     done = command(target, "--spec", path)
     assert done.exit_code == ExitCode.NOT_CERTIFIED
     assert "the knots of plan.csv" in " ".join(done.stderr.split())
+
+
+def test_a_defect_that_is_not_proven_to_vanish_is_undecided():
+    """The plan's defect is 0 by an addition theorem, which this verification does not know."""
+    text = replaced(BASE, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))
+    document = certified(text)
+    assert document["result"]["constants"]["plan_defect"]["above"] == 0
+    found = examine(document)
+    verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
+    assert verdicts == {"undecided"}
+    assert found.verdict == "undecided"
+
+
+def test_a_defect_that_is_denied_is_contradicted():
+    document = certified(replaced(BASE, (PLAN, PLAN.replace("[0, 0]", "[0.02, 0]"))))
+    assert document["result"]["constants"]["plan_defect_metric"]["below"] > 0
+    for name in ("plan_defect", "plan_defect_metric"):
+        document["result"]["constants"][name] |= {"below": 0.0, "above": 0.0}
+    verdicts = {c.name: c.outcome.verdict for c in examine(document).claims if "plan_defect" in c.name}
+    assert set(verdicts.values()) == {"contradicted"}, verdicts
+
+
+@pytest.mark.parametrize(
+    ("text", "zero"),
+    [
+        *[("sqrt(x)**2 - x", True), ("sqrt(x*y)**2/x - y", True), ("x/sqrt(x) - sqrt(x)", True)],
+        *[("sqrt(x) - x", False), ("sqrt(x**2) - x", False), ("sqrt(x) - sqrt(y)", False)],
+        *[
+            ("sqrt(2)**2 - 2", True),
+            ("sqrt(2) - 1", False),
+            ("sqrt(x/y)**2*y - x", True),
+            ("sqrt(x/y) - x", False),
+        ],
+        *[
+            ("exp(x) - 1", False),
+            ("sin(x)**2 + cos(x)**2 - 1", True),
+            ("sin(x)", False),
+            ("cos(x) - 1", False),
+        ],
+    ],
+)
+def test_what_vanishes(text, zero):
+    term = from_expressions([parse(text, symbols={name: symbol(name) for name in "xy"}).expression])
+    assert vanish(term) is zero
+
+
+@pytest.mark.parametrize(
+    ("text", "zero"),
+    [
+        *[("sqrt(x) - 2", True), ("exp(x - 4) - 1", True), ("sin(x - 4)", True), ("cos(4 - x) - 1", True)],
+        *[("tan(x - 4)", True), ("sqrt(x - 4)", True), ("sqrt(x/9) - 2/3", True), ("sqrt(x + 1) - 2", False)],
+        *[("exp(x) - 1", False), ("cos(x) - 1", False), ("sqrt(x) + 2", False)],
+    ],
+)
+def test_what_vanishes_at_a_point(text, zero):
+    x = symbol("x")
+    (term,) = from_expressions([parse(text, symbols={"x": x}).expression])
+    assert vanish(matrix_replaced([[term]], {"x": number(Fraction(4))})[0]) is zero

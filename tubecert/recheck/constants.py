@@ -161,8 +161,8 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
     p = defect(place)
     if _defect_zero(place, p):
         return stated(True, "")
-    if not limit:
-        return stated(False, "the plan has a defect")
+    if not limit:  # only a point at which the defect is proven not to vanish contradicts
+        return place.along(lambda: NormsBelow([p], limit, place.numbers))
     W = place.on_plan(place.system.W)
     top = number(limit**2)
     S = [*([*row, e] for row, (e,) in zip(W, p, strict=True)), [*(e for (e,) in p), top]]

@@ -1,13 +1,15 @@
 """Terms that vanish identically: quotients of polynomials over the rationals, exact.
 
-Variables and transcendental terms are indeterminates; sin^2 = 1 - cos^2 is the only relation used. A term whose
-numerator reduces to 0 vanishes wherever it is defined; nothing is concluded from one that does not.
+Variables, roots and transcendental terms are indeterminates; the relations used are sin^2 = 1 - cos^2, sqrt(u)^2 = u,
+and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces to 0 vanishes wherever it is
+defined; nothing is concluded from one that does not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isqrt
 from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
@@ -69,13 +71,21 @@ class _Field:
                 if term.op == "tan":
                     return _Quotient(sine, cosine)
                 return self._whole(sine if term.op == "sin" else cosine)
+            case "exp" if args[0].top == 0:
+                return self._whole(self._one)
+            case "sqrt" if (known := _root(args[0])) is not None:
+                return self._whole(self._one * known)
         key = (term.op, str(term.value), *((str(a.top), str(a.bottom)) for a in args))
         if key not in self._atoms:
-            self._atoms[key] = self._free.pop(0)
+            self._atoms[key] = atom = self._free.pop(0)
+            if term.op == "sqrt" and args[0].bottom != 0:
+                self._relations.append(atom * atom * args[0].bottom - args[0].top)
         return self._whole(self._atoms[key])
 
     def _wave(self, argument: _Quotient) -> tuple[Polynomial, Polynomial]:
         """The sine and the cosine of an argument; both are the same for every term with that argument."""
+        if argument.top == 0:
+            return self._zero, self._one
         key = str(argument.top), str(argument.bottom)
         for known, sine, cosine in self._waves:
             if known == key:
@@ -100,3 +110,15 @@ class _Field:
         for relation in self._relations:
             top, bottom = divmod(top, relation)[1], divmod(bottom, relation)[1]
         return _Quotient(top, bottom)
+
+
+def _root(argument: _Quotient) -> fmpq | None:
+    """The square root of a constant that is the square of a rational."""
+    if argument.bottom == 0 or not (argument.top.is_constant() and argument.bottom.is_constant()):
+        return None
+    value = fmpq(0) if argument.top == 0 else argument.top.coefficient(0) / argument.bottom.coefficient(0)
+    if value < 0:
+        return None
+    top, bottom = isqrt(int(value.p)), isqrt(int(value.q))
+    root = fmpq(top, bottom)
+    return root if root * root == value else None
