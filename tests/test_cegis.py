@@ -1,11 +1,12 @@
 """Synthesis by counterexamples: the forms, the bound, the attacks, and solvers that lie."""
 
+import warnings
 from dataclasses import replace
 from fractions import Fraction as Q
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from systems import matrix_of
 
@@ -273,8 +274,10 @@ def cvxpy_least(A, B, rate, floor=None):
         F = N.T @ (a @ W + W @ a.T + 2 * rate * W) @ N
         conditions.append(F + F.T << 0)
     task = cp.Problem(cp.Minimize(kappa), conditions)
-    task.solve(solver="CLARABEL")
-    return task.value
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that the solution may be inaccurate: the status says so too
+        task.solve(solver="CLARABEL")
+    return None if task.status == cp.OPTIMAL_INACCURATE else task.value
 
 
 @pytest.mark.parametrize("floor", ["identity", "input"])
@@ -301,7 +304,8 @@ def test_linear_systems_agree_with_cvxpy(seed, rate):
     model = system(["x0", "x1", "x2"], f, [[str(b)] for b in B[:, 0]])
     found = cegis.propose(problem(model, box(*[(-1, 1)] * 3), rate, limit=1e4))
     expected = cvxpy_least([A], B, rate)
-    if expected is None or not np.isfinite(expected) or expected > 1e4:
+    assume(expected is not None)
+    if not np.isfinite(expected) or expected > 1e4:
         assert not found.feasible
     elif expected < 1e3:
         assert found.bound == pytest.approx(expected, rel=2e-3)

@@ -35,6 +35,7 @@ from tubecert.metric.synthesis.conic import (
     triangle,
 )
 from tubecert.metric.synthesis.family import metric_family
+from tubecert.metric.synthesis.frame import commuting_frame
 from tubecert.metric.synthesis.gram import gram_form
 from tubecert.metric.synthesis.polynomial import polynomial_conditions
 from tubecert.metric.synthesis.problem import SynthesisProblem
@@ -469,7 +470,10 @@ def test_an_angle_is_treated_exactly():
 
 
 def test_state_dependent_input():
+    """The frame must be polynomial: the one in closed form is a quotient, to which sums of squares do not apply."""
     asked = problem(MOVING, ((-1, 1),) * 2, degree=1, rate=0.301)
+    assert "a quotient is no polynomial" in propose_sos(asked).status
+    asked = replace(asked, family=replace(asked.family, frame=commuting_frame(MOVING)))
     proposal = propose_sos(asked)
     assert proposal.feasible
     assert not asked.family.flat

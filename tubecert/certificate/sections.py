@@ -96,7 +96,8 @@ def _samples(plan: Plan) -> Result:
     end = 0.0 if plan.horizon is None else float(plan.horizon)
     t = np.zeros(1) if plan.is_constant else np.linspace(0.0, np.nextafter(end, 0.0), _SAMPLES)
     x = plan.enclose(t, t)[0]
-    middle = 0.5 * x.lo + 0.5 * x.hi
+    with np.errstate(invalid="ignore"):  # a curve that is not bounded
+        middle = 0.5 * x.lo + 0.5 * x.hi
     if not np.all(np.isfinite(middle)):
         return {}
     rows = [[float(f"{value:.7g}") for value in row] for row in middle]
