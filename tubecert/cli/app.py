@@ -12,7 +12,18 @@ import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
-from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+from tubecert.cli.options import (
+    Colored,
+    Debug,
+    Json,
+    NoProgress,
+    Output,
+    Quiet,
+    SpecFile,
+    Verbose,
+    Version,
+    number_option,
+)
 
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
@@ -76,13 +87,6 @@ class Formulas(StrEnum):
     AS_PRINTED = "as-printed"
 
 
-_Spec = Annotated[str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)]
-
-
-def _number(flag: str, help: str) -> object:
-    return typer.Option(flag, metavar="NUMBER", help=help)
-
-
 @app.callback(invoke_without_command=True)
 def _main(
     context: typer.Context,
@@ -103,13 +107,13 @@ def _main(
 @app.command(epilog=_CERTIFY_AFTER, short_help="Prove the tube, find the smallest gains.")
 def certify(
     context: typer.Context,
-    spec: _Spec,
+    spec: SpecFile,
     *,
     rho_a: Annotated[
-        str | None, _number("--rho-a", "Radius left to the adaptation (overrides tube.rho_a).")
+        str | None, number_option("--rho-a", "Radius left to the adaptation (overrides tube.rho_a).")
     ] = None,
     epsilon: Annotated[
-        str | None, _number("--epsilon", "Radius beyond the initial offset (overrides).")
+        str | None, number_option("--epsilon", "Radius beyond the initial offset (overrides).")
     ] = None,
     metric: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
@@ -120,12 +124,18 @@ def certify(
     formulas: Annotated[
         Formulas, typer.Option(help="Corrected formulas, or the paper's own (proves nothing).")
     ] = Formulas.CORRECTED,
-    bandwidth: Annotated[str | None, _number("--bandwidth", "Judge this filter bandwidth, in rad/s.")] = None,
-    adaptation_rate: Annotated[
-        str | None, _number("--adaptation-rate", "... with this adaptation rate.")
+    bandwidth: Annotated[
+        str | None, number_option("--bandwidth", "Judge this filter bandwidth, in rad/s.")
     ] = None,
-    gap: Annotated[str, _number("--gap", "Relative width at which a constant is sharp enough.")] = "1/100",
-    budget: Annotated[str | None, _number("--budget", "Boxes examined per claim before giving up.")] = None,
+    adaptation_rate: Annotated[
+        str | None, number_option("--adaptation-rate", "... with this adaptation rate.")
+    ] = None,
+    gap: Annotated[
+        str, number_option("--gap", "Relative width at which a constant is sharp enough.")
+    ] = "1/100",
+    budget: Annotated[
+        str | None, number_option("--budget", "Boxes examined per claim before giving up.")
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option(

@@ -33,6 +33,9 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+SpecFile = Annotated[
+    str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
+]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Also show the constants and all assumptions.")
 ]
@@ -44,6 +47,11 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an i
 Version = Annotated[
     bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
 ]
+
+
+def number_option(flag: str, help: str) -> object:
+    """An option whose text is read as an exact number (see `Numbers`)."""
+    return typer.Option(flag, metavar="NUMBER", help=help)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

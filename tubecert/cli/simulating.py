@@ -9,7 +9,18 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+from tubecert.cli.options import (
+    Colored,
+    Debug,
+    Json,
+    NoProgress,
+    Output,
+    Quiet,
+    SpecFile,
+    Verbose,
+    Version,
+    number_option,
+)
 
 _AFTER = """\b
 Examples:
@@ -32,10 +43,6 @@ class Source(StrEnum):
     SAMPLED = "sampled"
 
 
-def _number(flag: str, help: str) -> object:
-    return typer.Option(flag, metavar="NUMBER", help=help)
-
-
 def register(app: typer.Typer) -> None:
     """Adds the command to the app."""
     app.command(epilog=_AFTER, short_help="Integrate the closed loops, try to break the certificate.")(
@@ -45,9 +52,7 @@ def register(app: typer.Typer) -> None:
 
 def simulate(
     context: typer.Context,
-    spec: Annotated[
-        str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
-    ],
+    spec: SpecFile,
     *,
     certificate: Annotated[
         Path | None,
@@ -65,31 +70,36 @@ def simulate(
         typer.Option(help="The certificate whose gains are taken.  [distance]", show_default=False),
     ] = None,
     runs: Annotated[
-        str | None, _number("--runs", "Random runs against each loop that adapts; 0: no attacks.  [100]")
+        str | None,
+        number_option("--runs", "Random runs against each loop that adapts; 0: no attacks.  [100]"),
     ] = None,
     seed: Annotated[
-        str | None, _number("--seed", "Seed of the random runs and of the adversary.  [0]")
+        str | None, number_option("--seed", "Seed of the random runs and of the adversary.  [0]")
     ] = None,
     replay: Annotated[
-        str | None, _number("--replay", "Draw this random run in place of the specification's h.")
+        str | None, number_option("--replay", "Draw this random run in place of the specification's h.")
     ] = None,
     duration: Annotated[
-        str | None, _number("--duration", "How long, in s.  [the horizon, else 10/rate]")
+        str | None, number_option("--duration", "How long, in s.  [the horizon, else 10/rate]")
     ] = None,
     control_rate: Annotated[
-        str | None, _number("--control-rate", "Hold the whole controller at this rate, in Hz.")
+        str | None, number_option("--control-rate", "Hold the whole controller at this rate, in Hz.")
     ] = None,
-    bandwidth: Annotated[str | None, _number("--bandwidth", "Choose the filter bandwidth, in rad/s.")] = None,
+    bandwidth: Annotated[
+        str | None, number_option("--bandwidth", "Choose the filter bandwidth, in rad/s.")
+    ] = None,
     adaptation_rate: Annotated[
-        str | None, _number("--adaptation-rate", "Choose the adaptation rate of l1.")
+        str | None, number_option("--adaptation-rate", "Choose the adaptation rate of l1.")
     ] = None,
     sample_time: Annotated[
-        str | None, _number("--sample-time", "Choose the sample time of sampled, in s.")
+        str | None, number_option("--sample-time", "Choose the sample time of sampled, in s.")
     ] = None,
     epsilon: Annotated[
-        str | None, _number("--epsilon", "Overrides tube.epsilon (without --certificate).")
+        str | None, number_option("--epsilon", "Overrides tube.epsilon (without --certificate).")
     ] = None,
-    rho_a: Annotated[str | None, _number("--rho-a", "Overrides tube.rho_a (without --certificate).")] = None,
+    rho_a: Annotated[
+        str | None, number_option("--rho-a", "Overrides tube.rho_a (without --certificate).")
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", metavar="FOLDER", help="Data and figures.  [SPEC's stem.simulation]"),

@@ -16,12 +16,6 @@ from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 
-_CODES = {
-    "certified": ExitCode.CERTIFIED,
-    "refuted": ExitCode.NOT_CERTIFIED,
-    "undecided": ExitCode.UNDECIDED,
-}
-
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Synthesise; `given` holds the options by the names of their parameters."""
@@ -65,7 +59,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 
         certificate.write_text(given["plot"], draw([row.data() for row in found.rows]))
     _report(found, system.name, target, output)
-    return _CODES[found.verdict]
+    return certificate.exit_code({"verdict": found.verdict})
 
 
 def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -> Synthesis:

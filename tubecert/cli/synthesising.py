@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+from tubecert.cli.options import (
+    Colored,
+    Debug,
+    Json,
+    NoProgress,
+    Output,
+    Quiet,
+    SpecFile,
+    Verbose,
+    Version,
+    number_option,
+)
 
 _AFTER = """\b
 Examples:
@@ -47,10 +58,6 @@ class Solver(StrEnum):
     SCS = "scs"
 
 
-def _number(flag: str, help: str) -> object:
-    return typer.Option(flag, metavar="NUMBER", help=help)
-
-
 def register(app: typer.Typer) -> None:
     """Adds the command to the app."""
     app.command(epilog=_AFTER, short_help="Find a metric and prove it.")(synth)
@@ -58,11 +65,9 @@ def register(app: typer.Typer) -> None:
 
 def synth(
     context: typer.Context,
-    spec: Annotated[
-        str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
-    ],
+    spec: SpecFile,
     *,
-    rate: Annotated[str | None, _number("--rate", "Contraction rate, in 1/s.")] = None,
+    rate: Annotated[str | None, number_option("--rate", "Contraction rate, in 1/s.")] = None,
     objective: Annotated[
         Objective | None,
         typer.Option(
@@ -78,7 +83,7 @@ def synth(
         str | None, typer.Option(metavar="NAMES", help="States that W depends on, e.g. x1,x3.  [chosen]")
     ] = None,
     condition_number: Annotated[
-        str | None, _number("--condition-number", "Not to be exceeded on the safe set.")
+        str | None, number_option("--condition-number", "Not to be exceeded on the safe set.")
     ] = None,
     route: Annotated[Route | None, typer.Option(help="How metrics are found.  [auto]")] = None,
     solver: Annotated[Solver | None, typer.Option(help="Which solver proposes.  [clarabel]")] = None,
@@ -86,9 +91,11 @@ def synth(
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --sweep.")
     ] = None,
-    rho_a: Annotated[str | None, _number("--rho-a", "Overrides tube.rho_a.")] = None,
-    epsilon: Annotated[str | None, _number("--epsilon", "Overrides tube.epsilon.")] = None,
-    budget: Annotated[str | None, _number("--budget", "Boxes examined per claim before giving up.")] = None,
+    rho_a: Annotated[str | None, number_option("--rho-a", "Overrides tube.rho_a.")] = None,
+    epsilon: Annotated[str | None, number_option("--epsilon", "Overrides tube.epsilon.")] = None,
+    budget: Annotated[
+        str | None, number_option("--budget", "Boxes examined per claim before giving up.")
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option(

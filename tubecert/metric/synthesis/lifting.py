@@ -17,9 +17,7 @@ from tubecert.expression import (
     Expression,
     coefficient,
     constant,
-    cos,
     rebuild,
-    sin,
     symbol,
     topological,
 )
@@ -77,16 +75,6 @@ def lift(expressions: Sequence[Expression], *, opaque: bool = False) -> Lifted:
         else:
             raise NotLiftedError(f"{node.op} of something that is no angle")
     return Lifted(expressions=tuple(new[e] for e in expressions), circles=circles, atoms=atoms)
-
-
-def lower(expressions: Sequence[Expression], lifted: Lifted) -> list[Expression]:
-    """The inverse of `lift`: sines, cosines and atoms put back."""
-    from tubecert.expression import substitute
-
-    back: dict[str, Expression] = dict(lifted.atoms)
-    for variable, (s, c) in lifted.circles.items():
-        back[s], back[c] = sin(symbol(variable)), cos(symbol(variable))
-    return substitute(expressions, back)
 
 
 def _angle(u: Expression, circles: dict[str, tuple[str, str]]) -> tuple[Expression, Expression] | None:
