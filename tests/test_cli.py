@@ -534,6 +534,26 @@ def test_interrupted_in_the_middle_of_a_real_run(folder):
         command.communicate()
 
 
+INTERRUPTING = """
+import os, signal, sys
+class Interrupt:
+    def find_spec(self, name, path, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupt())
+from tubecert.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["tubecert.cli.app", "typer", "tubecert.cli.certify", "tubecert.spec"])
+def test_interrupted_while_modules_are_imported(folder, name):
+    command = process("certify", SPEC, code=INTERRUPTING.format(name=name))
+    output, errors = command.communicate()
+    assert (command.returncode, output, errors) == (130, "", "tubecert: interrupted\n")
+    assert not list(folder.iterdir())
+
+
 @pytest.mark.parametrize(
     "error", [ZeroDivisionError("oops"), RecursionError("deep"), MemoryError(), AssertionError()]
 )

@@ -12,6 +12,16 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 | `certify`, `check`, `simulate`, `version`, ... | what each command does |
 """
 
-from tubecert.cli.app import main
+import sys
 
-__all__ = ["main"]
+
+def main() -> None:
+    """The entry point. It imports the rest itself: from its first line on an interruption has its exit code."""
+    try:
+        from tubecert.cli.app import start
+
+        start()
+    except KeyboardInterrupt:
+        if sys.stderr is not None:
+            print("tubecert: interrupted", file=sys.stderr)
+        sys.exit(130)  # ExitCode.INTERRUPTED: what is not imported cannot be interrupted

@@ -208,8 +208,8 @@ rechecking.register(app)
 everyday.register(app)
 
 
-def main() -> None:
-    """The entry point: never a traceback, whatever stdout is connected to."""
+def start() -> None:
+    """Runs a command: never a traceback, whatever stdout is connected to."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's deprecations are no message to users
     for stream in (sys.stdout, sys.stderr):

@@ -101,6 +101,8 @@ def _drop_stdout() -> None:
 
 
 def _tell(line: str) -> None:
+    if sys.stderr is None:
+        return
     with contextlib.suppress(OSError, ValueError):
         print(f"tubecert: {line}", file=sys.stderr, flush=True)
 
