@@ -380,6 +380,28 @@ def test_bad_metric_files(folder, proven, change, fragment):
     assert fragment in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "this is not JSON: "),
+        ("hello", "the metric file must be a mapping with the keys format, rate, dual_metric"),
+        (json.dumps({key: METRIC[key] for key in METRIC if key != "rate"}), "the metric file lacks rate"),
+        (json.dumps(METRIC | {"rate": -1}), "error TC112: rate is -1; it must be > 0"),
+        (
+            '{"format": "tubecert-certificate/1", "hash": "", "result": {}}',
+            "this is a certificate, not a metric",
+        ),
+        (TEXT, "this is a specification, not a metric file"),
+    ],
+)
+def test_errors_of_metric_files_name_the_file_and_its_keys(folder, unused, text, said):
+    (folder / "w.json").write_text(text)
+    result = run("certify", SPEC, "--metric", "w.json")
+    quiet_failure(result, 2)
+    assert said in result.stderr.splitlines()[0], result.stderr
+    assert result.stderr.endswith("1 error\n")
+
+
 def test_metric_files_that_are_none(folder, proven):
     (folder / "bad.json").write_text("{")
     (folder / "empty.json").write_text("")

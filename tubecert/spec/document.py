@@ -67,8 +67,11 @@ class _Open:
     children: list[Node] = field(default_factory=list)
 
 
-def compose(source: Source) -> tuple[Node | None, list[Finding]]:
-    """The tree of the file's one document, None if there is none, and what was wrong with the YAML."""
+def compose(source: Source, language: str = "YAML") -> tuple[Node | None, list[Finding]]:
+    """The tree of the file's one document, None if there is none, and what was wrong with the YAML.
+
+    `language` is what findings call it (JSON is YAML).
+    """
     composer = _Composer(source)
     try:
         for event in _events(source.text):
@@ -77,7 +80,7 @@ def compose(source: Source) -> tuple[Node | None, list[Finding]]:
                 composer.report(codes.LIMIT, event, f"the text is nested more than {MAX_NESTING} deep")
                 return None, composer.findings
     except yaml.YAMLError as error:
-        composer.findings.append(_syntax(source, error))
+        composer.findings.append(_syntax(source, error, language))
         return None, composer.findings
     return composer.root, composer.findings
 
@@ -175,7 +178,7 @@ def _mark(mark: Any) -> Mark:  # the two parsers have marks of different types
     return Mark(line=mark.line, column=mark.column) if mark else Mark(line=0, column=0)
 
 
-def _syntax(source: Source, error: yaml.YAMLError) -> Finding:
+def _syntax(source: Source, error: yaml.YAMLError, language: str) -> Finding:
     problem = getattr(error, "problem", None) or getattr(error, "reason", None) or str(error)
     context = getattr(error, "context", None)
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
@@ -184,7 +187,7 @@ def _syntax(source: Source, error: yaml.YAMLError) -> Finding:
     tab = source.text[source.index(_mark(mark)) :].startswith("\t")
     return Finding(
         code=codes.YAML_SYNTAX,
-        message=f"this is not YAML: {words}"
+        message=f"this is not {language}: {words}"
         + (f" ({' '.join(str(context).split())[:100]})" if context else ""),
         location=location,
         help="indent with spaces, not tabs" if tab else _remedy(words),

@@ -10,16 +10,21 @@ from dataclasses import replace
 from typing import Final
 
 from tubecert.errors import SpecError
-from tubecert.spec.document import MappingNode, compose
+from tubecert.spec import codes
+from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.source import Source, check_limits, read_source
-from tubecert.spec.system import read_metric
+from tubecert.spec.system import metric_of
 from tubecert.spec.types import Metric, Spec
 
 FORMAT: Final = "tubecert-metric/1"
 
 _REPORTED: Final = ("verified_on", "margin", "lower", "upper", "condition_number", "solver")
+_REMEDY: Final = (
+    "give a metric file: tubecert synth writes one, and certify writes the metric that it synthesises beside "
+    "its certificate"
+)
 
 
 def with_metric(spec: Spec, path: str) -> Spec:
@@ -37,8 +42,8 @@ def with_metric_text(spec: Spec, text: str, file: str) -> Spec:
 
 def _with(spec: Spec, source: Source) -> Spec:
     check_limits(source)
-    node, findings = compose(source)
-    reader = Reader(source)
+    node, findings = compose(source, language="JSON")
+    reader = Reader(source, document="the metric file")
     reader.findings.extend(findings)
     metric = None if findings else _read(root_field(reader, node), spec)
     if reader.findings or metric is None:
@@ -47,13 +52,26 @@ def _with(spec: Spec, source: Source) -> Spec:
 
 
 def _read(root: Field, spec: Spec) -> Metric | None:
+    if _is_another_file(root):
+        return None
     entries = root.mapping(required=("format", "rate", "dual_metric"), optional=_REPORTED)
     if entries is None or "format" not in entries or entries["format"].word((FORMAT,)) is None:
         return None
-    assert isinstance(root.node, MappingNode)
-    used = tuple((key, node) for key, node in root.node.pairs if key.text in ("rate", "dual_metric"))
-    if len(used) < 2:
-        return None
-    names = Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters)
-    section = MappingNode(start=root.node.start, pairs=used)
-    return read_metric(Field(reader=root.reader, path="metric", node=section), names)
+    return metric_of(entries, Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters))
+
+
+def _is_another_file(root: Field) -> bool:
+    """Reports a file of ours of another kind: what its keys lack would be beside the point."""
+    pairs = root.node.pairs if isinstance(root.node, MappingNode) else ()
+    for key, node in pairs:
+        if key.text == "tubecert":
+            root.fail(codes.WRONG_TYPE, "this is a specification, not a metric file", _REMEDY)
+            return True
+        if (
+            key.text == "format"
+            and isinstance(node, Scalar)
+            and node.text.startswith("tubecert-certificate/")
+        ):
+            root.fail(codes.WRONG_TYPE, "this is a certificate, not a metric file", _REMEDY)
+            return True
+    return False

@@ -41,10 +41,11 @@ class Scope:
 
 
 class Reader:
-    """Collects the findings and the places of keys."""
+    """Collects the findings and the places of keys; `document` is what findings call the file."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, document: str = "the specification") -> None:
         self.source = source
+        self.document = document
         self.findings: list[Finding] = []
         self.places: dict[str, Location] = {}
 
@@ -110,7 +111,7 @@ class Field:
                 meant.update(self._unknown(key, known))
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
-            message = f"{self.path or 'the specification'} lacks {', '.join(missing)}"
+            message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
             help = f"add {', '.join(f'{key}: ...' for key in missing)}"
             if self.key is None:
                 self.fail(codes.MISSING_KEY, message, help)
@@ -296,7 +297,7 @@ class Field:
         found = "a list" if isinstance(self.node, ListNode) else "a mapping"
         if isinstance(self.node, Scalar):
             found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
-        name = self.path or "the specification"
+        name = self.path or self.reader.document
         self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", help)
 
 

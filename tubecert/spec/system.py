@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Final
 
@@ -94,8 +95,11 @@ def wanted_metric(field: Field, names: Names) -> Synthesis | None:
 def read_metric(field: Field, names: Names) -> Metric | None:
     """The dual metric with its rate, and declared bounds of the metric."""
     entries = field.mapping(required=METRIC_KEYS[:2], optional=METRIC_KEYS[2:])
-    if entries is None:
-        return None
+    return None if entries is None else metric_of(entries, names)
+
+
+def metric_of(entries: Mapping[str, Field], names: Names) -> Metric | None:
+    """The metric that the values of the keys make up; None if one is missing or wrong."""
     n = len(names.states)
     rate = entries["rate"].number(names.values, above=0) if "rate" in entries else None
     dual = entries["dual_metric"].term_matrix(n, n, names.of_state()) if "dual_metric" in entries else None
