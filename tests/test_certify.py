@@ -221,6 +221,14 @@ def test_gains_asked_for_are_judged_as_given(three):
     assert any("26c" in reason["claim"] for reason in weak["reasons"])
 
 
+def test_gains_beyond_all_bounds_are_told_in_words():
+    result = run(THREE, bandwidth=Fraction(1, 10**30), adaptation_rate=Fraction(1))
+    said = {reason["claim"]: reason["message"] for reason in result["reasons"]}
+    assert "no adaptation rate can, where (26b) fails" in said["conditions_26: 26c"]
+    assert "its margin is -1.12e+31" in said["conditions_26: 26a"]
+    assert not any("inf" in words for words in said.values())
+
+
 @pytest.mark.parametrize("name", ["26", "distance", "sampled", "all"])
 def test_the_chosen_conditions_decide(name):
     result = run(THREE, conditions=name)

@@ -503,6 +503,18 @@ def test_a_disk_that_fills_up_leaves_no_part(folder, proven, monkeypatch):
     assert (folder / "x.json").read_text() == "old"
 
 
+@pytest.mark.parametrize("gain", ["1e-300", "1e300", "1e60"])
+def test_gains_that_nothing_can_have_are_refused(unused, gain):
+    for options in (
+        ["--bandwidth", gain, "--adaptation-rate", "1"],
+        ["--bandwidth", 1, "--adaptation-rate", gain],
+    ):
+        result = run("certify", SPEC, *options)
+        quiet_failure(result, 2)
+        assert f"{gain} is not a gain that anything can have" in result.stderr
+        assert "write a number between 1e-60 and 1e60" in result.stderr
+
+
 # the ways to end
 
 

@@ -7,6 +7,7 @@ Out: the `reasons` of a certificate.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 from tubecert.bounds.constants import TABLE, Constant
@@ -95,16 +96,35 @@ def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
     return reason
 
 
+def _margin(item: Shortfall, *, no_rate: bool) -> str:
+    """The margin of a claim that is not proven, in words where it has no bound; `no_rate` if (26b) is refuted."""
+    low, high = float(item.margin.lo), float(item.margin.hi)
+    if high == -inf:
+        # (26c) divides by what (26b) leaves
+        rate = no_rate and item.claim == "26c"
+        return (
+            "no adaptation rate can, where (26b) fails" if rate else "it fails by more than can be computed"
+        )
+    if low == -inf:
+        below = "its margin could not be bounded from below"
+        return below if high == inf else f"{below}; it is {high:.3g} at most"
+    if (shown := f"{low:.3g}") == f"{high:.3g}":
+        return f"its margin is {shown}"
+    return f"its margin lies in [{shown}, {high:.3g}]"
+
+
 def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...], gain: str) -> list[Reason]:
     """Claims that are not proven; those that depend on the predictor name it, since another one may serve."""
     reasons = []
+    no_rate = any(item.claim == "26b" and item.margin.hi <= 0 for item in shortfalls)
     for item in shortfalls:
         message = EXPLAINED.get(item.claim, item.claim)
         if item.allowed is not None and item.needed is not None:
             message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
+        elif item.claim.startswith("unbounded: "):
+            message = f"no finite bound of {item.claim.removeprefix('unbounded: ')} was found"
         elif item.claim not in ("as-printed", "nothing found"):
-            low, high = float(item.margin.lo), float(item.margin.hi)
-            message += f": its margin lies in [{low:.3g}, {high:.3g}]"
+            message += f": {_margin(item, no_rate=no_rate)}"
             message += gain if item.claim in {"26c", "distance", "sampled"} else ""
         reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})
     return reasons or [

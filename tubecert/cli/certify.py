@@ -71,9 +71,10 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
     values: dict[str, Any] = {
-        name: numbers.positive(f"--{name.replace('_', '-')}", given[name])
-        for name in ("rho_a", "epsilon", "bandwidth", "adaptation_rate")
+        name: numbers.positive(f"--{name.replace('_', '-')}", given[name]) for name in ("rho_a", "epsilon")
     }
+    for name in ("bandwidth", "adaptation_rate"):
+        values[name] = numbers.gain(f"--{name.replace('_', '-')}", given[name])
     values["gap"] = numbers.positive("--gap", given["gap"], below=1)
     values["budget"] = numbers.count("--budget", given["budget"])
     numbers.check()

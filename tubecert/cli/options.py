@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -33,6 +33,7 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+_MODERATE: Final = 60  # powers of ten: the conditions hold products of gains, and floats end at 1e308
 SpecFile = Annotated[
     str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
 ]
@@ -113,6 +114,16 @@ class Numbers:
             self._range(option, text, f"below {below}", f"< {below}")
         else:
             return value
+        return None
+
+    def gain(self, option: str, text: str | None) -> Fraction | None:
+        """A positive number that is so moderate that what follows from it can be computed."""
+        value = self.positive(option, text)
+        if value is None or text is None or 10**-_MODERATE < value < 10**_MODERATE:
+            return value
+        self._range(
+            option, text, "a gain that anything can have", f"between 1e-{_MODERATE} and 1e{_MODERATE}"
+        )
         return None
 
     def count(

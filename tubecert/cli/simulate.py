@@ -24,15 +24,8 @@ if TYPE_CHECKING:
     from tubecert.simulate.problem import Controller
     from tubecert.spec import Spec
 
-_POSITIVE: Final = (
-    "epsilon",
-    "rho_a",
-    "duration",
-    "control_rate",
-    "bandwidth",
-    "adaptation_rate",
-    "sample_time",
-)
+_POSITIVE: Final = ("epsilon", "rho_a", "duration", "control_rate")
+_GAINS: Final = ("bandwidth", "adaptation_rate", "sample_time")
 _CODES: Final = {
     "falsified": ExitCode.NOT_CERTIFIED,
     "tube left": ExitCode.NOT_CERTIFIED,
@@ -85,6 +78,7 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
     values: dict[str, Any] = {name: numbers.positive(_flag(name), given[name]) for name in _POSITIVE}
+    values |= {name: numbers.gain(_flag(name), given[name]) for name in _GAINS}
     values |= {name: numbers.whole(_flag(name), given[name]) for name in ("runs", "seed", "replay")}
     numbers.check()
     return values
@@ -181,7 +175,7 @@ def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: S
 
     numbers = wishes.numbers
     setting = setting_of(system, sealed["result"], numbers["duration"])
-    gains = {name: numbers[name] for name in ("bandwidth", "adaptation_rate", "sample_time")}
+    gains = {name: numbers[name] for name in _GAINS}
     choice = Choice(source=wishes.gains, **gains)
     rate = numbers["control_rate"]
     loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in wishes.controllers]
