@@ -309,6 +309,22 @@ def test_an_undefined_expression_is_located_with_a_point(expression):
     assert "x1 =" in finding.message or "x2 =" in finding.message
 
 
+@pytest.mark.parametrize(
+    ("expression", "said"),
+    [
+        ("x1 + 1/(x2 + 0.05)", ": x2 + 0.05 is zero at x2 = -0.05"),
+        ("x1 + 1/(x2**2 - 1/200)", "has a zero near x2 = "),
+        ("1/(1/x2 + x2)", ": x2 is zero at x2 = 0"),  # where the divisor cannot be evaluated
+        ("1/(sin(x2) + 0.05)", "has a zero near x2 = -0.0500"),
+        ("1/exp(x1) + sqrt(x2)", "x2 is not positive at x2 = "),
+    ],
+)
+def test_a_point_is_said_to_be_near_a_zero_unless_it_is_one(expression, said):
+    with pytest.raises(SpecError) as caught:
+        run(edited(THREE, ("    - -x2\n", f"    - {expression}\n")))
+    assert any(said in finding.message for finding in caught.value.findings)
+
+
 def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
     result = run(edited(THREE, ("B: [[0], [0], [1]]", 'B: [[0], [0], ["x1 + x2 - 0.05"]]')))
     assert result["verdict"] == "refuted"

@@ -6,7 +6,7 @@ Trusted: yes. Implements: F(x) = -d_f W + f_x W + W f_x' + 2 rate W, B^+ = (B'B)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, reduce
@@ -24,6 +24,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import (
     ZERO,
     Expression,
+    Obligation,
     constant,
     derivative,
     free_symbols,
@@ -247,18 +248,24 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
             decision = _nonzero(duty.argument, used, effort)
         if decision.verdict == "proven":
             continue
-        wrong = "is zero" if duty.kind == "nonzero" else "is not positive"
         code, message = "TC202", f"'{duty.text}' could not be proven to be defined and smooth on {where}"
         remedy = "keep the safe set further away from the singularity"
         if decision.verdict == "refuted":
             code = "TC201"
             message = (
                 f"'{duty.text}' is undefined or not smooth on {where}: "
-                f"{to_text(duty.argument)} {wrong} at {place(decision.at)}"
+                f"{to_text(duty.argument)} {_wrong(duty, decision.at)} {place(decision.at)}"
             )
             remedy = "shrink the safe set, or rewrite the expression so that it is smooth there"
         findings.append(Finding(code=code, message=message, location=location, help=remedy))
     return findings
+
+
+def _wrong(duty: Obligation, at: dict[str, float]) -> str:
+    """What is wrong at a point, or near it: a zero is known to lie between points, and may be no float."""
+    if duty.kind == "positive":
+        return "is not positive at"
+    return "is zero at" if _vanishes(duty.argument, at) else "has a zero near"
 
 
 def place(at: dict[str, float]) -> str:
@@ -277,7 +284,8 @@ def _nonzero(e: Expression, ranges: dict[str, Range], effort: Effort) -> Decisio
         return negative
     if positive.verdict == negative.verdict == "refuted":
         # e <= 0 at one point and e >= 0 at the other, and a box is connected
-        return replace(negative, at=_between(e, positive.at, negative.at))
+        at = _between(e, positive.at, negative.at)
+        return replace(negative, at=_round_zero(e, at, ranges) or at)
     return replace(negative, verdict="undecided")
 
 
@@ -291,6 +299,25 @@ def _between(e: Expression, low: dict[str, float], high: dict[str, float]) -> di
         value = tape.run_floats([np.array(x) for x in middle], ())[0]
         a, b = (middle, b) if value <= 0 else (a, middle)
     return dict(zip(names, (float(x) for x in b), strict=True))
+
+
+def _round_zero(e: Expression, at: dict[str, float], ranges: Mapping[str, Range]) -> dict[str, float] | None:
+    """A decimal of few digits near the point where `e` is exactly zero, if there is one in the box."""
+    for digits in (1, 3, 6):
+        rounded = {name: round(value, digits) for name, value in at.items()}
+        inside = all(ranges[v][0] <= Fraction(repr(value)) <= ranges[v][1] for v, value in rounded.items())
+        if inside and _vanishes(e, rounded):
+            return rounded
+    return None
+
+
+def _vanishes(e: Expression, at: dict[str, float]) -> bool:
+    """Whether `e` is zero, exactly, at the decimals that are shown for a point."""
+    exact = {name: constant(Fraction(repr(value))) for name, value in at.items()}
+    try:
+        return substitute([e], exact)[0] is ZERO
+    except ZeroDivisionError:  # a part of it is undefined there
+        return False
 
 
 def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: Effort) -> Decision:
@@ -312,12 +339,5 @@ def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: 
     decision = decide(scalar(-gram), BoxDomain(box), 0.0, short)
     if decision.verdict != "undecided":
         return decision
-    for digits in (1, 3, 6):
-        at = {name: round(value, digits) for name, value in decision.at.items()}
-        exact = {name: constant(Fraction(repr(value))) for name, value in at.items()}
-        if (
-            all(box[v][0] <= exact[v].fraction <= box[v][1] for v in exact)
-            and substitute([gram], exact)[0] is ZERO
-        ):
-            return replace(decision, verdict="refuted", at=at)
-    return decision
+    at = _round_zero(gram, decision.at, box)
+    return decision if at is None else replace(decision, verdict="refuted", at=at)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from tubecert.report.numbers import Number, exact, percent
@@ -77,10 +78,9 @@ def _rates(data: Mapping[str, Any], decides: bool, asked: bool) -> Iterator[Gain
 
 
 def _rate_pair(data: Mapping[str, Any], pair: Mapping[str, Any], which: str, decides: bool) -> Gains:
-    margins = {
-        claim: margin[0] for claim, margin in (pair.get("margins") or {}).items() if margin[0] is not None
-    }
-    tightest = min(margins, key=lambda claim: margins[claim], default="")
+    margins = {claim: margin[0] for claim, margin in (pair.get("margins") or {}).items()}
+    # a margin that is not bounded from below may be the least
+    tightest = min(margins, key=lambda claim: -inf if margins[claim] is None else margins[claim], default="")
     return Gains(
         section="conditions_26",
         which=which,
