@@ -105,7 +105,8 @@ def suprema() -> None:
     """Suprema over the safe set of the three-state system to a relative gap of 1e-3, three ways."""
     from tubecert.enclosure.branch_and_bound import Effort, supremum
     from tubecert.enclosure.domain import BoxDomain
-    from tubecert.enclosure.objective import Pencil, SumOfNorms
+    from tubecert.enclosure.objective import SumOfNorms
+    from tubecert.enclosure.pencil import Pencil
     from tubecert.enclosure.taylor import MatrixFunction
     from tubecert.expression.matrix import column, identity
     from tubecert.model import build

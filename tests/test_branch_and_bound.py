@@ -2,24 +2,20 @@
 
 import math
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tubecert.bounds.feedback import over_mu
 from tubecert.enclosure import branch_and_bound as bnb
 from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
-from tubecert.enclosure.objective import (
-    LeastInputGain,
-    Lipschitz,
-    Pencil,
-    SumOfNorms,
-    SumOfPencils,
-    scalar,
-)
+from tubecert.enclosure.objective import LeastInputGain, Lipschitz, SumOfNorms
+from tubecert.enclosure.pencil import Pencil, SumOfPencils, Weights, scalar
 from tubecert.expression import ZERO, Expression, constant, cos, norm, parse, sin, sqrt, substitute, symbol
 from tubecert.expression.matrix import identity
 from tubecert.trajectory import Plan, constant_plan
@@ -288,17 +284,31 @@ def test_nested_norms_have_the_product_of_their_slopes():
 def test_weights_below_the_exact_ones_never_lower_the_bound():
     """Sup over mu of v'Nv/(p/mu + mu q) is N/(2 sqrt(p q)), at mu = sqrt(p/q)."""
 
-    def weights(lo, hi):
-        return np.where(hi[:, 0] > 0, np.nextafter(1 / hi[:, 0], 0), 0.0), lo[:, 0]
+    def ends(lo, hi):
+        return np.where(hi > 0, np.nextafter(1 / hi, 0), 0.0), lo
 
-    for n, truth in ((6, 6 / (2 * math.sqrt(2 * 5))), (-6, 0.0)):
-        objective = Pencil(
-            ((constant(n),),), [((constant(2),),), ((constant(5),),)], extra={"mu": 4.0}, weights=weights
-        )
-        found = supremum(objective, BoxDomain({"mu": (0.0, 4.0)}), Effort(gap=1e-3))
+    simple = Weights(variables=("mu",), below=ends, loss=lambda lo, hi: (hi - lo) / hi)
+    both = product(((6, 6 / (2 * math.sqrt(2 * 5))), (-6, 0.0)), (simple, over_mu(4.0)))
+    for (n, truth), weights in both:
+        objective = Pencil(((constant(n),),), [((constant(2),),), ((constant(5),),)], weights=weights)
+        found = supremum(objective, BoxDomain({weights.variables[0]: (0.0, 4.0)}), Effort(gap=1e-3))
         assert found.below <= truth * (1 + 1e-12)
         assert found.above >= truth
         assert found.reached
+
+
+def test_what_keeps_the_denominator_from_being_positive_is_split():
+    """The numerator varies with x only, but D is proven positive definite only where the boxes are narrow in y."""
+    wave = 0.99 * sin(7 * y)
+    D = ((constant(1), wave), (wave, constant(1)))
+    objective = SumOfPencils([((100 * sin(x), ZERO), (ZERO, ZERO))], D)
+    found = supremum(
+        objective, BoxDomain({"x": (-1.0, 1.0), "y": (-1.0, 1.0)}), Effort(gap=1e-2, budget=4000)
+    )
+    truth = 100 * math.sin(1) / (1 - 0.99**2)
+    assert found.reached
+    assert found.below <= truth * (1 + 1e-12)
+    assert found.above >= truth
 
 
 # -- what makes a bound false is noticed ----------------------------------------------------------------------

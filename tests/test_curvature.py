@@ -17,9 +17,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from tubecert.bounds.feedback import over_mu
 from tubecert.enclosure import taylor
 from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import LeastInputGain, Pencil, SumOfNorms, SumOfPencils, scalar
+from tubecert.enclosure.objective import LeastInputGain, SumOfNorms
+from tubecert.enclosure.pencil import Pencil, SumOfPencils, Weights, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, exp, norm, sin, sqrt, symbol
@@ -485,9 +487,12 @@ def test_values_inside_are_below_the_bounds_of_boxes(name):
 def test_weights_that_vary_with_a_further_variable():
     """N <= tau (D_1/mu + mu D_2) for mu in a range: the value is that of sampled mu, or 0."""
     D = [multiply(B, transpose(B)), W]
-    objective = Pencil(F, D, extra={"mu": 4.0}, weights=lambda lo, hi: (1 / hi[:, 0] * (1 - 1e-15), lo[:, 0]))
+    simple = Weights(
+        variables=("mu",), below=lambda lo, hi: (1 / hi * (1 - 1e-15), lo), loss=lambda lo, hi: hi - lo
+    )
     rng = np.random.default_rng(3)
-    for width in (0.3, 0.05):
+    for weights, width in product((simple, over_mu(4.0)), (0.3, 0.05)):
+        objective = Pencil(F, D, weights=weights)
         lo = rng.uniform(-0.6, 0.6, (20, 4))
         lo[:, 3] = rng.uniform(0.5, 3, 20)
         hi = lo + width
@@ -526,7 +531,9 @@ def diagonal(a, b):
 
 
 def weighted(N, D):
-    return Pencil(N, [D], extra={"mu": 2.0}, weights=lambda lo, hi: (lo[:, 0],))
+    return Pencil(
+        N, [D], weights=Weights(variables=("mu",), below=lambda lo, hi: (lo,), loss=lambda lo, hi: hi - lo)
+    )
 
 
 def beside(N, D):

@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tubecert.bounds.feedback import ClosedFormGain
-from tubecert.bounds.suprema import _mu_weights
+from tubecert.bounds.feedback import ClosedFormGain, below_over_mu
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, sin, symbol
@@ -111,13 +110,19 @@ def test_the_closed_form_holds_over_boxes():
             assert half > 1e-3 or (above <= exact * 1.05).all()
 
 
-def test_weights_of_the_denominator_are_rounded_down():
+def test_weights_of_the_denominator_lie_below_it():
+    """Exactly: over a range of mu, what lies between the two ends is at most (1/mu, mu)."""
     rng = np.random.default_rng(3)
-    hi = rng.uniform(0.1, 10, (500, 1))
-    lo = 0.5 * hi
-    inverse, least = _mu_weights(lo, hi)
-    assert all(Fraction(float(w)) * Fraction(float(m)) <= 1 for w, m in zip(inverse, hi[:, 0], strict=True))
-    assert (least == lo[:, 0]).all()
+    lo = rng.uniform(0.1, 10, (400, 1)) * 10.0 ** rng.integers(-8, 8, (400, 1))
+    hi = lo * (1 + rng.choice([0, 1e-12, 1e-3, 0.5, 3, 9], (400, 1)))
+    lo[0], hi[0] = 0, 1e-3
+    for row in np.concatenate([lo, hi, *below_over_mu(lo, hi)], axis=1).tolist():
+        a, b, s0, s1, w0, w1 = map(Fraction, row)
+        for part in (Fraction(k, 7) for k in range(8)):
+            mu = a + part * (b - a)
+            assert mu == 0 or (s0 + part * (s1 - s0)) * mu <= 1
+            assert w0 + part * (w1 - w0) <= mu
+            assert min(s0, s1, w0, w1) >= 0
 
 
 def test_a_piece_is_searched_to_its_very_end():

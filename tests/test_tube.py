@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tubecert.enclosure.branch_and_bound import Effort, supremum
-from tubecert.enclosure.objective import SumOfNorms, scalar
+from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.pencil import scalar
 from tubecert.expression import PI, Expression, constant, parse, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.trajectory import Plan, constant_plan

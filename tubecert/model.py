@@ -19,7 +19,7 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import PI, Interval
-from tubecert.enclosure.objective import scalar
+from tubecert.enclosure.pencil import scalar
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import (
     ZERO,

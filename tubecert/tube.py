@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, down, up
-from tubecert.enclosure.objective import Estimate, scalar
+from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.pencil import scalar
 from tubecert.model import TIME
 from tubecert.trajectory import Plan
 from tubecert.trajectory.plan import PIECE

@@ -1,7 +1,12 @@
-"""The feedback gain du in closed form: a bound of the exact constant that needs no search over mu.
+"""The feedback gain du: the weights of its exact search over mu, and a closed form that needs no such search.
 
-In coordinates in which W is near the identity, v = R r + N n with R, N bases of range(B~') and null(B~); where
-v'F~v <= 0 on the null space (C2, certified before), v'F~v <= |r| |v| sqrt(4 |N'F~R|^2 + max(0, lmax(R'F~R))^2), so
+2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2 makes du the supremum over (x, mu) of the pencil
+(F, B B'/mu + mu W). That denominator is convex in mu: over a range it lies above its tangent at the middle m, which is
+affine in mu, so that the two ends of the range suffice.
+
+The closed form: in coordinates in which W is near the identity, v = R r + N n with R, N bases of range(B~') and
+null(B~); where v'F~v <= 0 on the null space (C2, certified before),
+v'F~v <= |r| |v| sqrt(4 |N'F~R|^2 + max(0, lmax(R'F~R))^2), so
     du <= sqrt(|N'F~R|^2 + max(0, lmax(R'F~R))^2/4)/smin(B~).
 It is up to ten times the exact constant for several inputs, and a fallback where the exact search runs out of boxes.
 Implements: theory section 2, feedback gain, closed form.
@@ -10,14 +15,47 @@ Implements: theory section 2, feedback gain, closed form.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import eigenvalues_midrad, midrad, product, spectral_norm_midrad, whitening
 from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.pencil import Weights
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.model import ControlAffineModel
 
 Ball = tuple[Array, Array]  # midpoints and radii of matrices
+MU = "mu#"  # no state can have this name
+_WIDE = 4.0  # hi/lo of a range over which the tangent is worse than the values at the ends
+
+
+def over_mu(largest: float) -> Weights:
+    """Weights of (B B', W) below (1/mu, mu) over ranges of mu in [0, largest]."""
+    return Weights(variables=(MU,), below=below_over_mu, loss=lambda lo, hi: _loss(lo, hi, largest))
+
+
+def below_over_mu(lo: Array, hi: Array) -> tuple[Array, Array]:
+    """The two ends of the tangent at the middle, (N, 2) each; (1/hi, lo) where the range is wide or reaches 0."""
+    tangent = _narrow(lo, hi)
+    ends = np.concatenate([lo, hi], axis=1)
+    middle = np.where(tangent, 0.5 * (lo + hi), 1.0)
+    slope = (2 * middle - ends) / middle / middle * (1 - 1e-15)  # of B B': 1/m + (m - mu)/m^2, rounded down
+    least = np.where(hi > 0, np.nextafter(1 / np.where(hi > 0, hi, 1.0), 0.0), 0.0)
+    return np.where(tangent, slope, least), np.where(tangent, ends, lo)
+
+
+def _narrow(lo: Array, hi: Array) -> NDArray[np.bool_]:
+    return (lo > 1e-100) & (hi <= _WIDE * lo) & (hi < 1e100)  # nothing over- or underflows
+
+
+def _loss(lo: Array, hi: Array, largest: float) -> Array:
+    """What the weights lose, relative: of second order for narrow ranges.
+
+    Where a range reaches 0, its part of the whole one, which shrinks: it would otherwise be halved for ever where only
+    other variables can help.
+    """
+    wide = np.where(lo > 0, (hi - lo) / np.where(lo > 0, lo, 1.0), hi / largest)
+    return np.where(_narrow(lo, hi), ((hi - lo) / (hi + lo)) ** 2, wide)
 
 
 class ClosedFormGain:

@@ -12,18 +12,12 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Witness
-from tubecert.bounds.feedback import ClosedFormGain
+from tubecert.bounds.feedback import MU, ClosedFormGain, over_mu
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.domain import Range
-from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
-from tubecert.enclosure.objective import (
-    LeastInputGain,
-    Lipschitz,
-    Objective,
-    Pencil,
-    SumOfNorms,
-    SumOfPencils,
-)
+from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
+from tubecert.enclosure.pencil import Pencil, SumOfPencils
 from tubecert.expression import (
     ONE,
     ZERO,
@@ -41,7 +35,6 @@ from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
 from tubecert.tube import Tube
 
-MU = "mu#"  # no state can have this name
 _FEW = 20_000  # boxes
 Report = Callable[[str, int, float, float], None]
 
@@ -134,9 +127,7 @@ class Suprema:
         """
         top = self._over_tube("feedback_gain", Pencil(self.model.BBt, [self.model.W]))
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
-        objective = Pencil(
-            self.model.F, [self.model.BBt, self.model.W], extra={MU: largest}, weights=_mu_weights
-        )
+        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], weights=over_mu(largest))
         found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
@@ -235,12 +226,6 @@ class Suprema:
         centre, _ = self.plan.enclose(moment, moment)
         x = tuple(float(found.at.get(name, centre.mid[0, i])) for i, name in enumerate(self.model.states))
         return Witness(t=t, x=x)
-
-
-def _mu_weights(lo: Array, hi: Array) -> tuple[Array, Array]:
-    """Weights of (B B', W) below (1/mu, mu) for all mu in the range."""
-    inverse = np.where(hi[:, 0] > 0, np.nextafter(1.0 / hi[:, 0], 0.0), 0.0)
-    return inverse, lo[:, 0]
 
 
 def substituted(rows: Matrix, values: dict[str, Expression]) -> Matrix:

@@ -19,7 +19,8 @@ from tubecert.enclosure.branch_and_bound import Effort, Supremum, decide, suprem
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
-from tubecert.enclosure.objective import Objective, Pencil, scalar
+from tubecert.enclosure.objective import Objective
+from tubecert.enclosure.pencil import Pencil, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO, Expression, is_zero

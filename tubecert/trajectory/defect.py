@@ -12,7 +12,8 @@ import numpy as np
 
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import Objective, Pencil, SumOfNorms
+from tubecert.enclosure.objective import Objective, SumOfNorms
+from tubecert.enclosure.pencil import Pencil
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, identity
 from tubecert.model import ControlAffineModel

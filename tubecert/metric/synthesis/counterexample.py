@@ -17,7 +17,8 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array
-from tubecert.enclosure.objective import Objective, Pencil
+from tubecert.enclosure.objective import Objective
+from tubecert.enclosure.pencil import Pencil
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.expression.matrix import identity, multiply, transpose
 from tubecert.metric.synthesis.problem import SynthesisProblem

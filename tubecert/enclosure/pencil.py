@@ -1,0 +1,271 @@
+"""Eigenvalues of matrix pencils (N(x), D(x)), D > 0, as objectives: the least tau with N <= tau D, and sums of such.
+
+A guess tau is tested at the vertices of a box, after a congruence T that makes D nearly the identity: with
+T (N - tau D) T' <= e I and T D T' between l I and g I, l > 0,
+    N <= (tau + e/l) D if e >= 0,    N <= (tau + e/g) D if e <= 0.
+Everything here is rigorous except the guesses, the congruence, and what steers the search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.linalg import (
+    congruence,
+    eigenvalues_midrad,
+    finite,
+    midrad,
+    norm_bound,
+    quadratic_form,
+    whitening,
+)
+from tubecert.enclosure.objective import Estimate, edges, estimate_of
+from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
+from tubecert.expression import ONE, Expression
+
+_CLOSE = 0.5  # |T D T' - I| up to which Weyl's bound of its eigenvalues is good enough
+_EXACT = 4e-15  # relative: what weights at a point may be rounded below the exact ones
+
+Ball = tuple[Array, Array]  # midpoints and radii of matrices
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """D = sum_k w_k D_k with weights w_k >= 0 that depend on further variables.
+
+    `below(lo, hi)`: K arrays (N, E) of weights; over the whole range of the variables, some convex combination of the
+    E sums is at most D in the Loewner order. At a point, each is within 4e-15 of the exact one.
+    `loss(lo, hi)`: how much of D is lost by that, relative, for each variable (N, d); it only steers the search.
+    """
+
+    variables: tuple[str, ...]
+    below: Callable[[Array, Array], Sequence[Array]]
+    loss: Callable[[Array, Array], Array]
+
+
+class Pencil:
+    """The largest eigenvalue of the pencil (N(x), D(x)), D > 0: the least tau with N <= tau D.
+
+    D may be a weighted sum. Lower bounds of D bound N <= tau D for tau >= 0 only, so with weights the value is the
+    largest eigenvalue or 0, whichever is larger.
+    """
+
+    def __init__(
+        self,
+        numerator: Matrix,
+        denominators: Sequence[Matrix],
+        *,
+        weights: Weights | None = None,
+        fixed: frozenset[str] = frozenset(),
+    ) -> None:
+        self._function = MatrixFunction([numerator, *denominators], fixed=fixed)
+        self._own = self._function.variables
+        self._weights = weights
+        self.variables = self._own if weights is None else (*self._own, *weights.variables)
+        self._count = len(denominators)
+
+    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+        """`target` where N <= target D is proven at once, else the bound that the excess over it gives."""
+        own = len(self._own)
+        e = self._function.expand(lo[:, :own], hi[:, :own])
+        mid, rad = list(e.mid), _filled(e)
+        weights = self._below(lo, hi)
+        ends = weights[0].shape[1]
+        numerator = np.tile(mid[0], (1, ends, 1, 1)), np.tile(rad[0], (1, ends, 1, 1))
+        denominator = _weighted(weights, mid[1:], rad[1:])
+        t = self._frame(hi, mid[1:])
+        tested = target if np.isfinite(target) else _guess(t, numerator)
+        excess, above = _bound(t, numerator, denominator, tested)
+        value = above.max(axis=1)
+        if np.isfinite(target):
+            value = np.where((excess <= 0).all(axis=1), np.fmin(target, value), value)
+        if self._weights is not None:
+            value = np.maximum(value, 0.0)
+        # of the ends of the weights, the worst counts for the search
+        excess, above = (x.reshape(len(lo), ends, -1).max(axis=1) for x in (excess, above))
+        estimate = estimate_of(above, self._caused(t, e, target, weights), e, lo[:, :own], hi[:, :own])
+        worst = np.argmax(
+            np.where(np.isnan(excess), -np.inf, excess) if np.isfinite(target) else above, axis=1
+        )
+        corner = np.where(e.signs[worst] > 0, hi[:, :own], lo[:, :own])
+        corner = np.where(e.signs[worst] == 0, 0.5 * (lo + hi)[:, :own], corner)
+        loss = np.zeros((len(lo), 0))
+        if self._weights is not None:
+            loss = _scale(target) * self._weights.loss(lo[:, own:], hi[:, own:])
+        return Estimate(
+            value,
+            np.concatenate([corner, 0.5 * (lo + hi)[:, own:]], axis=1),
+            np.concatenate([estimate.caused, loss], axis=1),
+            np.concatenate([estimate.spread, loss], axis=1),
+        )
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Rayleigh quotient of a proposed eigenvector, rounded down."""
+        own = len(self._own)
+        values = [midrad(g) for g in self._function.at(lo[:, :own], hi[:, :own])]
+        numerator = values[0]
+        weights = [w[:, :1] for w in self._below(lo, hi)]
+        mid, rad = _weighted(
+            weights, [m[:, None] for m, _ in values[1:]], [r[:, None] for _, r in values[1:]]
+        )
+        denominator = mid[:, 0], rad[:, 0]
+        t = whitening(denominator[0])
+        v = np.einsum("nji,nj->ni", t, _eigenvectors(t, numerator[0])[..., -1])
+        quotient = quadratic_form(v, *numerator) / quadratic_form(v, *denominator)
+        lower = quotient.lo - _EXACT * np.abs(quotient.lo)
+        return np.where(np.isnan(lower), -np.inf, lower) if self._weights is None else np.fmax(lower, 0.0)
+
+    def _below(self, lo: Array, hi: Array) -> list[Array]:
+        """Weights of the denominators, each (N, E)."""
+        if self._weights is None:
+            return [np.ones((len(lo), 1))] * self._count
+        own = len(self._own)
+        return list(self._weights.below(lo[:, own:], hi[:, own:]))
+
+    def _frame(self, hi: Array, denominators: list[Array]) -> Array:
+        """A congruence that makes the denominator, weighted as at the upper ends, nearly the identity."""
+        mid, _ = _weighted(self._below(hi, hi), denominators, denominators)
+        return whitening(mid.mean(axis=1))[:, None]
+
+    def _caused(self, t: Array, e: Expansion, target: float, weights: list[Array]) -> Array:
+        """How much each variable's rest adds to the excess, (d, N)."""
+        caused = _whitened_rest(t, e, 0)
+        for k, weight in enumerate(weights):
+            caused = caused + _scale(target) * weight.max(axis=1) * _whitened_rest(t, e, 1 + k)
+        return caused
+
+
+class SumOfPencils:
+    """sum_i max |lambda| of the pencils (N_i(x), D(x)): with D = W^2, sum_i |W^-1 N_i W^-1|."""
+
+    def __init__(self, numerators: Sequence[Matrix], denominator: Matrix) -> None:
+        self._function = MatrixFunction([denominator, *numerators])
+        self.variables = self._function.variables
+
+    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+        """For each i a value is guessed at the vertices, and bounded by what +-N_i exceed it."""
+        e = self._function.expand(lo, hi)
+        filled = _filled(e)
+        denominator = e.mid[0], filled[0]
+        t = whitening(e.mid[0].mean(axis=1))[:, None]
+        total = np.zeros(e.mid[0].shape[:2])
+        caused = np.zeros((lo.shape[1], len(lo)))
+        by_denominator = _whitened_rest(t, e, 0)
+        for i, (mid, rad) in enumerate(zip(e.mid[1:], filled[1:], strict=True), start=1):
+            tau = np.maximum(_guess(t, (mid, rad)), _guess(t, (-mid, rad)))
+            both = [_bound(t, (sign * mid, rad), denominator, tau)[1] for sign in (1.0, -1.0)]
+            value = np.maximum(np.maximum(*both), 0.0).max(axis=1)
+            total = total + value[:, None]
+            caused += _whitened_rest(t, e, i) + np.where(np.isfinite(value), value, 0.0) * by_denominator
+        total = np.where(np.isnan(total), np.inf, total)
+        # where D is not proven positive definite, only what varies D helps, however much the N_i vary
+        caused = np.where(np.isinf(total[:, 0]), by_denominator + _whitened_variation(t, e, 0), caused)
+        return estimate_of(total * (1 + 1e-14), caused, e, lo, hi)
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Quotients |v' N_i v| / v' D v of proposed eigenvectors, rounded down and summed."""
+        values = [midrad(g) for g in self._function.at(lo, hi)]
+        t = whitening(values[0][0])
+        total = np.zeros(len(lo))
+        for mid, rad in values[1:]:
+            vectors = _eigenvectors(t, mid)
+            best = np.zeros(len(lo))
+            for end in (0, -1):
+                v = np.einsum("nji,nj->ni", t, vectors[..., end])
+                quotient = quadratic_form(v, mid, rad) / quadratic_form(v, *values[0])
+                best = np.fmax(best, np.where(np.isnan(quotient.lo), 0.0, quotient.mignitude))
+            total = total + best
+        return total * (1 - 1e-14)
+
+
+def scalar(e: Expression, fixed: frozenset[str] = frozenset()) -> Pencil:
+    """The value of one expression, as the pencil (e, 1)."""
+    return Pencil([[e]], [[[ONE]]], fixed=fixed)
+
+
+# -- bounds at the vertices ------------------------------------------------------------------------------------
+
+
+def _bound(t: Array, numerator: Ball, denominator: Ball, tau: float | Array) -> tuple[Array, Array]:
+    """(e, tau'): T (N - tau D) T' <= e I and N <= tau' D at every vertex, each (N, V); inf where nothing is proven."""
+    level = np.broadcast_to(np.asarray(tau, dtype=float), numerator[0].shape[:2])
+    scale = level[..., None, None]
+    mid = numerator[0] - scale * denominator[0]
+    size = np.abs(numerator[0]) + np.abs(scale) * np.abs(denominator[0])
+    rad = (numerator[1] + np.abs(scale) * denominator[1]) * (1 + 1e-14) + 4e-16 * size
+    excess = eigenvalues_midrad(*congruence(t, mid, rad)).hi[..., -1]
+    least, greatest = _range(t, denominator)
+    step = excess / np.where(excess > 0, least, greatest)
+    above = np.nextafter(level + step + 1e-15 * (np.abs(level) + np.abs(step)), np.inf)
+    proven = (least > 0) & np.isfinite(above)
+    return np.where(np.isnan(excess), np.inf, excess), np.where(proven, above, np.inf)
+
+
+def _range(t: Array, denominator: Ball) -> tuple[Array, Array]:
+    """Bounds of the eigenvalues of T D T' from below and above, (N, V)."""
+    mid, rad = congruence(t, *denominator)
+    departure = norm_bound(np.abs(mid - np.eye(mid.shape[-1])) * (1 + 1e-15) + rad)
+    least, greatest = np.nextafter(1 - departure, -np.inf), np.nextafter(1 + departure, np.inf)
+    far = ~(departure < _CLOSE)
+    if far.any():
+        values = eigenvalues_midrad(mid[far], rad[far])
+        least[far], greatest[far] = values.lo[..., 0], values.hi[..., -1]
+    return least, greatest
+
+
+def _guess(t: Array, numerator: Ball) -> Array:
+    """The largest eigenvalue of T N T' in floats, (N, V)."""
+    scaled = t @ numerator[0] @ np.swapaxes(t, -1, -2)
+    return np.asarray(np.linalg.eigvalsh(np.where(finite(scaled)[..., None, None], scaled, 0.0))[..., -1])
+
+
+def _eigenvectors(t: Array, mid: Array) -> Array:
+    """Eigenvectors of T S T' in floats, 0 where S is not finite."""
+    scaled = t @ mid @ np.swapaxes(t, -1, -2)
+    scaled = np.where(finite(scaled)[..., None, None], 0.5 * (scaled + np.swapaxes(scaled, -1, -2)), 0.0)
+    return np.linalg.eigh(scaled)[1]
+
+
+def _filled(e: Expansion) -> list[Array]:
+    """Radii with the rest of every variable in them."""
+    return [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
+
+
+def _weighted(weights: Sequence[Array], mids: Sequence[Array], rads: Sequence[Array]) -> Ball:
+    """sum_k w_k (mid_k +- rad_k) for every end of the weights, (N, E V, n, n), with the roundings in the radius."""
+    if len(mids) == 1 and np.all(weights[0] == 1.0):
+        return mids[0], rads[0]
+    zero = np.zeros(())
+    by_end = [w[:, :, None, None, None] for w in weights]
+    mid = sum((w * m[:, None] for w, m in zip(by_end, mids, strict=True)), start=zero)
+    size = sum((w * np.abs(m)[:, None] for w, m in zip(by_end, mids, strict=True)), start=zero)
+    rad = sum((w * r[:, None] for w, r in zip(by_end, rads, strict=True)), start=zero)
+    shape = (len(mids[0]), -1, *mids[0].shape[2:])
+    return np.asarray(mid).reshape(shape), np.asarray(rad * (1 + 1e-14) + 1e-15 * size).reshape(shape)
+
+
+# -- what steers the search ------------------------------------------------------------------------------------
+
+
+def _scale(target: float) -> float:
+    return abs(target) if np.isfinite(target) else 1.0
+
+
+def _whitened_rest(t: Array, e: Expansion, k: int) -> Array:
+    """The size of T R_k T' by variable, (d, N)."""
+    abs_t = np.abs(t[:, 0])
+    return norm_bound(abs_t @ e.rest[k].max(axis=2) @ np.swapaxes(abs_t, -1, -2))
+
+
+def _whitened_variation(t: Array, e: Expansion, k: int) -> Array:
+    """How much T G_k T' varies between the vertices, by variable, (d, N)."""
+    variation = np.zeros((e.signs.shape[1], len(t)))
+    for i in np.flatnonzero(e.signs.any(axis=0)):
+        low, high = edges(e.signs, i)
+        step = t @ (e.mid[k][:, high] - e.mid[k][:, low]) @ np.swapaxes(t, -1, -2)
+        variation[i] = norm_bound(np.abs(step)).mean(axis=1)
+    return variation
