@@ -91,6 +91,21 @@ def test_init_names_the_file_that_it_wrote(folder):
     assert "tubecert certify mine.yaml" in (folder / "mine.yaml").read_text().splitlines()[0]
 
 
+def test_init_takes_the_file_as_it_is_named(folder):
+    assert "tubecert certify mine.yaml" in run("init", "mine.yaml", "-t", "tracking").stdout
+    assert (folder / "mine.yaml").read_text().splitlines()[0].endswith("tubecert certify mine.yaml")
+    assert run("init", "mine.yaml").exit_code == 2
+    for arguments, said in (
+        (["other.yaml", "-o", "third.yaml"], "give other.yaml or third.yaml"),
+        (["tracking"], "write --template tracking"),
+    ):
+        result = run("init", *arguments)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert said in result.stderr
+    assert [path.name for path in folder.iterdir()] == ["mine.yaml"]
+    assert run("init", "-").stdout == run("init", "-o", "-").stdout
+
+
 def test_init_to_stdout(folder):
     result = run("init", "-o", "-")
     assert result.stdout == (PACKAGE / "templates" / "regulation.yaml").read_text("utf-8")

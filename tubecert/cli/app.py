@@ -12,18 +12,7 @@ import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
-from tubecert.cli.options import (
-    Colored,
-    Debug,
-    Json,
-    NoProgress,
-    Output,
-    Quiet,
-    SpecFile,
-    Verbose,
-    Version,
-    number_option,
-)
+from tubecert.cli.options import Output, SpecFile, number_option, with_output
 
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
@@ -88,23 +77,15 @@ class Formulas(StrEnum):
 
 
 @app.callback(invoke_without_command=True)
-def _main(
-    context: typer.Context,
-    *,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
-) -> None:
-    context.obj = Output.of(context, locals())
+@with_output
+def _main(context: typer.Context, *, how: Output) -> None:
+    context.obj = how
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
 
 @app.command(epilog=_CERTIFY_AFTER, short_help="Prove the tube, find the smallest gains.")
+@with_output
 def certify(
     context: typer.Context,
     spec: SpecFile,
@@ -149,17 +130,10 @@ def certify(
         list[str] | None,
         typer.Option(metavar="FILE", help="A page about it, too: FILE.html or FILE.md; may be repeated."),
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
     given = dict(locals())
-    how = Output.of(context, given)
     if (bandwidth is None) != (adaptation_rate is None):
         raise typer.BadParameter("--bandwidth and --adaptation-rate are given together", ctx=context)
     with guarded(how):
@@ -170,6 +144,7 @@ def certify(
 
 
 @app.command("report", epilog=_REPORT_AFTER, short_help="Make a page from a certificate.")
+@with_output
 def make_report(
     context: typer.Context,
     certificate: Annotated[
@@ -185,16 +160,9 @@ def make_report(
             help="The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]",
         ),
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Make a page from a certificate, without certifying anything again."""
-    how = Output.of(context, locals())
     with guarded(how):
         from tubecert.cli.report import run
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+from tubecert.cli.options import Debug, Output, Quiet, with_output
 
 _CHECK_AFTER = """\b
 Examples:
@@ -31,7 +31,7 @@ and, as the first line of a specification:
 
 _INIT_AFTER = """\b
 Example:
-  tubecert init --template tracking -o plant.yaml && tubecert certify plant.yaml
+  tubecert init plant.yaml --template tracking && tubecert certify plant.yaml
 """
 
 _EXPLAIN_AFTER = """\b
@@ -79,6 +79,7 @@ _Specs = Annotated[
 ]
 
 
+@with_output
 def check(
     context: typer.Context,
     specs: _Specs,
@@ -98,13 +99,7 @@ def check(
     budget: Annotated[
         str | None, typer.Option(metavar="NUMBER", help="As for certify; with --certify.")
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Check specifications: format, mathematics, what is odd; with --certify also the locked results.
 
@@ -112,7 +107,6 @@ def check(
     changed costs nothing.
     """
     given = dict(locals())
-    how = Output.of(context, given)
     if how.json and format_ not in (None, Format.JSON):
         raise typer.BadParameter("--json and --format exclude each other", ctx=context)
     with guarded(how):
@@ -139,22 +133,32 @@ def schema(
 
 def init(
     context: typer.Context,
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[FILE]", help="The new file; - is stdout.  [TEMPLATE.yaml]", show_default=False
+        ),
+    ] = None,
     *,
     template: Annotated[
         Template, typer.Option("--template", "-t", help="What to start from.")
     ] = Template.REGULATION,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The new file; - is stdout.  [TEMPLATE.yaml]"),
+        typer.Option("--output", "-o", metavar="FILE", help="The same as FILE."),
     ] = None,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
     """Write a commented specification to start from; it certifies as it is. Nothing is overwritten."""
+    if file is not None and output is not None:
+        raise typer.BadParameter(f"FILE and --output name the same: give {file} or {output}", ctx=context)
+    if file in tuple(Template):
+        raise typer.BadParameter(f"{file} is a template: write --template {file}", ctx=context)
     with guarded(Output(debug=debug)):
         from tubecert.cli.init import run
 
-        run(str(template), output, quiet=quiet)
+        run(str(template), output if file is None else file, quiet=quiet)
 
 
 def explain(
@@ -173,19 +177,9 @@ def explain(
         run(topic)
 
 
-def show_version(
-    context: typer.Context,
-    *,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
-) -> None:
+@with_output
+def show_version(context: typer.Context, *, how: Output) -> None:
     """Show the version; with -v, also those of Python and of the libraries that results rest on."""
-    how = Output.of(context, locals())
     with guarded(how):
         from tubecert.cli.version import run
 

@@ -39,4 +39,6 @@ def _create(name: str, text: str) -> None:
 
 
 def _refused(message: str) -> TargetError:
-    return TargetError([Finding(code="TC120", message=message, help="choose another file with -o FILE")])
+    return TargetError(
+        [Finding(code="TC120", message=message, help="choose another file: tubecert init FILE")]
+    )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+import inspect
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, get_type_hints
 
 import typer
 
@@ -34,20 +36,14 @@ def _version(wanted: bool) -> None:
 
 
 _MODERATE: Final = 60  # powers of ten: the conditions hold products of gains, and floats end at 1e308
+_Version = Annotated[
+    bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+]
 SpecFile = Annotated[
     str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
 ]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Also show the constants and all assumptions.")
-]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only the verdict.")]
-Json = Annotated[bool, typer.Option("--json", help="JSON on stdout instead of the report.")]
-Colored = Annotated[Color | None, typer.Option("--color", help="When to colour (NO_COLOR is honoured).")]
-NoProgress = Annotated[bool, typer.Option("--no-progress", help="No progress on stderr.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
-Version = Annotated[
-    bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
-]
 
 
 def number_option(flag: str, help: str) -> object:
@@ -57,22 +53,26 @@ def number_option(flag: str, help: str) -> object:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """How to report."""
+    """How to report: the options that commands share (see `with_output`)."""
 
-    verbose: bool = False
-    quiet: bool = False
-    json: bool = False
-    color: Color | None = None
-    no_progress: bool = False
-    debug: bool = False
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also show the constants and all assumptions.")
+    ] = False
+    quiet: Quiet = False
+    json: Annotated[bool, typer.Option("--json", help="JSON on stdout instead of the report.")] = False
+    color: Annotated[Color | None, typer.Option("--color", help="When to colour (NO_COLOR is honoured).")] = (
+        None
+    )
+    no_progress: Annotated[bool, typer.Option("--no-progress", help="No progress on stderr.")] = False
+    debug: Debug = False
 
     @classmethod
-    def of(cls, context: typer.Context, values: Mapping[str, object]) -> Output:
-        """The options given after the command (among `values`) together with those given before it.
+    def of(cls, context: typer.Context, values: Mapping[str, Any]) -> Output:
+        """The options given after the command (`values`) together with those given before it.
 
         Raises a usage error for `-q` with `-v`.
         """
-        own = cls(**{item.name: values[item.name] for item in fields(cls)})  # type: ignore[arg-type]
+        own = cls(**values)
         before = context.obj if isinstance(context.obj, cls) else cls()
         both = cls(
             **{item.name: getattr(own, item.name) or getattr(before, item.name) for item in fields(cls)}
@@ -80,6 +80,26 @@ class Output:
         if both.quiet and both.verbose:
             raise typer.BadParameter("--quiet and --verbose exclude each other", ctx=context)
         return both
+
+
+def with_output(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options of `Output`, which it takes together as `how`, and with --version."""
+    own = inspect.signature(command, eval_str=True)
+    hints = get_type_hints(Output, include_extras=True)
+    shared = {item.name: (hints[item.name], item.default) for item in fields(Output)}
+
+    @functools.wraps(command)
+    def whole(context: typer.Context, version: bool, **values: Any) -> None:
+        how = Output.of(context, {name: values.pop(name) for name in shared})
+        command(context, **values, how=how)
+
+    parameters = [parameter for name, parameter in own.parameters.items() if name != "how"]
+    parameters += [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
+        for name, (annotation, default) in {**shared, "version": (_Version, False)}.items()
+    ]
+    whole.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return whole
 
 
 class Numbers:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Colored, Debug, Json, NoProgress, Output, Quiet, Verbose, Version
+from tubecert.cli.options import Output, with_output
 
 _AFTER = """\b
 Examples:
@@ -26,6 +26,7 @@ def register(app: typer.Typer) -> None:
     app.command(epilog=_AFTER, short_help="Verify a certificate in a second arithmetic.")(recheck)
 
 
+@with_output
 def recheck(
     context: typer.Context,
     certificate: Annotated[
@@ -41,17 +42,10 @@ def recheck(
         str | None,
         typer.Option(metavar="NUMBER", help="Boxes examined per claim before giving up.  [200000]"),
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
     given = dict(locals())
-    how = Output.of(context, given)
     with guarded(how):
         from tubecert.cli.recheck import run
 

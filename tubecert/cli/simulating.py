@@ -9,18 +9,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import (
-    Colored,
-    Debug,
-    Json,
-    NoProgress,
-    Output,
-    Quiet,
-    SpecFile,
-    Verbose,
-    Version,
-    number_option,
-)
+from tubecert.cli.options import Output, SpecFile, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -50,6 +39,7 @@ def register(app: typer.Typer) -> None:
     )
 
 
+@with_output
 def simulate(
     context: typer.Context,
     spec: SpecFile,
@@ -104,17 +94,10 @@ def simulate(
         str | None,
         typer.Option("--output", "-o", metavar="FOLDER", help="Data and figures.  [SPEC's stem.simulation]"),
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Integrate the closed loops, attack the tube, draw figures. It can falsify a certificate, never support one."""
     given = dict(locals())
-    how = Output.of(context, given)
     if certificate is not None and (epsilon is not None or rho_a is not None):
         raise typer.BadParameter("a certificate has its own epsilon and rho_a", ctx=context)
     with guarded(how):

@@ -8,18 +8,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import (
-    Colored,
-    Debug,
-    Json,
-    NoProgress,
-    Output,
-    Quiet,
-    SpecFile,
-    Verbose,
-    Version,
-    number_option,
-)
+from tubecert.cli.options import Output, SpecFile, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -63,6 +52,7 @@ def register(app: typer.Typer) -> None:
     app.command(epilog=_AFTER, short_help="Find a metric and prove it.")(synth)
 
 
+@with_output
 def synth(
     context: typer.Context,
     spec: SpecFile,
@@ -102,17 +92,10 @@ def synth(
             "--output", "-o", metavar="FILE", help="The metric file; - is stdout.  [SPEC's stem.metric.json]"
         ),
     ] = None,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    json: Json = False,
-    color: Colored = None,
-    no_progress: NoProgress = False,
-    debug: Debug = False,
-    version: Version = False,
+    how: Output,
 ) -> None:
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
     given = dict(locals())
-    how = Output.of(context, given)
     with guarded(how):
         from tubecert.cli.synth import run
 
