@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Debug, Output, Quiet, with_output
+from tubecert.cli.options import Debug, Output, with_output
 
 _CHECK_AFTER = """\b
 Examples:
@@ -119,7 +119,7 @@ def check(
 def schema(
     context: typer.Context,
     name: Annotated[
-        Schema, typer.Argument(metavar="[spec|metric|certificate]", help="Of what.", show_default=False)
+        Schema, typer.Argument(metavar="spec|metric|certificate", help="Of what.", show_default=False)
     ] = Schema.SPEC,
     *,
     debug: Debug = False,
@@ -136,7 +136,7 @@ def init(
     file: Annotated[
         str | None,
         typer.Argument(
-            metavar="[FILE]", help="The new file; - is stdout.  [TEMPLATE.yaml]", show_default=False
+            metavar="FILE", help="The new file; - is stdout.  [TEMPLATE.yaml]", show_default=False
         ),
     ] = None,
     *,
@@ -147,7 +147,7 @@ def init(
         str | None,
         typer.Option("--output", "-o", metavar="FILE", help="The same as FILE."),
     ] = None,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing.")] = False,
     debug: Debug = False,
 ) -> None:
     """Write a commented specification to start from; it certifies as it is. Nothing is overwritten."""
@@ -165,7 +165,7 @@ def explain(
     context: typer.Context,
     topic: Annotated[
         str | None,
-        typer.Argument(metavar="[TOPIC]", help="A code, a constant or an equation.", show_default=False),
+        typer.Argument(metavar="TOPIC", help="A code, a constant or an equation.", show_default=False),
     ] = None,
     *,
     debug: Debug = False,

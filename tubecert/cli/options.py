@@ -42,7 +42,6 @@ _Version = Annotated[
 SpecFile = Annotated[
     str, typer.Argument(metavar="SPEC", help="The specification (YAML).", show_default=False)
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only the verdict.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
 
 
@@ -58,7 +57,7 @@ class Output:
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Also show the constants and all assumptions.")
     ] = False
-    quiet: Quiet = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Only the verdict.")] = False
     json: Annotated[bool, typer.Option("--json", help="JSON on stdout instead of the report.")] = False
     color: Annotated[Color | None, typer.Option("--color", help="When to colour (NO_COLOR is honoured).")] = (
         None
