@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
+from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import exit_code, seal
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
@@ -358,3 +360,23 @@ def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
         <= result["constants"]["h_initial"]["above"] * (1 + 1e-9)
     )
     assert result["constants"]["h_initial"]["above"] <= 0.0101
+
+
+@pytest.mark.parametrize(("supremum", "loser"), [("metric_slope", "conditions_26"), ("norms", None)])
+def test_a_constant_without_a_bound_stops_only_what_needs_it(supremum, loser, monkeypatch):
+    """B and C do not contain the slope of the metric; without a bound of h there is nothing."""
+    honest = getattr(Suprema, supremum)
+
+    def unbounded(self, *arguments):
+        found = honest(self, *arguments)
+        return found if arguments and arguments[0] != "h" else dataclasses.replace(found, above=math.inf)
+
+    monkeypatch.setattr(Suprema, supremum, unbounded)
+    result = run(THREE)
+    assert result["verdict"] == "undecided"
+    assert result["reasons"][0]["relax"] == "raise --budget, or shrink the tube"
+    sections = [
+        result[name]["verdict"] for name in ("conditions_26", "distance", "sampled") if name in result
+    ]
+    assert sections == (["undecided", "certified", "certified"] if loser else [])
+    assert (run(THREE, conditions="distance")["verdict"] == "certified") == (loser is not None)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
-from tubecert.bounds.constants import TABLE, Constant
+from tubecert.bounds.constants import TABLE, Constant, Meaning
 from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.search.results import (
     Conditions26,
@@ -96,6 +96,14 @@ def _certified(claim: str, message: str, halved: Mapping[str, float]) -> Reason:
     return reason
 
 
+UNBOUNDED_RELAX = "raise --budget, or shrink the tube"
+
+
+def unbounded_text(constant: Meaning) -> str:
+    """That a constant has no finite bound."""
+    return f"{constant.words} ({constant.symbol}) could not be bounded within the budget of boxes"
+
+
 def _margin(item: Shortfall, *, no_rate: bool) -> str:
     """The margin of a claim that is not proven, in words where it has no bound; `no_rate` if (26b) is refuted."""
     low, high = float(item.margin.lo), float(item.margin.hi)
@@ -121,12 +129,14 @@ def _short(claim: str, verdict: Verdict, shortfalls: tuple[Shortfall, ...], gain
         message = EXPLAINED.get(item.claim, item.claim)
         if item.allowed is not None and item.needed is not None:
             message += f": {item.needed:.4g} is needed, {item.allowed:.4g} is allowed"
-        elif item.claim.startswith("unbounded: "):
-            message = f"no finite bound of {item.claim.removeprefix('unbounded: ')} was found"
+        elif (constant := TABLE.get(item.claim.removeprefix("unbounded: "))) is not None:
+            message = unbounded_text(constant)
         elif item.claim not in ("as-printed", "nothing found"):
             message += f": {_margin(item, no_rate=no_rate)}"
             message += gain if item.claim in {"26c", "distance", "sampled"} else ""
         reasons.append({"claim": f"{claim}: {item.claim}", "verdict": str(verdict), "message": message})
+        if item.claim.startswith("unbounded: "):
+            reasons[-1]["relax"] = UNBOUNDED_RELAX
     return reasons or [
         {
             "claim": claim,

@@ -116,9 +116,17 @@ FIELDS = {
 _INFIMA = {"a", "smin"}
 
 # what the formulas of each certificate contain (certificate A: and what its options choose)
-_SHARED = {"lower", "B", "B_pinv", "h", "h_x", "h_t", "initial_distance", "plan_defect_metric"}
-_IN_26 = _SHARED | {"upper", "f_x", "B_x", "b_x", "B_pinv_x", "M_x", "u_star"}
-_IN_DISTANCE = _SHARED | {"B_pinv_x", "h_initial", "feedback_gain", "metric_input_gain", "drift_on_plan"}
+NEEDED_BY_ALL = frozenset(
+    {"lower", "B", "B_pinv", "h", "h_x", "h_t", "initial_distance", "plan_defect_metric"}
+)
+_IN_26 = NEEDED_BY_ALL | {"upper", "f_x", "B_x", "b_x", "B_pinv_x", "M_x", "u_star"}
+_IN_DISTANCE = NEEDED_BY_ALL | {
+    "B_pinv_x",
+    "h_initial",
+    "feedback_gain",
+    "metric_input_gain",
+    "drift_on_plan",
+}
 _IN_SAMPLED = _IN_DISTANCE | {"B_x"}
 
 

@@ -14,7 +14,7 @@ from tubecert.bounds.constants import BoundConstants, Constant, Witness
 from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
-from tubecert.certificate.reasons import defect_advice
+from tubecert.certificate.reasons import UNBOUNDED_RELAX, defect_advice, unbounded_text
 from tubecert.certificate.sections import (
     assumptions,
     ceiling_text,
@@ -30,7 +30,7 @@ from tubecert.certificate.sections import (
     witness_data,
 )
 from tubecert.conditions.kernels import Kernel
-from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.conditions.problem import NEEDED_BY_ALL, Drift, Formulas, TubeProblem
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.domain import Range
@@ -242,14 +242,15 @@ class Certification:
         self._search(self._problem(suprema, radius, constants))
 
     def _finite(self, constants: BoundConstants) -> bool:
+        """Whether what every certificate needs is bounded; what only some of them need is for those to say."""
         for name, value, meaning in constants.items():
-            if not math.isfinite(value.above):
+            if name in NEEDED_BY_ALL and not math.isfinite(value.above):
                 return self._stop(
                     f"bound of {name}",
                     "undecided",
-                    f"{meaning.words} ({meaning.symbol}) could not be bounded within the budget of boxes",
+                    unbounded_text(meaning),
                     value.at,
-                    "raise --budget, or shrink the safe set",
+                    UNBOUNDED_RELAX,
                 )
         return True
 
