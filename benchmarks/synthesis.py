@@ -1,7 +1,8 @@
-"""Metric synthesis by sums of squares: wall time over the solver's own, against a plain cvxpy formulation, growth.
+"""Metric synthesis by sums of squares: wall and verification over the solver's own time, plain cvxpy, growth.
 
 python benchmarks/synthesis.py            # all but the large ones
 python benchmarks/synthesis.py wall       # wall time over the solver's own
+python benchmarks/synthesis.py verify     # rounding and the proof of C1-C3, over the solver's own time
 python benchmarks/synthesis.py plain      # against Gram matrices as variables, through cvxpy
 python benchmarks/synthesis.py growth     # with the degree of W, with the pieces, and with the number of states
 python benchmarks/synthesis.py large      # the planar quadrotor with W of degree 3 and 4, and plainly with degree 2
@@ -19,15 +20,16 @@ from typing import Any
 
 import numpy as np
 
+from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, symbol
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.synthesis.family import metric_family
 from tubecert.metric.synthesis.polynomial import Conditions, polynomial_conditions
 from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
+from tubecert.metric.synthesis.rounding import VerifiedMetric, shortest_proven
 from tubecert.metric.synthesis.sos import propose_sos
 from tubecert.model import ControlAffineModel
 
-Bounds = dict[str, tuple[str, str]]
 ANGLE = "1.0471975512"
 
 
@@ -75,13 +77,13 @@ def pvtol(degree: int = 2, rate: float = 0.83) -> SynthesisProblem:
     return problem(PVTOL, PVTOL_BOX, degree, rate)
 
 
-def chain(states: int) -> SynthesisProblem:
+def chain(states: int, rate: float = 0.3) -> SynthesisProblem:
     """An unstable pendulum at the end of a chain of integrators: x1' = sin(x1) + x2, ..., xn' = u."""
     names = [f"x{i}" for i in range(1, states + 1)]
     f = dict(zip(names, [*names[1:], "0"], strict=True))
     f["x1"] = "sin(x1) + x2"
     system = model(f, [["0"]] * (states - 1) + [["1"]])
-    return problem(system, dict.fromkeys(names, "0.5"), 1, 0.3)
+    return problem(system, dict.fromkeys(names, "0.5"), 1, rate)
 
 
 def problem(system: ControlAffineModel, box: dict[str, str], degree: int, rate: float) -> SynthesisProblem:
@@ -151,6 +153,28 @@ def wall() -> None:
         )
 
 
+def verification() -> None:
+    """Rounding and proof of what the solver proposes, with the room to spare that `synth` asks for."""
+    for name, asked, rate in (
+        ("three-state", three_state(rate=0.9995), "0.999"),
+        ("pvtol, degree 2", pvtol(rate=0.835), "0.83"),
+        ("chain of 4 states", chain(4, rate=0.302), "0.3"),
+    ):
+        found = timed(asked)
+        start = time.perf_counter()
+        proven = shortest_proven(asked, found, Fraction(rate), Effort())
+        seconds = time.perf_counter() - start
+        outcome = (
+            f"{proven.digits} digits, kappa {proven.condition_number.above:.4f} proven"
+            if isinstance(proven, VerifiedMetric)
+            else proven.reason
+        )
+        print(
+            f"{name}: {outcome} in {seconds:.2f} s, solver {found.solver_seconds:.2f} s, "
+            f"ratio {seconds / found.solver_seconds:.2f}"
+        )
+
+
 def against_plain(asked: SynthesisProblem, name: str, runs: int) -> None:
     """Against the plain formulation, from the same polynomials on; cvxpy is imported already."""
     import cvxpy  # noqa: F401
@@ -198,6 +222,6 @@ def _line(name: str, found: Proposal) -> None:
 
 
 if __name__ == "__main__":
-    parts = {"wall": wall, "plain": compare, "growth": growth, "large": large}
-    for chosen in sys.argv[1:] or ("wall", "plain", "growth"):
+    parts = {"wall": wall, "verify": verification, "plain": compare, "growth": growth, "large": large}
+    for chosen in sys.argv[1:] or ("wall", "verify", "plain", "growth"):
         parts[chosen]()
