@@ -16,6 +16,11 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _PROBE = """<script>
 addEventListener("load", () => {
   const box = e => { const r = e.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; };
+  const lines = e => {
+    const range = document.createRange();
+    range.selectNodeContents(e);
+    return range.getClientRects().length;
+  };
   const found = {
     width: innerWidth,
     client: document.documentElement.clientWidth,
@@ -26,6 +31,8 @@ addEventListener("load", () => {
       texts: [...svg.querySelectorAll("text")].map(t => [t.textContent, ...box(t)]),
       marks: [...svg.querySelectorAll(".curve, .dot, .sweep, .bar, .tube")].map(box),
     })),
+    heads: [...document.querySelectorAll("th")].map(
+      th => [th.textContent, getComputedStyle(th.closest("thead")).position, lines(th)]),
     sizes: [...document.querySelectorAll("figure > svg text.tick")].map(
       t => parseFloat(getComputedStyle(t).fontSize) * t.getScreenCTM().a),
   };
@@ -139,6 +146,17 @@ def measure(path, folder, *, width: int, dark: bool = False) -> dict:
     parser.feed(found[1])
     parser.close()
     return json.loads("".join(texts))
+
+
+def on_paper(path, folder):
+    """A copy of the page that looks on a screen as it does in print."""
+    source = path.read_text(encoding="utf-8")
+    for media, other in (("@media print", "@media all"), ("@media screen", "@media not all")):
+        assert media in source
+        source = source.replace(media, other)
+    copy = folder / f"paper-{path.name}"
+    copy.write_text(source, encoding="utf-8")
+    return copy
 
 
 def screenshot(path, folder, *, width: int, height: int, dark: bool = False):
