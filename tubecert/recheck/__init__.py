@@ -8,8 +8,10 @@ derivative, kernel, formula or rounding in the producer must not pass both.
 |---|---|
 | `balls` | ball arithmetic: exact numbers, ends, norms, positive definite matrices |
 | `terms`, `program` | expressions with derivative rules of this room's own; evaluated on balls |
-| `identity` | terms that vanish identically, by polynomials over the rationals |
-| `boxes`, `statements` | expansions of second order over boxes; norms, definiteness and signs at their vertices |
+| `monomials` | the same as exact combinations of monomials: a whole matrix with its derivatives by one product |
+| `identity`, `angles` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
+| `boxes`, `expansion` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
+| `statements` | norms, definiteness and signs at those vertices |
 | `pencils`, `multiplier`, `lipschitz` | statements of other kinds: pencils, columns over a ball, an h with kinks |
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
@@ -17,4 +19,5 @@ derivative, kernel, formula or rounding in the producer must not pass both.
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `filtering`, `predictor`, `conditions`, `sampling`, `gains` | the conditions A, B and C at printed gains |
 | `consistency`, `refuted`, `claims` | what must agree; what refutes; all claims in their order |
+| `uncontrollable` | the mode of the linearisation that leaves no metric |
 """

@@ -112,9 +112,20 @@ def pivots(a: Balls) -> list[arb]:
     return found
 
 
-def is_positive(a: Balls) -> bool:
-    """Whether a symmetric matrix is proven to be positive definite (its lower triangle is read)."""
-    return all(pivot > 0 for pivot in pivots(a))
+def is_positive(a: Balls | arb_mat) -> bool:
+    """Whether a symmetric matrix is proven to be positive definite.
+
+    By the signs of its characteristic polynomial: the eigenvalues are real, and none of them is negative or zero if
+    and only if the signs of the coefficients alternate. Where these are not known, by elimination.
+    """
+    m = a if isinstance(a, arb_mat) else arb_mat(a)
+    alternating, signs = True, (1, -1)
+    for k, c in enumerate(reversed(m.charpoly().coeffs())):
+        value = c * signs[k % 2]
+        if value < 0:
+            return False
+        alternating = alternating and bool(value > 0)
+    return alternating or all(pivot > 0 for pivot in pivots(m.tolist()))
 
 
 def is_indefinite(a: Balls) -> bool:
@@ -138,7 +149,7 @@ def spectral_norm(a: Balls) -> arb:
     m = arb_mat(tall)
     gram = (m.transpose() * m).tolist()
     n = len(gram)
-    guess = _largest([[float(x.mid()) for x in row] for row in gram])
+    guess = proposed_largest([[float(x.mid()) for x in row] for row in gram])
     if math.isfinite(guess):
         for inflation in _INFLATIONS:
             top = arb(guess) * (1 + inflation)
@@ -178,7 +189,7 @@ def _bisected(serves: Callable[[arb], bool], high: arb, low: arb) -> arb:
     return high
 
 
-def _largest(a: list[list[float]]) -> float:
+def proposed_largest(a: list[list[float]]) -> float:
     """The largest eigenvalue of a positive semidefinite matrix, a proposal in floats."""
     b = a
     n = len(a)

@@ -1,23 +1,25 @@
 """Terms over boxes: what a list of terms can be on a box, by expansions of second order.
 
 On a box with centre c and radii r, d = x - c: G(x) = G(c) + sum d_i G_i(c) + 1/2 sum d_i d_j G_ij(c) + rest with
-|rest| <= 1/2 sum r_i r_j sup|G_ij - G_ij(c)|. With s_i = d_i^2 that is affine in every pair (d_i, s_i), and the pair
-lies in the hull of (-r, r^2), (-r/2, 0), (r/2, 0), (r, r^2) (edges: tangents of the parabola, and its chord). Norms and
-largest eigenvalues are convex, so products of these vertices are all there is to examine. Where they are too many,
-s_i = r_i^2/2 +- r_i^2/2. Variables in which every entry is affine are replaced by their ends, exactly. Terms with
-kinks: mean value form, then natural extension.
+|rest| <= 1/6 sum r_i r_j r_k sup|G_ijk|, or 1/2 sum r_i r_j sup|G_ij - G_ij(c)| where third derivatives are too many.
+The polynomial is examined at its vertices (`expansion`); where those are too many, s_i = d_i^2 is r_i^2/2 +- r_i^2/2.
+Variables in which every entry is affine are replaced by their ends, exactly. Terms with kinks: mean value form, then
+natural extension.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import combinations_with_replacement, product
+from math import factorial, prod
 from typing import Protocol
 
-from flint import arb
+from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, magnitude
+from tubecert.recheck.expansion import Expansion
+from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import NOUGHT, Term, in_order, names, slopes
 
@@ -26,8 +28,7 @@ Values = Mapping[str, Ball]
 
 _CORNERS = 5  # variables whose corners are all tried
 _VERTICES = 64  # of which curvature may take its share
-_STRAIGHT = ((-1.0, 0.0), (1.0, 0.0))
-_CURVED = ((-1.0, 1.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 1.0))
+_TURNING = 4  # curved variables with which third derivatives are looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,56 +54,6 @@ class Test(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Expansion:
-    """Entries near the centre of a box, row by row, as a polynomial in d_i/r_i; `rest` bounds what is left.
-
-    `steps[i]` belongs to d_i/r_i, `squares[i]` to (d_i/r_i)^2, `mixed` to products of two different ones.
-    """
-
-    value: list[Ball]
-    steps: list[list[Ball]]
-    squares: dict[int, list[Ball]]
-    mixed: dict[tuple[int, int], list[Ball]]
-    rest: list[Ball]
-
-    def corners(self) -> Iterator[list[Ball]]:
-        """The polynomial at vertices whose hull contains all its values."""
-        yield from self._corners(0, self.value, self.steps)
-
-    def _corners(self, i: int, value: list[Ball], steps: list[list[Ball]]) -> Iterator[list[Ball]]:
-        """Variable i at each of its vertices; its products with later ones become a part of their steps."""
-        if i == len(steps):
-            yield value
-            return
-        for d, s in _CURVED if i in self.squares else _STRAIGHT:
-            corner = _added(value, d, steps[i])
-            if s:
-                corner = _added(corner, s, self.squares[i])
-            later = [
-                _added(step, d, self.mixed[i, j]) if (i, j) in self.mixed else step
-                for j, step in enumerate(steps)
-            ]
-            yield from self._corners(i + 1, corner, later)
-
-    def ranges(self) -> list[Ball]:
-        """An enclosure of every entry."""
-        found = []
-        for k, (value, r) in enumerate(zip(self.value, self.rest, strict=True)):
-            size = sum((magnitude(e[k]) for e in (*self.steps, *self.mixed.values())), start=r)
-            total = value + between(-size, size)
-            found.append(sum((between(0, q[k]) for q in self.squares.values()), start=total))
-        return found
-
-
-def _added(corner: list[Ball], factor: float, step: list[Ball]) -> list[Ball]:
-    if factor == 1:
-        return [x + s for x, s in zip(corner, step, strict=True)]
-    if factor == -1:
-        return [x - s for x, s in zip(corner, step, strict=True)]
-    return [x + factor * s for x, s in zip(corner, step, strict=True)]
-
-
 class Field:
     """Terms as functions on boxes; `values` are numbers for the names that are no variables."""
 
@@ -114,24 +65,28 @@ class Field:
         ops = {term.op for term in in_order(entries)}
         self._order = 0 if "direction" in ops else 1 if "norm" in ops else 2
         first = {v: slopes(entries, v) for v in self.variables} if self._order else {}
-        pure = [
-            v for v in self.variables if self._order == 2 and all(e is NOUGHT for e in slopes(first[v], v))
-        ]
+        pure = [v for v in self.variables if self._order == 2 and _all_nought(slopes(first[v], v))]
         self._affine = [self.variables.index(v) for v in pure[:_CORNERS]]
         self._curved = [i for i in range(len(self.variables)) if i not in self._affine]
         curved = [self.variables[i] for i in self._curved]
+        count = len(curved) if self._order == 2 else 0
+        bent = {
+            (a, b): slopes(first[curved[a]], curved[b])
+            for a, b in combinations_with_replacement(range(count), 2)
+        }
+        self._pairs = [pair for pair, e in bent.items() if not _all_nought(e)]
+        second = [e for pair in self._pairs for e in bent[pair]]
+        own = [e for v in curved for e in first.get(v, ())]
         self._program = Program(entries, inputs)
-        self._slopes = Program([e for v in curved for e in first.get(v, ())], inputs)
-        self._pairs: list[tuple[int, int, int]] = []  # place among the outputs, two variables
-        second: list[Term] = []
-        if self._order == 2:
-            for a, v in enumerate(curved):
-                for b, w in enumerate(curved[a:], start=a):
-                    bent = slopes(first[v], w)
-                    if any(e is not NOUGHT for e in bent):
-                        self._pairs.append((len(second), a, b))
-                        second += bent
-        self._curvature = Program(second, inputs)
+        self._centre = Combinations([*entries, *(own if self._order == 2 else ()), *second], inputs)
+        self._triples: list[tuple[int, int, int]] = []
+        if self._order == 2 and count <= _TURNING:
+            turning = {(a, b, c): slopes(e, curved[c]) for (a, b), e in bent.items() for c in range(b, count)}
+            self._order, self._triples = 3, [key for key, e in turning.items() if not _all_nought(e)]
+            whole = [e for key in self._triples for e in turning[key]]
+        else:
+            whole = second if self._order == 2 else own
+        self._whole = Combinations(whole, inputs)
 
     def with_values(self, values: Values) -> Field:
         """The same with other numbers for the same names."""
@@ -172,72 +127,94 @@ class Field:
         if not self._order:
             wide = [hi - lo for lo, hi in box]
             value = self.at(whole)
-            return [Expansion(value, [], {}, {}, [arb(0)] * len(value))], wide, wide
-        found = []
+            return [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value))], wide, wide
+        points, ranges = [], []
         for ends in product((0, 1), repeat=len(self._affine)):
             point, range_ = list(mid), list(whole)
             for end, i in zip(ends, self._affine, strict=True):
                 point[i] = range_[i] = arb(box[i][end])
-            found.append(self._around(point, range_, radius, caused, spread))
+            points.append([*point, *self.values.values()])
+            ranges.append([*range_, *self.values.values()])
+        around = zip(self._centre.run(points), self._whole.run(ranges), strict=True)
+        found = [self._around(at, over, radius, caused, spread) for at, over in around]
         for place, i in enumerate(self._affine):  # two corners that differ in that variable only
             other = found[1 << (len(self._affine) - 1 - place)]
-            spread[i] = sum(
-                abs(float((x - y).mid())) for x, y in zip(found[0].value, other.value, strict=True)
-            )
+            spread[i] = sum(abs(float(x.mid())) for x in (found[0].value - other.value).entries())
         return found, caused, spread
 
     def _around(
-        self, point: list[Ball], box: list[Ball], radius: list[Ball], caused: list[float], spread: list[float]
+        self, at: list[Ball], over: list[Ball], radius: list[Ball], caused: list[float], spread: list[float]
     ) -> Expansion:
-        more = list(self.values.values())
-        value = self._program.run([*point, *more])
-        count = len(value)
-        slope = self._slopes.run([*(point if self._order == 2 else box), *more])
-        rest = [arb(0)] * count
-        steps: list[list[Ball]] = []
-        for a, i in enumerate(self._curved):
-            step = [radius[i] * s for s in slope[a * count : (a + 1) * count]]
+        """Made of values, slopes and curvature at the centre, and of what varies over the box."""
+        count, curved, second = len(self._entries), len(self._curved), self._order >= 2
+        own, varied = _parts(at, count), _parts(over, count)
+        value, rest = _column(own[0]), [arb(0)] * count
+        steps: list[arb_mat] = []
+        for a, slope in enumerate(own[1 : 1 + curved] if second else varied):
+            i = self._curved[a]
+            step = [radius[i] * s for s in slope]
             size = sum(float(magnitude(s)) for s in step)
             spread[i] = max(spread[i], size)
-            if self._order == 2 and a < _CORNERS:
-                steps.append(step)
+            if second and a < _CORNERS:
+                steps.append(_column(step))
             else:
                 rest = [r + magnitude(s) for r, s in zip(rest, step, strict=True)]
                 caused[i] += size
-        squares: dict[int, list[Ball]] = {}
-        mixed: dict[tuple[int, int], list[Ball]] = {}
-        bends = self._bends(point, box, radius) if self._pairs else ()
+        squares: dict[int, arb_mat] = {}
+        mixed: dict[tuple[int, int], arb_mat] = {}
         vertices = 2 ** (len(steps) + len(self._affine))
-        for a, b, near, far in bends:
-            bend = [magnitude(q) for q in near]
+        for (a, b), bent in zip(self._pairs, own[1 + curved :], strict=True):
+            weight = self._weight((a, b), radius)
+            bends = [weight * x for x in bent]
+            bend, near = [magnitude(q) for q in bends], _column(bends)
             share: float = 1  # of what bends at the centre: it goes into the rest
             if a == b and a < len(steps) and 2 * vertices <= _VERTICES:
                 squares[a], share = near, 0
                 vertices *= 2
             elif a == b:  # between 0 and all of it
-                value, share = [x + q / 2 for x, q in zip(value, near, strict=True)], 0.5
+                value, share = value + near * 0.5, 0.5
             elif b < len(steps):
                 mixed[a, b], share = near, 0
-            rest = [r + f + share * q for r, f, q in zip(rest, far, bend, strict=True)]
+            rest = [r + share * q for r, q in zip(rest, bend, strict=True)]
             loss = share or 0.25 * (a == b)  # the hull of a parabola is that much larger
-            wide = sum(float(f) + loss * float(q) for f, q in zip(far, bend, strict=True))
-            for i in {a, b}:
-                caused[self._curved[i]] += wide
+            self._blame((a, b), loss * sum(float(q) for q in bend), caused)
+        for key, far in self._variation(own[1 + curved :], varied, radius):
+            rest = [r + x for r, x in zip(rest, far, strict=True)]
+            self._blame(key, sum(float(x) for x in far), caused)
         return Expansion(value, steps, squares, mixed, [r.upper() for r in rest])
 
-    def _bends(
-        self, point: list[Ball], box: list[Ball], radius: list[Ball]
-    ) -> Iterator[tuple[int, int, list[Ball], list[Ball]]]:
-        """For every two curved variables: r_i r_j G_ij at the centre (half of it if i = j), and how it varies."""
-        more = list(self.values.values())
-        centre, whole = self._curvature.run([*point, *more]), self._curvature.run([*box, *more])
-        count = len(self._program)
-        for start, a, b in self._pairs:
-            weight = radius[self._curved[a]] * radius[self._curved[b]] * (0.5 if a == b else 1)
-            near, far = centre[start : start + count], whole[start : start + count]
-            yield (
-                a,
-                b,
-                [weight * x for x in near],
-                [magnitude(weight * (y - x)) for x, y in zip(near, far, strict=True)],
-            )
+    def _variation(
+        self, bent: list[list[Ball]], varied: list[list[Ball]], radius: list[Ball]
+    ) -> Iterator[tuple[tuple[int, ...], list[Ball]]]:
+        """What the polynomial of second order leaves, for every choice of curved variables that takes part."""
+        if self._order == 3:
+            for triple, turning in zip(self._triples, varied, strict=True):
+                weight = self._weight(triple, radius)
+                yield triple, [magnitude(weight * x) for x in turning]
+        elif self._order == 2:
+            for pair, near, far in zip(self._pairs, bent, varied, strict=True):
+                weight = self._weight(pair, radius)
+                yield pair, [magnitude(weight * (y - x)) for x, y in zip(near, far, strict=True)]
+
+    def _weight(self, key: tuple[int, ...], radius: list[Ball]) -> Ball:
+        """Radii over factorials, as in Taylor's formula, for curved variables in ascending order."""
+        weight = arb(1)
+        for a in key:
+            weight = weight * radius[self._curved[a]]
+        return weight / prod(factorial(key.count(a)) for a in set(key))
+
+    def _blame(self, key: tuple[int, ...], size: float, caused: list[float]) -> None:
+        for a in set(key):
+            caused[self._curved[a]] += size
+
+
+def _parts(entries: list[Ball], count: int) -> list[list[Ball]]:
+    return [entries[k : k + count] for k in range(0, len(entries), count)]
+
+
+def _all_nought(entries: Sequence[Term]) -> bool:
+    return all(e is NOUGHT for e in entries)
+
+
+def _column(entries: list[Ball]) -> arb_mat:
+    return arb_mat(len(entries), 1, entries)

@@ -111,7 +111,8 @@ class Case:
     def whole(self) -> tuple[object, ...]:
         """What every claim about the system depends on."""
         parts = {key: value for key, value in self.effective.mapping().items() if key not in _IDLE}
-        return digest(parts), digest(self.result["metric"]["dual_metric"].value), self.budget
+        metric = self.result.get("metric")  # none was found: what is claimed then is about the system
+        return digest(parts), metric and digest(metric["dual_metric"].value), self.budget
 
     @cached_property
     def over_tube(self) -> tuple[object, ...]:

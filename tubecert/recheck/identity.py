@@ -1,8 +1,8 @@
 """Terms that vanish identically: quotients of polynomials over the rationals, exact.
 
-Variables, roots and transcendental terms are indeterminates; the relations used are sin^2 = 1 - cos^2, sqrt(u)^2 = u,
-and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces to 0 vanishes wherever it is
-defined; nothing is concluded from one that does not.
+Variables, roots and transcendental terms are indeterminates; the relations used are the addition theorems (`angles`),
+sin^2 = 1 - cos^2, sqrt(u)^2 = u, and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces
+to 0 vanishes wherever it is defined; nothing is concluded from one that does not.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from tubecert.recheck.angles import by_addition
 from tubecert.recheck.terms import Term, in_order
 
 Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
@@ -27,6 +28,7 @@ class _Quotient:
 
 def vanish(terms: Sequence[Term]) -> bool:
     """Whether every term is proven to be zero wherever it is defined."""
+    terms = by_addition(terms)
     order = in_order(terms)
     waves = [term for term in order if term.op in ("sin", "cos", "tan")]
     others = [term for term in order if term.op in ("symbol", "pi", "sqrt", "exp", "norm", "direction")]

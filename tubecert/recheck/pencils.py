@@ -11,7 +11,15 @@ from fractions import Fraction
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, exact, is_indefinite, is_positive, spectral_norm
+from tubecert.recheck.balls import (
+    Ball,
+    exact,
+    is_indefinite,
+    is_positive,
+    proposed_largest,
+    spectral_norm,
+    whitening,
+)
 from tubecert.recheck.boxes import Box, Field, Found
 from tubecert.recheck.program import Program
 from tubecert.recheck.statements import PositiveDefinite
@@ -29,7 +37,7 @@ class SlopesBelow:
 
     def __init__(self, matrices: Sequence[Rows], D: Rows, limit: Fraction) -> None:
         self._limit = exact(limit)
-        self._values = {"share#": arb(0)}
+        self._n, self._values = len(D), {"share#": arb(0)}
         share = variable("share#")
         tests = []
         for N in matrices:
@@ -40,12 +48,13 @@ class SlopesBelow:
                 ]
                 tests.append(PositiveDefinite(S, D, self._values))
         self.variables = tuple(sorted({v for test in tests for v in test.variables}))
+        self._pencil = Program([e for rows in (D, *matrices) for row in rows for e in row], self.variables)
         self._tests = [(test, [self.variables.index(v) for v in test.variables]) for test in tests]
 
     def over(self, box: Box) -> Found:
         """Every share on the whole box."""
         at = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
-        least = [self._least(k, at) for k in range(len(self._tests) // 2)]
+        least = self._least(at)
         rest = self._limit - sum(least, start=arb(0))
         total = sum(least, start=arb(0))
         caused, spread = [hi - lo for lo, hi in box], [hi - lo for lo, hi in box]
@@ -70,18 +79,15 @@ class SlopesBelow:
             for test, columns in self._tests
         )
 
-    def _least(self, k: int, at: Sequence[Ball]) -> Ball:
-        """About the least share of one matrix at a point: by bisection, a proposal."""
-        low, high = 0.0, float(self._limit)
-        for _ in range(30 if len(self._tests) > 2 else 0):
-            middle = 0.5 * (low + high)
-            box_tests = self._tests[2 * k : 2 * k + 2]
-            serves = not any(
-                test.with_values({"share#": arb(middle)}).broken([at[i] for i in columns])
-                for test, columns in box_tests
-            )
-            low, high = (low, middle) if serves else (middle, high)
-        return arb(low)
+    def _least(self, at: Sequence[Ball]) -> list[Ball]:
+        """About the least share of each matrix at a point, a proposal in floats: |T N T'| where T D T' = I."""
+        n = self._n
+        entries = self._pencil.run(at)
+        D, *slopes = [arb_mat(n, n, entries[k : k + n * n]) for k in range(0, len(entries), n * n)]
+        T = arb_mat(whitening([[float(x.mid()) for x in row] for row in D.tolist()]))
+        moved = [T * N * T.transpose() for N in slopes]
+        squares = [[[float(x.mid()) for x in row] for row in (N * N.transpose()).tolist()] for N in moved]
+        return [arb(proposed_largest(square)).sqrt() for square in squares]
 
 
 class GainBelow:

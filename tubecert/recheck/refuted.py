@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from flint import arb
 
-from tubecert.recheck import metric
+from tubecert.recheck import metric, uncontrollable
 from tubecert.recheck.balls import Ball, exact, is_indefinite
 from tubecert.recheck.claims import Case, Claim
 from tubecert.recheck.cover import Outcome
@@ -21,6 +21,7 @@ from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
+_SYNTHESIS = "metric synthesis"
 _DECLARED = "declared bounds of the metric"
 
 
@@ -42,6 +43,8 @@ def of_others(case: Case) -> Iterator[Claim]:
 
 
 def _refutation(case: Case, name: str, reason: Node) -> Outcome:
+    if name == _SYNTHESIS:
+        return uncontrollable.excludes(case.effective)
     s, at = case.system, reason.get("at")
     if (name.startswith("metric, ") or name == _DECLARED) and at is not None:
         point = [exact(value) for value in at["x"].numbers()]

@@ -36,17 +36,26 @@ class NormsBelow:
         """The norms of the affine part at its corners, and of the rest."""
         found, caused, spread = self._field.expand(box)
         proven = all(
-            self._norms(corner) + rest <= self._limit
+            self._is_below(corner, self._limit - rest)
             for e in found
             for rest in [self._norms(e.rest)]
             for corner in e.corners()
         )
         return Found(proven, caused, spread)
 
+    def _is_below(self, corner: arb_mat, limit: Ball) -> bool:
+        """One matrix: limit^2 I - G'G > 0; where that fails by little, or there are several, norm by norm."""
+        if len(self._shapes) == 1 and limit > 0:
+            G = arb_mat(*self._shapes[0], corner.entries())
+            gram = G.transpose() * G if G.ncols() <= G.nrows() else G * G.transpose()
+            if is_positive(arb_mat(gram.nrows(), gram.nrows(), limit * limit) - gram):
+                return True
+        return bool(self._norms(corner.entries()) <= limit)
+
     def bound(self, box: Box) -> Ball:
         """An upper bound on a box."""
         found, _, _ = self._field.expand(box)
-        tops = [self._norms(corner) + self._norms(e.rest) for e in found for corner in e.corners()]
+        tops = [self._norms(corner.entries()) + self._norms(e.rest) for e in found for corner in e.corners()]
         return max(tops[1:], key=float, default=tops[0]).max(tops[0]).upper() if _finite(tops) else arb("nan")
 
     def broken(self, point: Sequence[Ball]) -> bool:
@@ -94,10 +103,15 @@ class PositiveDefinite:
     """S(x) > 0, with a congruence that makes `unit` (by default S) near the identity at the centre of each box."""
 
     def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
-        self._n = len(S)
-        self._field = Field([S[i][j] for i in range(self._n) for j in range(self._n)], values)
+        self._n = n = len(S)
+        self._field = Field([S[i][j] for i in range(n) for j in range(i + 1)], values)
+        self._place = [max(i, j) * (max(i, j) + 1) // 2 + min(i, j) for i in range(n) for j in range(n)]
         self.variables = self._field.variables
-        self._unit = None if unit is None else Program([e for row in unit for e in row], self._inputs)
+        self._unit = (
+            None
+            if unit is None
+            else Program([unit[i][j] for i in range(n) for j in range(i + 1)], self._inputs)
+        )
 
     @property
     def _inputs(self) -> tuple[str, ...]:
@@ -112,20 +126,19 @@ class PositiveDefinite:
 
     def over(self, box: Box) -> Found:
         """Every corner of the affine part, minus the row sums of what the rest can be."""
+        n = self._n
         found, caused, spread = self._field.expand(box)
-        t = self._congruence(box, found[0].value)
-        sizes = [[abs(x) for x in row] for row in t]
-        T, size = arb_mat(t), arb_mat(sizes)
+        t = self._congruence(box, found[0].value.entries())
+        T, size = arb_mat(t), arb_mat([[abs(x) for x in row] for row in t])
         turned, size_turned = T.transpose(), size.transpose()
         for e in found:
-            rest = size * arb_mat(self._n, self._n, e.rest) * size_turned
-            drop = [sum(rest[i, j] for j in range(self._n)) for i in range(self._n)]
-            for corner in e.corners():
-                S = (T * arb_mat(self._n, self._n, corner) * turned).tolist()
-                for i in range(self._n):
-                    S[i][i] = S[i][i] - drop[i]
-                if not is_positive(S):
-                    return Found(False, caused, spread)
+            rest = (size * self._square(e.rest) * size_turned).tolist()
+            drop = arb_mat(
+                [[sum(row, start=arb(0)) if i == j else 0 for j in range(n)] for i, row in enumerate(rest)]
+            )
+            moved = e.mapped(lambda S: T * self._square(S.entries()) * turned)
+            if not all(is_positive(S - drop) for S in moved.corners()):
+                return Found(False, caused, spread)
         return Found(True)
 
     def broken(self, point: Sequence[Ball]) -> bool:
@@ -146,8 +159,11 @@ class PositiveDefinite:
     def _congruence_of(rows: list[list[float]]) -> list[list[float]]:
         return whitening(rows)
 
+    def _square(self, entries: Sequence[Ball]) -> arb_mat:
+        return arb_mat(self._n, self._n, [entries[k] for k in self._place])
+
     def _rows(self, entries: Sequence[Ball]) -> Balls:
-        return [list(entries[i * self._n : (i + 1) * self._n]) for i in range(self._n)]
+        return self._square(entries).tolist()
 
 
 class NotNegative:
@@ -168,7 +184,7 @@ class NotNegative:
     def over(self, box: Box) -> Found:
         """The least corner, minus what the rest can be."""
         found, caused, spread = self._field.expand(box)
-        least = [corner[0] - e.rest[0] for e in found for corner in e.corners()]
+        least = [corner[0, 0] - e.rest[0] for e in found for corner in e.corners()]
         proven = all(x > 0 if self._strict else x >= 0 for x in least)
         return Found(proven, caused, spread)
 

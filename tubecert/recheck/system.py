@@ -21,6 +21,7 @@ from tubecert.recheck.terms import (
     all_zero,
     from_expressions,
     matrix_slopes,
+    number_of,
     plus,
     scaled,
     times,
@@ -39,6 +40,17 @@ class Duty:
     argument: Term
     text: str
     over: str  # "set", "time"
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """x' = f + B u on a box; all exact."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    f: Matrix  # (n, 1)
+    B: Matrix
+    safe_set: dict[str, tuple[Fraction, Fraction]]
 
 
 @dataclass(frozen=True)
@@ -150,15 +162,41 @@ def _rows(node: Node, p: int, q: int) -> list[list[Node]]:
     return [_sized(row, q) for row in _sized(node, p)]
 
 
-def read_system(spec: Node) -> System:
-    """The system of a canonical specification."""
+def read_plant(spec: Node) -> Plant:
+    """What a canonical specification says of the system alone."""
+    return _plant(spec)[0]
+
+
+def _plant(spec: Node) -> tuple[Plant, _Reader]:
     _known(spec)
-    system, adaptation = spec["system"], spec["adaptation"]
+    system = spec["system"]
     states, inputs = tuple(system["states"].texts()), tuple(system["inputs"].texts())
     n, m = len(states), len(inputs)
     if not (0 < m <= n) or len({*states, *inputs, TIME}) != n + m + 1:
         raise wrong("TC603", f"{system.path} must name states, and at most as many inputs, all different")
     reader = _Reader(states)
+    plant = Plant(
+        states=states,
+        inputs=inputs,
+        f=reader.column(system["f"], n, "set"),
+        B=[[reader.term(e, "set") for e in row] for row in _rows(system["B"], n, m)],
+        safe_set=_safe_set(spec["safe_set"], states),
+    )
+    return plant, reader
+
+
+def constants(node: Node) -> list[Fraction] | None:
+    """A list of expressions as exact numbers; None if one of them is no rational constant."""
+    reader = _Reader(())
+    terms = [reader.term(item, "time", time=True) for item in node.entries()]
+    return [number_of(e) for e in terms] if all(e.op == "const" for e in terms) else None
+
+
+def read_system(spec: Node) -> System:
+    """The system of a canonical specification."""
+    plant, reader = _plant(spec)
+    n, m = len(plant.states), len(plant.inputs)
+    adaptation = spec["adaptation"]
     uncertainty = spec["uncertainty"]
     bounds = uncertainty.get("bounds")
     start, metric = spec["initial_state"], spec["metric"]
@@ -167,15 +205,15 @@ def read_system(spec: Node) -> System:
     h = uncertainty.get("h")
     horizon = spec["trajectory"].get("horizon")
     found = System(
-        states=states,
-        inputs=inputs,
-        f=reader.column(system["f"], n, "set"),
-        B=[[reader.term(e, "set") for e in row] for row in _rows(system["B"], n, m)],
+        states=plant.states,
+        inputs=plant.inputs,
+        f=plant.f,
+        B=plant.B,
         W=[[reader.term(e, "set") for e in row] for row in _rows(metric["dual_metric"], n, n)],
         rate=metric["rate"].number(),
         h=None if h is None else reader.column(h, m, "time", time=True, kinks=True),
         declared={} if bounds is None else {key: value.number() for key, value in bounds.items()},
-        safe_set=_safe_set(spec["safe_set"], states),
+        safe_set=plant.safe_set,
         x0=None if at is None else [item.number() for item in _sized(at, n)],
         within=None if within is None else within.number(),
         epsilon=spec["tube"]["epsilon"].number(),

@@ -1,0 +1,172 @@
+"""Terms as exact combinations of monomials: what a whole matrix with its derivatives costs is one product.
+
+A factor is a variable, or any operation that is no sum, product or integer power (a wave, a root, one over a
+divisor); factors are evaluated by a `Program`, their products one from another. The coefficients are exact: they come
+from polynomials over the rationals, with sin^2 = 1 - cos^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import Ordering, arb, arb_mat, fmpq, fmpq_mpoly_ctx
+
+from tubecert.recheck.balls import Ball, exact, power
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import UNIT, Term, in_order, number_of
+
+_CHEAPER = 10  # terms of a product of matrices for each step of a program: a step costs three times that
+_LARGE = 4_000  # terms of a polynomial
+
+Monomial = tuple[tuple[int, int], ...]  # (factor, exponent), factors ascending
+Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
+
+
+class Combinations:
+    """Terms to be evaluated at several points at once; straight lines of steps where that is cheaper."""
+
+    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
+        self._plain = Program(outputs, inputs)
+        self._monomials: _Monomials | None = None
+        found = expanded(outputs)
+        if found is None:
+            return
+        factors, polynomials = found
+        rows: dict[tuple[tuple[Monomial, Fraction], ...], int] = {}
+        self._row = [rows.setdefault(tuple(sorted(p.items())), len(rows)) for p in polynomials]
+        monomials = sorted({monomial for p in polynomials for monomial in p})
+        if len(rows) * len(monomials) > _CHEAPER * len(in_order(outputs)):
+            return
+        place = {monomial: k for k, monomial in enumerate(monomials)}
+        table = [[arb(0)] * len(monomials) for _ in rows]
+        for line, k in rows.items():
+            for monomial, q in line:
+                table[k][place[monomial]] = exact(q)
+        self._table = arb_mat(len(rows), len(monomials), [e for line in table for e in line])
+        self._monomials = _Monomials(monomials, factors, inputs)
+
+    def run(self, points: Sequence[Sequence[Ball]]) -> list[list[Ball]]:
+        """Enclosures of the outputs for each point (or box, given as balls)."""
+        if self._monomials is None:
+            return [self._plain.run(point) for point in points]
+        columns = [self._monomials.run(point) for point in points]
+        values = (self._table * arb_mat(columns).transpose()).tolist()
+        return [[values[row][k] for row in self._row] for k in range(len(points))]
+
+
+class _Monomials:
+    """Products of powers of factors, each made from the one before."""
+
+    def __init__(self, monomials: Sequence[Monomial], factors: Sequence[Term], inputs: Sequence[str]) -> None:
+        used = sorted({factor for monomial in monomials for factor, _ in monomial})
+        self._program = Program([factors[k] for k in used], inputs)
+        self._powers = sorted({pair for monomial in monomials for pair in monomial})
+        column = {factor: k for k, factor in enumerate(used)}
+        self._raised = [(column[factor], n) for factor, n in self._powers]
+        place: dict[Monomial, int] = {(): 0}
+        self._steps: list[tuple[int, int]] = []  # a monomial before, and a power
+        power_at = {pair: k for k, pair in enumerate(self._powers)}
+        for monomial in monomials:
+            for size in range(1, len(monomial) + 1):
+                if monomial[:size] not in place:
+                    place[monomial[:size]] = len(place)
+                    self._steps.append((place[monomial[: size - 1]], power_at[monomial[size - 1]]))
+        self._outputs = [place[monomial] for monomial in monomials]
+
+    def run(self, point: Sequence[Ball]) -> list[Ball]:
+        """All monomials at a point."""
+        factors = self._program.run(point)
+        powers = [factors[k] if n == 1 else power(factors[k], n) for k, n in self._raised]
+        values = [arb(1)]
+        for before, k in self._steps:
+            values.append(values[before] * powers[k] if before else powers[k])
+        return [values[k] for k in self._outputs]
+
+
+def expanded(outputs: Sequence[Term]) -> tuple[list[Term], list[dict[Monomial, Fraction]]] | None:
+    """Factors, and every output as a polynomial in them; None if there is nothing to gain, or too much to write."""
+    order = in_order(outputs)
+    place: dict[Term, int] = {}
+    for term in sorted(order, key=lambda term: term.op != "sin"):  # sines first in the order of the ring
+        factor = _factor(term)
+        if factor is not None:
+            place.setdefault(factor, len(place))
+    factors = list(place)
+    if not factors:
+        return None
+    ring = fmpq_mpoly_ctx.get([f"v{k}" for k in range(len(factors))], Ordering.lex)
+    generators = dict(zip(factors, ring.gens(), strict=True))
+    value: dict[Term, Polynomial] = {}
+    for term in order:
+        factor = _factor(term)
+        known = None if factor is None else generators[factor]
+        value[term] = found = _polynomial(term, [value[arg] for arg in term.args], known, ring)
+        if found is None:
+            return None
+    relations = [
+        generators[sine] ** 2 + generators[cosine] ** 2 - 1
+        for sine in factors
+        for cosine in factors
+        if sine.op == "sin" and cosine.op == "cos" and sine.args == cosine.args
+    ]
+    return factors, [_written(value[term], relations) for term in outputs]
+
+
+def _factor(term: Term) -> Term | None:
+    """What a term contributes as a factor: itself, one over the base of its divisor, or nothing."""
+    if term.op in ("const", "add", "mul") or (term.op == "pow" and _exponent(term) > 0):
+        return None
+    return UNIT / _divisor(term)[0] if term.op in ("div", "pow") else term
+
+
+def _divisor(term: Term) -> tuple[Term, int]:
+    """(e, n) of a division by e^n."""
+    divisor = term.args[1] if term.op == "div" else term
+    if divisor.op != "pow":
+        return divisor, 1
+    n = _exponent(divisor)
+    if term.op == "pow":
+        return term.args[0], -n
+    return (divisor.args[0], n) if n > 0 else (divisor, 1)
+
+
+def _exponent(term: Term) -> int:
+    return int(str(term.value))
+
+
+def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: Any) -> Polynomial:
+    """A term from its arguments; None where it gets too large."""
+    match term.op:
+        case "const":
+            q = number_of(term)
+            return ring.constant(1) * fmpq(q.numerator, q.denominator)
+        case "add":
+            found = args[0] + args[1]
+        case "mul":
+            if len(args[0]) * len(args[1]) > _LARGE:
+                return None
+            found = args[0] * args[1]
+        case "div":
+            found = args[0] * factor ** _divisor(term)[1]
+        case "pow" if factor is not None:
+            found = factor ** _divisor(term)[1]
+        case "pow":
+            found = ring.constant(1)
+            for _ in range(_exponent(term)):
+                if len(found) * len(args[0]) > _LARGE:
+                    return None
+                found = found * args[0]
+        case _:
+            found = factor
+    return found if len(found) <= _LARGE else None
+
+
+def _written(p: Polynomial, relations: Sequence[Polynomial]) -> dict[Monomial, Fraction]:
+    for relation in relations:
+        p = divmod(p, relation)[1]
+    return {
+        tuple((k, int(n)) for k, n in enumerate(exponents) if n): Fraction(int(q.p), int(q.q))
+        for exponents, q in p.to_dict().items()
+    }
