@@ -1,0 +1,131 @@
+"""The plane of two states: plan, tube, obstacles and loops."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.simulate.campaign import Campaign
+from tubecert.simulate.clearance import corners_of
+from tubecert.simulate.figures_style import blank, labelled, line, title
+from tubecert.simulate.setting import Setting
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SHAPES: Final = 400  # cross-sections of the tube that are drawn
+_TUBE: Final = "#FBE3B5"  # opaque: overlapping shapes must not darken each other
+
+
+def plane(campaign: Campaign) -> Figure | None:
+    """The plane with plan, tube, obstacles and loops."""
+    setting = campaign.setting
+    names = _names(setting)
+    if names is None:
+        return None
+    from matplotlib.collections import PolyCollection
+
+    figure = blank(6.4, 5.6)
+    axis = figure.subplots()
+    i, j = (setting.spec.states.index(name) for name in names)
+    plan = _fine_plan(setting)
+    section = _section(setting, i, j)
+    shapes = [section + point for point in _spread(plan[:, [i, j]])]
+    axis.add_collection(PolyCollection(shapes, facecolors=_TUBE, edgecolors="none", zorder=1))
+    _obstacles(axis, setting, names)
+    for item in campaign.drawn:
+        axis.plot(item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4, **line(item))
+    axis.plot(plan[:, i], plan[:, j], color="black", lw=1.0, ls="--", zorder=5, label="plan")
+    axis.plot(*plan[0, [i, j]], marker="o", ms=4, color="black", ls="none", zorder=6)
+    axis.plot(*plan[-1, [i, j]], marker="s", ms=4, color="black", ls="none", zorder=6)
+    _window(axis, np.vstack(shapes), [item.runs.x[0][:, [i, j]] for item in campaign.drawn])
+    axis.set_aspect("equal")
+    axis.set_xlabel(labelled(setting, names[0]))
+    axis.set_ylabel(labelled(setting, names[1]))
+    axis.set_title(title(campaign), fontsize=9, loc="left")
+    handles, labels = axis.get_legend_handles_labels()
+    from matplotlib.patches import Patch
+
+    tube = Patch(facecolor=_TUBE)
+    figure.legend([tube, *handles], ["tube", *labels], loc="outside lower center", ncols=5)
+    return figure
+
+
+def _names(setting: Setting) -> tuple[str, str] | None:
+    """The states of the plane that is drawn: those asked for, else those of an obstacle, else the first two."""
+    spec = setting.spec
+    if spec.simulation and spec.simulation.plane:
+        return spec.simulation.plane
+    if spec.obstacles:
+        return spec.obstacles[0].states
+    return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
+
+
+def _fine_plan(setting: Setting) -> Array:
+    """The plan's states (K, n) for drawing."""
+    t = np.linspace(0.0, setting.horizon, 2001)
+    x, _ = setting.plan.enclose(t, t)
+    return x.mid
+
+
+def _spread(curve: Array) -> Array:
+    """Points (K, 2) of a curve at equal distances along it."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    if length[-1] == 0:
+        return curve[:1]
+    wanted = np.linspace(0.0, length[-1], _SHAPES)
+    return np.stack([np.interp(wanted, length, curve[:, i]) for i in range(2)], axis=1)
+
+
+def _section(setting: Setting, i: int, j: int) -> Array:
+    """The outline (K, 2) of the tube around a point of the plan, projected to the plane of two states.
+
+    For a constant metric that is the projection of the ellipsoid d < dbar; else the disc of radius rho, cut to the
+    half-widths.
+    """
+    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    W = setting.model.W
+    if all(e.is_constant for row in W for e in row):
+        values = Tape([W[a][b] for a in (i, j) for b in (i, j)], ()).run_floats([], ()).reshape(2, 2)
+        return np.asarray(setting.reach * circle @ np.linalg.cholesky(values).T)
+    widths = setting.half_widths[[i, j]]
+    return np.clip(setting.rho * circle, -widths, widths)
+
+
+def _obstacles(axis: Axes, setting: Setting, names: tuple[str, str]) -> None:
+    from matplotlib.patches import Circle, Patch, Polygon
+
+    label: str | None = "obstacle"
+    for obstacle in setting.spec.obstacles:
+        if set(obstacle.states) != set(names):
+            continue
+        turned = obstacle.states != names
+        style: dict[str, Any] = {"facecolor": "#BDBDBD", "edgecolor": "#6E6E6E", "zorder": 2, "label": label}
+        patch: Patch
+        if obstacle.radius is not None:
+            center = [float(value) for value in obstacle.center]
+            patch = Circle((center[::-1] if turned else center), float(obstacle.radius), **style)  # type: ignore[arg-type]
+        else:
+            corners = corners_of(obstacle)
+            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True, **style)
+        axis.add_patch(patch)
+        label = None
+
+
+def _window(axis: Axes, tube: Array, curves: list[Array]) -> None:
+    """The tube and what stays within a tube of it."""
+    low, high = tube.min(axis=0), tube.max(axis=0)
+    room = 0.5 * (high - low)
+    for curve in curves:
+        shown = curve[np.isfinite(curve).all(axis=1)]
+        if len(shown):
+            low = np.maximum(np.minimum(low, shown.min(axis=0)), tube.min(axis=0) - room)
+            high = np.minimum(np.maximum(high, shown.max(axis=0)), tube.max(axis=0) + room)
+    margin = 0.04 * (high - low)
+    axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axis.set_ylim(low[1] - margin[1], high[1] + margin[1])

@@ -1,0 +1,83 @@
+"""What the figures of a campaign have in common: colours, names, labels, legends.
+
+Colours are those of Okabe and Ito, told apart by everybody; what is certified is orange, the plan is dashed black.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from tubecert.simulate.campaign import Campaign, Drawn
+from tubecert.simulate.setting import Setting
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS: Final = {
+    "l1": "#0072B2",
+    "sampled": "#009E73",
+    "ccm": "#D55E00",
+    "reference": "#CC79A7",
+    "nominal": "#7F7F7F",
+}
+TUBE: Final = "#E69F00"
+NAMES: Final = {
+    "l1": "L1 adaptive",
+    "sampled": "L1, sampled adaptation",
+    "ccm": "CCM alone",
+    "reference": "reference system",
+    "nominal": "CCM, no uncertainty",
+}
+STYLE: Final[Any] = {
+    "svg.hashsalt": "tubecert",
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "savefig.dpi": 150,
+}
+
+
+def blank(width: float, height: float) -> Figure:
+    """An empty figure, in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def line(item: Drawn) -> dict[str, Any]:
+    """How the curves of a loop are drawn: dashed for one whose promise is not tested."""
+    controller = item.loop.controller
+    style = "-" if item.loop.tested or controller in ("nominal", "reference") else (0, (6, 1.5))
+    return {"color": COLORS[controller], "ls": style, "label": NAMES[controller]}
+
+
+def labelled(setting: Setting, name: str) -> str:
+    """A state or input with its unit, as far as the specification tells."""
+    unit = dict(setting.spec.units).get(name)
+    return f"{name} [{unit}]" if unit else name
+
+
+def title(campaign: Campaign) -> str:
+    """What a figure is about."""
+    setting = campaign.setting
+    return f"{setting.spec.name}: rho = {setting.rho:.4g}, uncertainty {campaign.uncertainty}"
+
+
+def finish(figure: Figure, bottom: Axes, legend: Axes, campaign: Campaign) -> None:
+    """Time on the axes at the bottom, the title over those whose labels become the legend."""
+    bottom.set_xlabel("t [s]")
+    bottom.set_xlim(0, campaign.setting.horizon)
+    legend.set_title(title(campaign), fontsize=9, loc="left")
+    handles, labels = legend.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
