@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
 from tubecert.cli.app import app
-from tubecert.errors import RefutedError, SpecError
+from tubecert.cli.belonging import ForeignError
+from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
 from tubecert.spec import canonical
 
@@ -621,7 +622,7 @@ def test_a_log_that_cannot_be_written(proven, monkeypatch):
 
 def test_errors_bring_their_code(proven):
     finding = Finding(code="TC203", message="B loses rank")
-    for error, code in ((SpecError([finding]), 2), (RefutedError([finding]), 1)):
+    for error, code in ((SpecError([finding]), 2), (ForeignError([finding]), 1)):
         proven["result"] = error
         result = run("certify", SPEC)
         quiet_failure(result, code)

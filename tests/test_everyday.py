@@ -17,8 +17,7 @@ from tubecert import lint, spec
 from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.checking import expectations
 from tubecert.cli.app import app
-from tubecert.cli.init import TEMPLATES
-from tubecert.cli.schema import NAMES
+from tubecert.cli.everyday import Schema, Template
 from tubecert.report import pages
 
 PACKAGE = Path(tubecert.__file__).parent
@@ -40,7 +39,7 @@ def run(*arguments):
 # schema
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", Schema)
 def test_schema(name):
     result = run("schema", name)
     assert result.exit_code == 0
@@ -56,7 +55,7 @@ def test_schema_of_the_specification_by_default():
 # init
 
 
-@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("template", Template)
 def test_templates_certify_as_they_are(template, folder):
     made = run("init", "--template", template)
     assert (made.exit_code, made.stderr) == (0, "")

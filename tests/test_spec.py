@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.expression import free_symbols, symbol, to_text
 from tubecert.findings import Finding
-from tubecert.spec import CODES, Spec, apply_overrides, canonical, load, load_text
+from tubecert.spec import CODES, Spec, canonical, load, load_text
 
 ROOT = Path(__file__).parents[1]
 OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
@@ -247,20 +247,6 @@ def test_long_constants_survive_the_canonical_form() -> None:
     text = minimal("inputs: [u],", "inputs: [u], parameters: {a: 0.1234567890123456789, b: a**12/7},")
     data = canonical(load_text(text.replace("f: [-x]", "f: [-b*x]")))
     assert canonical(load_text(json.dumps(data))) == data
-
-
-def test_overrides_are_read_like_the_file() -> None:
-    spec = load(str(ROOT / "configs/three_state.yaml"))
-    changed = apply_overrides(spec, rho_a="1e-1/5")
-    assert (changed.tube.rho_a, changed.tube.epsilon) == (Fraction(1, 50), Fraction(1, 100))
-    assert spec.tube.rho_a == Fraction(1, 100)
-    assert apply_overrides(spec) == spec
-    assert apply_overrides(spec, epsilon=Fraction(1, 3)).tube.epsilon == Fraction(1, 3)
-    for given_text in ("-1", "0", "nan", "1e10000000", "__import__('os')", ""):
-        with pytest.raises(SpecError) as caught:
-            apply_overrides(spec, epsilon=given_text, rho_a=given_text)
-        files = [f.location.file for f in caught.value.findings if f.location]
-        assert files == ["--epsilon", "--rho-a"]
 
 
 def test_specs_are_values() -> None:

@@ -42,9 +42,3 @@ class SpecError(TubecertError):
 
 class TargetError(TubecertError):
     """A file cannot be read or written (exit code 2)."""
-
-
-class RefutedError(TubecertError):
-    """A claim that everything later rests on is false, with its witness (exit code 1)."""
-
-    exit_code = ExitCode.NOT_CERTIFIED

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Final
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
-
-TEMPLATES: Final = ("regulation", "tracking", "pvtol")
 
 
 def run(template: str, target: str | None, *, quiet: bool) -> None:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from importlib import resources
-from typing import Final
 
 from tubecert.cli.guard import write_stdout
-
-NAMES: Final = ("spec", "metric", "certificate")
 
 
 def run(name: str) -> None:

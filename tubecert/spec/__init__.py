@@ -17,7 +17,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 
 from tubecert.spec.canonical import canonical
 from tubecert.spec.codes import CODES
-from tubecert.spec.load import apply_overrides, load, load_text
+from tubecert.spec.load import load, load_text
 from tubecert.spec.types import (
     Adaptation,
     Bounds,
@@ -61,7 +61,6 @@ __all__ = [
     "Tube",
     "Uncertainty",
     "Vector",
-    "apply_overrides",
     "canonical",
     "load",
     "load_text",

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from fractions import Fraction
 from types import MappingProxyType
 from typing import Final
 
 from tubecert.errors import SpecError
-from tubecert.expression import ExpressionError, parse_number
-from tubecert.findings import Finding, Location
+from tubecert.findings import Finding
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
@@ -20,7 +17,7 @@ from tubecert.spec.settings import read_adaptation, read_expectation, read_kerne
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty, wanted_metric
-from tubecert.spec.types import Metric, Spec, Synthesis, Tube
+from tubecert.spec.types import Metric, Spec, Synthesis
 
 VERSION: Final = 1
 
@@ -161,42 +158,3 @@ def _check_version(field: Field | None) -> None:
     version = field.number({}) if field else None
     if field is not None and version is not None and version != VERSION:
         field.fail(codes.RANGE, f"version {version} of the format is unknown", f"write tubecert: {VERSION}")
-
-
-def apply_overrides(
-    spec: Spec, *, epsilon: str | Fraction | None = None, rho_a: str | Fraction | None = None
-) -> Spec:
-    """The specification with radii from the command line; raises `SpecError` naming the option."""
-    findings: list[Finding] = []
-    parameters = dict(spec.parameters)
-    given = {
-        "epsilon": _override("--epsilon", epsilon, parameters, findings),
-        "rho_a": _override("--rho-a", rho_a, parameters, findings),
-    }
-    if findings:
-        raise SpecError(findings)
-    tube = Tube(
-        epsilon=spec.tube.epsilon if given["epsilon"] is None else given["epsilon"],
-        rho_a=spec.tube.rho_a if given["rho_a"] is None else given["rho_a"],
-    )
-    return replace(spec, tube=tube)
-
-
-def _override(
-    option: str, given: str | Fraction | None, parameters: dict[str, Fraction], findings: list[Finding]
-) -> Fraction | None:
-    if given is None:
-        return None
-    text = str(given)
-    try:
-        value = given if isinstance(given, Fraction) else parse_number(text, parameters)
-    except ExpressionError as error:
-        place = Location(file=option, line=1, column=error.offset + 1, source=text, width=error.width)
-        findings.append(Finding(code=codes.NUMBER, message=error.message, location=place, help=error.help))
-        return None
-    if value <= 0:
-        place = Location(file=option, line=1, column=1, source=text, width=len(text))
-        findings.append(
-            Finding(code=codes.RANGE, message=f"{option} is {text[:40]}; it must be > 0", location=place)
-        )
-    return value
