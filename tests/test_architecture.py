@@ -15,6 +15,7 @@ ROOT = PACKAGE.parent
 ROOMS = [
     "errors",
     "findings",
+    "files",
     "expression",
     "recheck",
     "spec",

@@ -26,6 +26,7 @@ from tubecert.checking import Checked, cache
 from tubecert.checking.expectations import Claim
 from tubecert.cli.app import app
 from tubecert.errors import ExitCode
+from tubecert.files import kept_folder, seal
 from tubecert.findings import Finding, Location, Severity
 from tubecert.report import github, junit, sarif
 
@@ -393,7 +394,7 @@ def test_nothing_to_check_is_said_in_every_format(format_, folder):
 
 
 def entries() -> list[Path]:
-    return sorted(cache.folder().glob("*.json"))
+    return sorted(kept_folder(cache.KIND).glob("*.json"))
 
 
 def test_an_unchanged_file_costs_nothing(monkeypatch, certified):
@@ -452,8 +453,8 @@ def test_another_program_does_it_again(monkeypatch):
         lambda text: text.replace("certified", "refuted"),
         lambda text: text.replace("[", "{", 1),
         lambda text: json.dumps({**json.loads(text), "data": None}),
-        lambda text: json.dumps({**json.loads(text), "data": [], "seal": cache._seal([])}),
-        lambda text: json.dumps({**json.loads(text), "data": {"a": 1}, "seal": cache._seal({"a": 1})}),
+        lambda text: json.dumps({**json.loads(text), "data": [], "seal": seal([])}),
+        lambda text: json.dumps({**json.loads(text), "data": {"a": 1}, "seal": seal({"a": 1})}),
         lambda text: "[" * 100_000,
         lambda text: "\udcff",
     ],

@@ -15,6 +15,7 @@ from tubecert.conditions.problem import Drift
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import ExitCode, SpecError
+from tubecert.files import kept_folder
 from tubecert.model import build
 from tubecert.pipeline import Options, certify, gains
 from tubecert.search.distance import search_distance
@@ -261,7 +262,7 @@ def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
     assert one.knots == two.knots
     plan_of(edited(SMALL, ("  R: 1\n", "  R: 2\n")), MODEL, ROOM)
     assert len(calls) == 2
-    assert len(list(cache.folder().iterdir())) == 2
+    assert len(list(kept_folder(cache.KIND).iterdir())) == 2
 
 
 @pytest.mark.parametrize(
@@ -270,7 +271,7 @@ def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
         lambda text: "",
         lambda text: text[:-20],
         lambda text: "[1, 2]",
-        lambda text: json.dumps(json.loads(text) | {"u": [["0"]] * 21}),
+        lambda text: json.dumps(json.loads(text) | {"data": [["0"]] * 21}),
         lambda text: json.dumps(json.loads(text) | {"seal": 1}),
     ],
 )
@@ -278,7 +279,7 @@ def test_a_broken_cache_is_not_believed(tmp_path, monkeypatch, damage):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     spec = edited(SMALL)
     before = plan_of(spec, MODEL, ROOM).knots
-    (path,) = cache.folder().iterdir()
+    (path,) = kept_folder(cache.KIND).iterdir()
     path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
     calls = counted(monkeypatch)
     assert plan_of(spec, MODEL, ROOM).knots == before

@@ -6,17 +6,16 @@ keys, no spaces, no NaN), so that any change of what was proven shows. Trusted: 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from tubecert.errors import ExitCode, TargetError
+from tubecert.files import replace
 from tubecert.findings import Finding
 
 FORMAT = "tubecert-certificate/1"
@@ -129,7 +128,7 @@ def write_text(target: str, text: str, remedy: str = REMEDY) -> None:
             with path.open("w", encoding="utf-8") as device:
                 device.write(text)
         else:
-            _replace(path, text)
+            replace(path, text.encode())
     except OSError as error:
         raise _unwritable(target, error.strerror or str(error), remedy) from error
 
@@ -140,25 +139,6 @@ def same_file(target: str, source: str | Path) -> bool:
         return Path(target).samefile(source)
     except (OSError, ValueError):
         return False
-
-
-def _replace(path: Path, text: str) -> None:
-    # a link keeps pointing where it points: the file it names is replaced
-    path = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(temporary).unlink()
-        raise
 
 
 def _unwritable(target: str, why: str, remedy: str) -> TargetError:

@@ -7,11 +7,8 @@ written, or cannot be read, counts as absent.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import tempfile
 from dataclasses import asdict
 from fractions import Fraction
 from functools import cache
@@ -21,16 +18,12 @@ from typing import Any
 
 import tubecert
 from tubecert.checking.expectations import Claim, Outcome
+from tubecert.files import keep, read_kept
 from tubecert.findings import Finding, Location, Severity
 from tubecert.spec import Spec, canonical
 
+KIND = "checks"
 _LIBRARIES = ("numpy", "scipy", "pyyaml")
-
-
-def folder() -> Path:
-    """Where checks are kept."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".cache") / "tubecert" / "checks"
 
 
 def key_of_text(what: str, spec: Spec) -> str:
@@ -65,7 +58,7 @@ def _program() -> list[str]:
 
 def read_findings(name: str, spec: Spec) -> list[Finding] | None:
     """The findings kept under a name, at their places in the file of `spec`."""
-    data = _read(name)
+    data = read_kept(KIND, name)
     try:
         return None if data is None else [_finding(item, spec.path) for item in data]
     except (KeyError, TypeError, ValueError):
@@ -76,7 +69,7 @@ def write_findings(name: str, findings: list[Finding]) -> None:
     """Keep findings; those of other files (a plan's) are not kept, since these may change."""
     files = {item.location.file for item in findings if item.location}
     if len(files) <= 1:
-        _write(name, [asdict(item) for item in findings])
+        keep(KIND, name, [asdict(item) for item in findings])
 
 
 def _finding(data: dict[str, Any], path: str) -> Finding:
@@ -87,7 +80,7 @@ def _finding(data: dict[str, Any], path: str) -> Finding:
 
 def read_outcome(name: str) -> Outcome | None:
     """The outcome kept under a name."""
-    data = _read(name)
+    data = read_kept(KIND, name)
     try:
         return None if data is None else _outcome(data)
     except (KeyError, TypeError, ValueError):
@@ -96,7 +89,7 @@ def read_outcome(name: str) -> Outcome | None:
 
 def write_outcome(name: str, found: Outcome) -> None:
     """Keep an outcome."""
-    _write(name, asdict(found))
+    keep(KIND, name, asdict(found))
 
 
 def _outcome(data: dict[str, Any]) -> Outcome:
@@ -105,32 +98,3 @@ def _outcome(data: dict[str, Any]) -> Outcome:
         numbers=tuple((str(key), value) for key, value in data["numbers"]),
         claims=tuple(Claim(**claim) for claim in data["claims"]),
     )
-
-
-def _read(name: str) -> Any:
-    try:
-        kept = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
-        return kept["data"] if kept["key"] == name and kept["seal"] == _seal(kept["data"]) else None
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, RecursionError):
-        return None
-
-
-def _write(name: str, data: Any) -> None:
-    """Keep data; a cache that cannot be written is no one's concern."""
-    text = json.dumps({"key": name, "seal": _seal(data), "data": data})
-    with contextlib.suppress(OSError, RuntimeError):
-        place = folder()
-        place.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=place, suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            Path(temporary).replace(place / f"{name}.json")
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(temporary).unlink()
-            raise
-
-
-def _seal(data: Any) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

@@ -7,7 +7,6 @@ import csv
 import io
 import json
 import math
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TargetError
+from tubecert.files import replace
 from tubecert.findings import Finding
 from tubecert.simulate.campaign import Attack, Campaign, Drawn
 from tubecert.simulate.runs import Runs
@@ -56,7 +56,7 @@ def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
     try:
         (Path(folder) / SUMMARY).unlink(missing_ok=True)  # of earlier files, which are now replaced
         for name, data in _files(campaign, certificate):
-            _replace(Path(folder) / name, data)
+            replace(Path(folder) / name, data)
             written.append(name)
     except OSError as error:
         raise _unwritable(folder, error) from None
@@ -164,22 +164,6 @@ def _cell(value: float) -> str:
     if not math.isfinite(value):
         return ""
     return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else f"{value:.9g}"
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Writes to a temporary name and renames: an interruption leaves no half file."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(temporary).unlink()
-        raise
 
 
 def _unwritable(folder: str, error: Any) -> TargetError:

@@ -5,15 +5,14 @@ A cache that is broken, absent or unwritable changes nothing but the time a run 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
+from tubecert.files import keep, read_kept
+
+KIND = "plans"
 Rows = tuple[tuple[str, ...], ...]  # decimals as text, row by row
 
 
@@ -22,41 +21,15 @@ def key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def folder() -> Path:
-    """Where plans are kept."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".cache") / "tubecert" / "plans"
-
-
 def read(name: str) -> Rows | None:
     """The inputs kept under a name; None if there are none, or they are broken."""
+    data = read_kept(KIND, name)
     try:
-        data = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
-        rows = tuple(tuple(str(value) for value in row) for row in data["u"])
-        return rows if data["key"] == name and data["seal"] == _seal(rows) else None
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError):
+        return None if data is None else tuple(tuple(str(value) for value in row) for row in data)
+    except TypeError:
         return None
 
 
 def write(name: str, rows: Rows) -> str:
     """Keep inputs; the reason if that cannot be done, else nothing."""
-    text = json.dumps({"key": name, "seal": _seal(rows), "u": rows})
-    try:
-        place = folder()
-        place.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=place, suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            Path(temporary).replace(place / f"{name}.json")
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(temporary).unlink()
-            raise
-    except (OSError, RuntimeError) as error:
-        return str(error)
-    return ""
-
-
-def _seal(rows: Rows) -> str:
-    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+    return keep(KIND, name, rows)
