@@ -3,6 +3,7 @@
 import copy
 import json
 from fractions import Fraction
+from functools import cache
 
 import pytest
 from typer.testing import CliRunner
@@ -11,7 +12,10 @@ from tubecert import certificate, pipeline, spec
 from tubecert.cli.app import app
 from tubecert.errors import ExitCode
 from tubecert.expression import parse, symbol
+from tubecert.recheck.balls import exact
+from tubecert.recheck.document import digest
 from tubecert.recheck.identity import vanish
+from tubecert.recheck.program import Program
 from tubecert.recheck.run import recheck
 from tubecert.recheck.terms import from_expressions, matrix_replaced, number
 
@@ -170,6 +174,64 @@ def test_what_is_not_certified_is_never_certified(change, verdict, code):
     assert failing(found) == []
 
 
+SYNTHESISED = (
+    'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}',
+    "metric: {synthesise: {rate: 1.5}}",
+)
+UNREACHED = {
+    "a real mode": [('"-x + y", "-y + 0.3*sin(x)"', '"-x + x*y", "-y + 0.3*sin(x)"')],
+    "at a forced equilibrium": [
+        ('"-x + y", "-y + 0.3*sin(x)"', '"-x + 0.5", "-y + 0.3"'),
+        ("[[0], [1]]", '[["x - 0.5"], [1]]'),  # with u = -0.3 the mode is -1.3
+        (PLAN, "trajectory: {kind: equilibrium, at: [0.5, 0], input: [-0.3]}"),
+        (START, "initial_state: {at: [0.5, 0.01]}"),
+    ],
+    "an oscillation": [
+        ("[x, y]", "[x, y, z]"),
+        ('"-x + y", "-y + 0.3*sin(x)"', '"-x + 2*y", "-y - 2*x", "x - z"'),
+        ("[[0], [1]]", "[[0], [0], [1]]"),
+        ("{x: [-1, 1], y: [-1, 1]}", "{x: [-1, 1], y: [-1, 1], z: [-1, 1]}"),
+        (PLAN, "trajectory: {kind: equilibrium, at: [0, 0, 0], input: [0]}"),
+        (START, "initial_state: {at: [0, 0, 0.01]}"),
+    ],
+}
+
+
+@pytest.mark.parametrize("kind", UNREACHED)
+def test_a_mode_that_no_input_reaches_is_confirmed(kind):
+    document = certified(replaced(BASE, SYNTHESISED, *UNREACHED[kind]))
+    assert document["result"]["verdict"] == "refuted"
+    found = examine(document)
+    assert failing(found) == []
+    assert found.exit_code == ExitCode.NOT_CERTIFIED
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("metric", "synthesise", "rate"), "0.9"),  # the mode -1 allows it
+        (("metric", "synthesise", "rate"), "1"),  # and the limit itself
+        (("metric", "synthesise", "rate"), "1.2"),  # -1.3 with the input that holds the equilibrium
+        (("system", "f"), ["y - x", "0.3*sin(x) - y"]),  # every mode is reached
+        (("system", "f"), ["x*y - x + 1/100", "0.3*sin(x) - y"]),  # no equilibrium at rational points
+        (("safe_set",), {"x": ["1", "2"], "y": ["1", "2"]}),  # the point is outside
+    ],
+    ids=["rate", "limit", "forced", "reached", "no equilibrium", "outside"],
+)
+def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
+    kind = "at a forced equilibrium" if value == "1.2" else "a real mode"
+    document = certified(replaced(BASE, SYNTHESISED, *UNREACHED[kind]))
+    place = document["result"]["spec"]["effective"]
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    document["result"]["spec"]["effective_hash"] = digest(document["result"]["spec"]["effective"])
+    document["hash"] = certificate.seal(document["result"], {})["hash"]
+    (found,) = [item for item in examine(document).claims if not item.outcome.holds]
+    assert found.name == "refuted: metric synthesis"
+    assert found.outcome.verdict == "undecided"
+
+
 def test_what_was_left_undecided_stays_so():
     document = certified(BASE, formulas="as-printed")
     assert document["result"]["verdict"] == "undecided"
@@ -295,11 +357,21 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     assert "the knots of plan.csv" in " ".join(done.stderr.split())
 
 
-def test_a_defect_that_is_not_proven_to_vanish_is_undecided():
-    """The plan's defect is 0 by an addition theorem, which this verification does not know."""
-    text = replaced(BASE, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))
-    document = certified(text)
+@cache
+def wiggling():
+    return json.dumps(certified(replaced(BASE, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))))
+
+
+def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
+    document = json.loads(wiggling())
     assert document["result"]["constants"]["plan_defect"]["above"] == 0
+    assert failing(examine(document)) == []
+
+
+def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
+    """No more is concluded where the addition theorems do not reach."""
+    document = json.loads(wiggling())
+    monkeypatch.setattr("tubecert.recheck.angles._MULTIPLE", 0)
     found = examine(document)
     verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
     assert verdicts == {"undecided"}
@@ -313,6 +385,52 @@ def test_a_defect_that_is_denied_is_contradicted():
         document["result"]["constants"][name] |= {"below": 0.0, "above": 0.0}
     verdicts = {c.name: c.outcome.verdict for c in examine(document).claims if "plan_defect" in c.name}
     assert set(verdicts.values()) == {"contradicted"}, verdicts
+
+
+ADDED = {
+    "sin(2*x) - 2*sin(x)*cos(x)": "sin(2*x) - 2*sin(x)",
+    "cos(x + y) - cos(x)*cos(y) + sin(x)*sin(y)": "cos(x + y) - cos(x)*cos(y) - sin(x)*sin(y)",
+    "sin(0.37*x)*cos(0.74*y) - sin(0.37*x)*(1 - 2*sin(0.37*y)**2)": "sin(0.37*x) - cos(0.74*x)",
+    "2*sin(x/2)**2 - 1 + cos(x)": "2*sin(x/2)**2 - 1 + cos(2*x)",
+    "tan(2*x)*(1 - tan(x)**2) - 2*tan(x)": "tan(2*x)*(1 + tan(x)**2) - 2*tan(x)",
+    "exp(x - 2*y)*exp(y)**2 - exp(x)": "exp(x - 2*y)*exp(y) - exp(x)",
+    "sin(x + pi/2) - cos(x)": "sin(x + pi/2) + cos(x)",
+    "sin(x - pi) + sin(x)": "sin(x - pi) - sin(x)",
+    "cos(3*pi/2 - x) + sin(x)": "cos(3*pi/2 - x) - sin(x)",
+    "sin(x) + sin(-x)": "sin(x) - sin(-x)",
+    "cos(x) - cos(-x)": "cos(x) + cos(-x)",
+    "sin(24*x) - 2*sin(12*x)*cos(12*x)": "sin(24*x) - 2*sin(12*x)*cos(11*x)",
+    "sin(x*y + x) - sin(x*y)*cos(x) - cos(x*y)*sin(x)": "sin(x*y + x) - sin(x*y)*cos(x) + cos(x*y)*sin(x)",
+    "sin(x)**2 - sin(y)**2 - sin(x + y)*sin(x - y)": "sin(x)**2 + sin(y)**2 - sin(x + y)*sin(x - y)",
+}
+
+
+@pytest.mark.parametrize("text", ADDED)
+def test_what_vanishes_by_an_addition_theorem(text):
+    for shown, zero in ((text, True), (ADDED[text], False)):
+        term = from_expressions([parse(shown, symbols={name: symbol(name) for name in "xy"}).expression])
+        assert vanish(term) is zero, shown
+        values = {"x": Fraction(3, 7), "y": Fraction(-2, 5)}
+        (number_there,) = Program(term, ("x", "y")).run([exact(values[name]) for name in "xy"])
+        assert number_there.contains(0) is zero  # the identity itself, in numbers
+
+
+@pytest.mark.parametrize("slip", ["sign", "order", "quarter"])
+def test_a_slip_in_the_addition_theorems_is_caught(slip, monkeypatch):
+    slips = {
+        "sign": ("_turned", lambda a, b: (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[0] * b[1])),
+        "order": ("_turned", lambda a, b: (a[0] * b[0] - a[1] * b[1], a[1] * b[1] + a[0] * b[0])),
+        "quarter": ("_Parts._is_pi", lambda self, monomial: True),
+    }
+    name, broken = slips[slip]
+    monkeypatch.setattr(f"tubecert.recheck.angles.{name}", broken)
+    failed = 0
+    for text in ADDED:
+        try:
+            test_what_vanishes_by_an_addition_theorem(text)
+        except AssertionError:
+            failed += 1
+    assert failed > 0
 
 
 @pytest.mark.parametrize(
