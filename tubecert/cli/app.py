@@ -12,7 +12,7 @@ import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
-from tubecert.cli.options import Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
 
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
@@ -114,9 +114,7 @@ def certify(
     gap: Annotated[
         str, number_option("--gap", "Relative width at which a constant is sharp enough.")
     ] = "1/100",
-    budget: Annotated[
-        str | None, number_option("--budget", "Boxes examined per claim before giving up.")
-    ] = None,
+    budget: Budget = None,
     output: Annotated[
         str | None,
         typer.Option(

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
-from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
+from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, TargetError
@@ -173,16 +173,10 @@ def _report(sealed: Mapping[str, Any], place: Place, files: Mapping[str, Any], o
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
-    as_json = output.json or place.is_stdout
-    terminal = (Terminal.stderr if as_json else Terminal.stdout)(color=output.color)
-    if as_json:
-        write_stdout(certificate.dump(sealed))
-        if not output.quiet:
-            terminal.show(console.verdict_line(sealed["result"]))
-        return
-    if output.quiet:
-        text = terminal.text(console.verdict_line(sealed["result"]))
-    else:
-        verbose = output.verbose
-        text = terminal.text(console.report(sealed, target=place.target, verbose=verbose, **files))
-    write_stdout(text)
+    result = sealed["result"]
+    present(
+        output,
+        console.verdict_line(result),
+        lambda: console.report(sealed, target=place.target, verbose=output.verbose, **files),
+        certificate.dump(sealed) if output.json or place.is_stdout else None,
+    )

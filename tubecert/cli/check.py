@@ -28,7 +28,7 @@ def run(paths: Sequence[str], given: Mapping[str, Any], output: Output) -> ExitC
     jobs, options = _options(given)
     files = list(_expand(paths))
     results = _nothing(paths) if not files else _checked(files, options, jobs, output)
-    write_stdout(_text(results, format_, output))
+    write_stdout(_text(results, format_, output, len(files)))
     if format_ == "github":
         from tubecert.report import github
 
@@ -109,7 +109,7 @@ def _leave_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _text(results: Sequence[Checked], format_: str, output: Output) -> str:
+def _text(results: Sequence[Checked], format_: str, output: Output, count: int) -> str:
     findings = [item for result in results for item in result.findings]
     if format_ == "json":
         return json.dumps([as_data(finding) for finding in findings], indent=1, ensure_ascii=False) + "\n"
@@ -125,13 +125,8 @@ def _text(results: Sequence[Checked], format_: str, output: Output) -> str:
         from tubecert.report import sarif
 
         return sarif.render(results)
-    count = sum(not _is_no_file(result) for result in results)
     shown = () if output.quiet else findings
     return Terminal.stdout(color=output.color).text(render(shown, closing=summary(findings, count)))
-
-
-def _is_no_file(result: Checked) -> bool:
-    return len(result.findings) == 1 and result.findings[0].message.startswith("no specification in ")
 
 
 def _expand(paths: Sequence[str]) -> Iterator[str]:

@@ -50,6 +50,9 @@ def number_option(flag: str, help: str) -> object:
     return typer.Option(flag, metavar="NUMBER", help=help)
 
 
+Budget = Annotated[str | None, number_option("--budget", "Boxes examined per claim before giving up.")]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
     """How to report: the options that commands share (see `with_output`)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from tubecert import certificate
-from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
+from tubecert.cli.presenting import present
 from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
@@ -189,19 +190,12 @@ def _report(data: Mapping[str, Any], folder: str, files: int, output: Output) ->
     """The report on stdout, or the summary as JSON, with the verdict line on stderr."""
     from tubecert.report import simulation
 
-    terminal = (Terminal.stderr if output.json else Terminal.stdout)(color=output.color)
-    if output.json:
-        import json
-
-        write_stdout(json.dumps(data, indent=1, sort_keys=True, allow_nan=False) + "\n")
-        if not output.quiet:
-            terminal.show(simulation.verdict_line(data))
-    elif output.quiet:
-        write_stdout(terminal.text(simulation.verdict_line(data)))
-    else:
-        write_stdout(
-            terminal.text(simulation.report(data, folder=folder, files=files, verbose=output.verbose))
-        )
+    present(
+        output,
+        simulation.verdict_line(data),
+        lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose),
+        json.dumps(data, indent=1, sort_keys=True, allow_nan=False) + "\n" if output.json else None,
+    )
 
 
 def _tell(line: str) -> None:

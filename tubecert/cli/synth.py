@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from tubecert import certificate
-from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
 from tubecert.cli.places import OptionPlace
+from tubecert.cli.presenting import present
 from tubecert.errors import ExitCode, SpecError, TargetError
 from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
@@ -111,13 +111,11 @@ def _report(found: Any, name: str, target: str, output: Output) -> None:
     """The report on stdout, or the metric file, with the verdict line on stderr."""
     from tubecert.report import synthesis
 
-    json = output.json or target == certificate.STDOUT
-    terminal = (Terminal.stderr if json else Terminal.stdout)(color=output.color)
-    line = synthesis.verdict_line(found.data(), found.file, name)
-    if json:
-        write_stdout(certificate.dump(found.file if found.file is not None else found.data()))
-        if not output.quiet:
-            terminal.show(line)
-        return
-    shown = [line] if output.quiet else synthesis.report(found.data(), found.file, name, target)
-    write_stdout(terminal.text(shown))
+    present(
+        output,
+        synthesis.verdict_line(found.data(), found.file, name),
+        lambda: synthesis.report(found.data(), found.file, name, target),
+        certificate.dump(found.data() if found.file is None else found.file)
+        if output.json or target == certificate.STDOUT
+        else None,
+    )
