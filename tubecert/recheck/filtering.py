@@ -23,13 +23,17 @@ def kappa(c: Ball, w: Ball) -> Ball:
 
 
 def tight_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
-    """J(c, w, s0, s1) (2.19), an upper bound."""
+    """J(c, w, s0, s1) (2.19)."""
     slow = s1 / (c * w)
-    if smaller(c, w) * s0 <= s1:
+    room = smaller(c, w) * s0 - s1
+    if room <= 0:
         return slow
-    always = slow + s0 * kappa(c, w)
+    # what the initial value adds is 0 if room <= 0, else at most s0 kappa, and at most room/(c w): with p = w s0 - s1
+    # it is q (q/p)^(c/(w-c)) <= q = room over c w if c < w, and q (p/q)^(c/(c-w)) <= p = room if c > w
+    most = smaller(s0 * kappa(c, w), larger(room, arb(0)) / (c * w))
+    always = slow.union(slow + most)
     q = c * s0 - s1
-    if smaller(c, w) * s0 > s1:
+    if room > 0:
         exact = (s1 + q * (-(c * s0 / q) * log_ratio((w - c) * s0 / q)).exp()) / (c * w)
         return exact if exact.is_finite() else always
     return always
