@@ -128,6 +128,8 @@ def _input_on_plan(place: Place, limit: Fraction) -> Outcome:
 def _drift(place: Place, limit: Fraction) -> Outcome:
     s, curve = place.system, place.curve
     drift = s.drift
+    if curve.moves and len(curve.parts) == 1:
+        return prove(NormsBelow([place.around_plan(drift)], limit, place.numbers), place.ball(), place.budget)
     if not curve.moves:
         drift = matrix_replaced(drift, dict(zip(s.inputs, curve.u, strict=True)))
     return _norms(place, [drift], limit)

@@ -10,11 +10,11 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.cover import Boxed, Outcome, prove
-from tubecert.recheck.curve import CLOCK, Curve
+from tubecert.recheck.curve import CLOCK, Curve, expressed
 from tubecert.recheck.metric import time_range, together
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import TIME, System
-from tubecert.recheck.terms import Matrix, Rows, matrix_replaced
+from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable
 from tubecert.recheck.tube import Tube
 
 
@@ -40,6 +40,30 @@ class Place:
         return matrix_replaced(
             rows, dict(zip((*s.states, *s.inputs), (*self.curve.x, *self.curve.u), strict=True))
         )
+
+    def around_plan(self, rows: Rows) -> Matrix:
+        """A matrix in s and in x - x*, for a plan of one part: the tube is a ball there, whatever the plan does."""
+        offsets = [variable(name) + x for name, x in zip(self._offsets, self.curve.x, strict=True)]
+        s = self.system
+        return matrix_replaced(
+            rows, dict(zip((*s.states, *s.inputs), (*offsets, *self.curve.u), strict=True))
+        )
+
+    def ball(self) -> Tube:
+        """The tube in s and in x - x*."""
+        (part,) = self.curve.parts
+        nothing = [number(0)] * len(self.system.states)
+        return Tube(
+            expressed(nothing, (), TIME, None),
+            self.rho,
+            self._offsets,
+            (),
+            {CLOCK: (arb(0), part.length)},
+        )
+
+    @property
+    def _offsets(self) -> list[str]:
+        return [f"{name} - {name}*" for name in self.system.states]
 
     def along(self, test: Callable[[], NormsBelow | PositiveDefinite | NotNegative]) -> Outcome:
         """A test in s on every part of the plan."""
