@@ -7,6 +7,7 @@ import sys
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from tubecert.recheck import boxes, expansion, monomials, pencils, statements
 from tubecert.recheck.balls import is_positive
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.monomials import Combinations
-from tubecert.recheck.pencils import SlopesBelow
+from tubecert.recheck.pencils import LeastGain, SlopesBelow
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
 from tubecert.recheck.terms import from_expressions, number, slopes
 
@@ -183,6 +184,27 @@ def check_slopes():
         assert test.over([box[NAMES.index(v)] for v in test.variables]).proven == proven
 
 
+def check_least_gain():
+    """The smallest singular value of Theta B over a box, by eigenvalues of B'M B."""
+    W = [["2 + x**2", "0.3*x", "0"], ["0.3*x", "1.5 + sin(y)", "0.2"], ["0", "0.2", "1 + y**2"]]
+    B = [["1", "x*y"], ["0", "1 + 0.5*sin(x)"], ["y", "0.3"]]
+    box = [(0.1, 0.3), (-0.4, -0.2), (0.0, 0.0)]
+    W_s, B_s = (
+        at_points([e for row in m for e in row], samples(box)).reshape(-1, 3, width)
+        for m, width in ((W, 3), (B, 2))
+    )
+    least = np.linalg.eigvalsh(np.swapaxes(B_s, 1, 2) @ np.linalg.solve(W_s, B_s)).min() ** 0.5
+    system = SimpleNamespace(states=NAMES, inputs="uv", W=matrix(W), B=plain(B))
+    for share, proven in ((1.0001, False), (0.97, True)):
+        test = LeastGain(system, Fraction(least * share))
+        assert test.over([box[NAMES.index(v)] for v in test.variables]).proven == proven, share
+
+
+def plain(rows):
+    flat = iter(terms([e for row in rows for e in row]))
+    return [[next(flat) for _ in row] for row in rows]
+
+
 CHECKS = {
     "monomials": check_monomials,
     "expansion": check_expansion,
@@ -190,6 +212,7 @@ CHECKS = {
     "definiteness": check_definiteness,
     "signs": check_signs,
     "slopes": check_slopes,
+    "least gain": check_least_gain,
 }
 
 
@@ -226,11 +249,16 @@ def unmixed(self):
     return true_corners(replace(self, mixed={}))
 
 
+def half_of_what_is_taken(a, b, scale=1):
+    return true_plus(a, b, Fraction(scale) / 2 if scale == -1 else scale)
+
+
 def by_trace(a):
     return true_positive(a) or bool(arb_mat(a).det() > 0 and arb_mat(a).trace() > 0)
 
 
 true_written, true_divisor = monomials._written, monomials._divisor
+true_plus = pencils.plus
 true_weight, true_corners, true_positive = Field._weight, expansion.Expansion.corners, is_positive
 
 BROKEN = {
@@ -243,6 +271,7 @@ BROKEN = {
     "one corner": ("norms", expansion.Expansion, "corners", one_side),
     "one corner of a symmetric matrix": ("definiteness", expansion.Expansion, "corners", one_side),
     "trace and determinant": ("signs", sys.modules[__name__], "is_positive", by_trace),
+    "half of the square": ("least gain", pencils, "plus", half_of_what_is_taken),
     "trace and determinant on a box": ("definiteness", statements, "is_positive", by_trace),
 }
 
@@ -270,6 +299,17 @@ def test_shares_are_proposals_only(proposal):
     with patched(SlopesBelow, _least=lambda self, at: [arb(proposal)]):
         test = SlopesBelow([matrix(slope)], matrix([["4", "0"], ["0", "1"]]), Fraction(1, 5))
         assert not test.over([(0.9, 1.0)]).proven
+
+
+@pytest.mark.parametrize("y", [0.0, 0.7, 1.0, -3.0])
+def test_the_weights_of_a_least_gain_are_proposals_only(y, monkeypatch):
+    system = SimpleNamespace(states="x", inputs="u", W=matrix([["1 + x**2"]]), B=plain([["1"]]))
+    test = LeastGain(system, Fraction(999, 1000))
+    true_values = PositiveDefinite.with_values
+    monkeypatch.setattr(
+        PositiveDefinite, "with_values", lambda self, values: true_values(self, dict.fromkeys(values, arb(y)))
+    )
+    assert not test.over([(0.0, 0.1)]).proven  # it is 1/sqrt(1.01) at 0.1
 
 
 @settings(max_examples=60, deadline=None)

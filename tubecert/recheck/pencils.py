@@ -15,16 +15,14 @@ from tubecert.recheck.balls import (
     Ball,
     exact,
     is_indefinite,
-    is_positive,
     proposed_largest,
-    spectral_norm,
     whitening,
 )
-from tubecert.recheck.boxes import Box, Field, Found
+from tubecert.recheck.boxes import Box, Found
 from tubecert.recheck.program import Program
 from tubecert.recheck.statements import PositiveDefinite
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Rows, number, plus, variable
+from tubecert.recheck.terms import Rows, number, plus, scaled, times, turned, unit_matrix, variable
 
 MU, _CURVE_MU, _LINE_MU = "mu#", "p#", "q#"  # no state can have these names
 
@@ -140,31 +138,36 @@ def _tangent(m: float) -> dict[str, Ball]:
 
 
 class LeastGain:
-    """smin(Theta B) >= limit: for any G, u'B'M B u >= |G B u|^2/lmax(G W G'); G is taken from the centre of the box."""
+    """smin(Theta B) >= limit, where W > 0: then B'M B >= B'Y + Y'B - Y'W Y for any Y.
+
+    Y = M B at the centre of the box is a proposal, with which nothing is lost there.
+    """
 
     def __init__(self, s: System, limit: Fraction) -> None:
-        self._n, self._m = len(s.states), len(s.inputs)
-        self._field = Field([*(e for row in s.W for e in row), *(e for row in s.B for e in row)])
-        self.variables = self._field.variables
+        self._n, self._m = n, m = len(s.states), len(s.inputs)
+        self._names = [f"y{i}_{j}#" for i in range(n) for j in range(m)]
+        Y = [[variable(name) for name in self._names[i * m : (i + 1) * m]] for i in range(n)]
+        half = times(turned(s.B), Y)
+        square = times(turned(Y), times(s.W, Y))
+        S = plus(plus(half, turned(half)), plus(square, scaled(limit**2, unit_matrix(m))), -1)
+        self._test = PositiveDefinite(S, values=dict.fromkeys(self._names, arb(0)))
+        self.variables = self._test.variables
+        self._system = Program([e for rows in (s.W, s.B) for row in rows for e in row], self.variables)
         self._square = exact(limit**2)
 
     def over(self, box: Box) -> Found:
-        """(G B)'(G B)/limit^2 >= lmax(G W G') on the box."""
-        W, B = self._matrices(self._field.hull(box))
-        wide = [hi - lo for lo, hi in box]
-        G = self._weights([arb(0.5 * lo + 0.5 * hi) for lo, hi in box])
-        if G is None:
+        """The bound from below, on the whole box."""
+        W, B = self._matrices([arb(0.5 * lo + 0.5 * hi) for lo, hi in box])
+        try:
+            Y = [arb(float(y.mid())) for y in W.solve(B).entries()]
+        except ZeroDivisionError:
+            wide = [hi - lo for lo, hi in box]
             return Found(False, wide, wide)
-        top = spectral_norm((G * W * G.transpose()).tolist())
-        image = G * B
-        gram = (image.transpose() * image).tolist()
-        for i in range(self._m):
-            gram[i][i] = gram[i][i] - top * self._square
-        return Found(is_positive(gram), wide, wide)
+        return self._test.with_values(dict(zip(self._names, Y, strict=True))).over(box)
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """B'M B - limit^2 at a point."""
-        W, B = self._matrices(self._field.at(point))
+        W, B = self._matrices(point)
         try:
             gram = (B.transpose() * W.solve(B)).tolist()
         except ZeroDivisionError:
@@ -173,16 +176,6 @@ class LeastGain:
             gram[i][i] = gram[i][i] - self._square
         return is_indefinite(gram)
 
-    def _matrices(self, entries: Sequence[Ball]) -> tuple[arb_mat, arb_mat]:
-        split = self._n * self._n
+    def _matrices(self, point: Sequence[Ball]) -> tuple[arb_mat, arb_mat]:
+        entries, split = self._system.run(point), self._n * self._n
         return arb_mat(self._n, self._n, entries[:split]), arb_mat(self._n, self._m, entries[split:])
-
-    def _weights(self, centre: Sequence[Ball]) -> arb_mat | None:
-        """(B'M B)^-1 B'M at a point, rounded to floats."""
-        W, B = self._matrices(self._field.at(centre))
-        try:
-            half = W.solve(B)
-            G = (B.transpose() * half).solve(half.transpose())
-        except ZeroDivisionError:
-            return None
-        return arb_mat([[float(x.mid()) for x in row] for row in G.tolist()])
