@@ -15,7 +15,7 @@ from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, SumOfNorms
-from tubecert.enclosure.pencil import Pencil, SumOfPencils, Weights, scalar
+from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, Weights, scalar
 from tubecert.expression import ZERO, Expression, constant, cos, norm, parse, sin, sqrt, substitute, symbol
 from tubecert.expression.matrix import identity
 from tubecert.trajectory import Plan, constant_plan
@@ -309,6 +309,16 @@ def test_what_keeps_the_denominator_from_being_positive_is_split():
     assert found.reached
     assert found.below <= truth * (1 + 1e-12)
     assert found.above >= truth
+
+
+def test_a_badly_scaled_matrix_is_shown_positive_in_few_boxes():
+    small = constant(Fraction(1, 10**5))
+    wave = small * sin(3 * x)
+    for entry, verdict in ((2, "proven"), (Fraction(9, 10), "refuted")):  # against sin(3)**2 < 1 at the peak
+        S = ((entry * small**2, wave), (wave, constant(1)))
+        found = decide(Definite(S), BoxDomain({"x": (-1.0, 1.0)}), 0.0, Effort(budget=1000))
+        assert found.verdict == verdict
+        assert found.boxes < 60
 
 
 # -- what makes a bound false is noticed ----------------------------------------------------------------------

@@ -26,6 +26,7 @@ from tubecert.enclosure.linalg import (
 from tubecert.enclosure.objective import Estimate, edges, estimate_of
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 from tubecert.expression import ONE, Expression
+from tubecert.expression.matrix import identity
 
 _CLOSE = 0.5  # |T D T' - I| up to which Weyl's bound of its eigenvalues is good enough
 _EXACT = 4e-15  # relative: what weights at a point may be rounded below the exact ones
@@ -77,7 +78,7 @@ class Pencil:
         ends = weights[0].shape[1]
         numerator = np.tile(mid[0], (1, ends, 1, 1)), np.tile(rad[0], (1, ends, 1, 1))
         denominator = _weighted(weights, mid[1:], rad[1:])
-        t = self._frame(hi, mid[1:])
+        t = self._frame(hi, mid)
         tested = target if np.isfinite(target) else _guess(t, numerator)
         excess, above = _bound(t, numerator, denominator, tested)
         value = above.max(axis=1)
@@ -126,9 +127,9 @@ class Pencil:
         own = len(self._own)
         return list(self._weights.below(lo[:, own:], hi[:, own:]))
 
-    def _frame(self, hi: Array, denominators: list[Array]) -> Array:
+    def _frame(self, hi: Array, mids: list[Array]) -> Array:
         """A congruence that makes the denominator, weighted as at the upper ends, nearly the identity."""
-        mid, _ = _weighted(self._below(hi, hi), denominators, denominators)
+        mid, _ = _weighted(self._below(hi, hi), mids[1:], mids[1:])
         return whitening(mid.mean(axis=1))[:, None]
 
     def _caused(self, t: Array, e: Expansion, target: float, weights: list[Array]) -> Array:
@@ -137,6 +138,20 @@ class Pencil:
         for k, weight in enumerate(weights):
             caused = caused + _scale(target) * weight.max(axis=1) * _whitened_rest(t, e, 1 + k)
         return caused
+
+
+class Definite(Pencil):
+    """-lmin(S), for the question whether S(x) > 0: the congruence makes S itself nearly the identity.
+
+    Without it, boxes would have to be so small that S varies by less than its least eigenvalue.
+    """
+
+    def __init__(self, matrix: Matrix) -> None:
+        negative = [[-e for e in row] for row in matrix]
+        super().__init__(negative, [identity(len(matrix))])
+
+    def _frame(self, hi: Array, mids: list[Array]) -> Array:
+        return whitening(-mids[0].mean(axis=1))[:, None]
 
 
 class SumOfPencils:

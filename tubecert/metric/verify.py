@@ -20,7 +20,7 @@ from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.objective import Objective
-from tubecert.enclosure.pencil import Pencil, scalar
+from tubecert.enclosure.pencil import Definite, Pencil, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO, Expression, is_zero
@@ -59,8 +59,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         middle = [float((lo + hi) / 2) for lo, hi in safe_set]
         return Witness(x=tuple(at.get(name, m) for name, m in zip(model.states, middle, strict=True)))
 
-    negative = tuple(tuple(-e for e in row) for row in model.W)
-    positive = decide(Pencil(negative, [eye]), domain, 0.0, effort)
+    positive = decide(Definite(model.W), domain, 0.0, effort)
     if positive.verdict != "proven":
         return MetricProof(
             verdict=positive.verdict,

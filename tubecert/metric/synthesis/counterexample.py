@@ -18,9 +18,9 @@ from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Objective
-from tubecert.enclosure.pencil import Pencil
+from tubecert.enclosure.pencil import Definite, Pencil
 from tubecert.enclosure.projected import ProjectedPencil
-from tubecert.expression.matrix import identity, multiply, transpose
+from tubecert.expression.matrix import multiply, transpose
 from tubecert.metric.synthesis.problem import SynthesisProblem
 from tubecert.model import ControlAffineModel
 
@@ -50,8 +50,7 @@ def counterexample(
     W = problem.family.dual_metric(_decimals(coefficients))
     model = replace(problem.model, W=W, rate=Fraction(problem.rate))
     domain = BoxDomain(dict(zip(model.states, _one_image(problem.safe_set, symmetries, order), strict=True)))
-    negative = tuple(tuple(-e for e in row) for row in W)
-    found = decide(Pencil(negative, [identity(len(W))]), domain, 0.0, _EFFORT)
+    found = decide(Definite(W), domain, 0.0, _EFFORT)
     if found.verdict != "proven":
         return _failed("C1", found, problem)
     if len(model.inputs) == len(model.states):
