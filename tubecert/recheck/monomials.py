@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from math import inf
 from typing import Any
 
 from flint import Ordering, arb, arb_mat, fmpq, fmpq_mpoly_ctx
@@ -30,14 +31,15 @@ class Combinations:
     def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
         self._plain = Program(outputs, inputs)
         self._monomials: _Monomials | None = None
-        found = expanded(outputs)
+        most = _CHEAPER * len(in_order(outputs))
+        found = expanded(outputs, most)
         if found is None:
             return
         factors, polynomials = found
         rows: dict[tuple[tuple[Monomial, Fraction], ...], int] = {}
         self._row = [rows.setdefault(tuple(sorted(p.items())), len(rows)) for p in polynomials]
         monomials = sorted({monomial for p in polynomials for monomial in p})
-        if len(rows) * len(monomials) > _CHEAPER * len(in_order(outputs)):
+        if len(rows) * len(monomials) > most:
             return
         place = {monomial: k for k, monomial in enumerate(monomials)}
         table = [[arb(0)] * len(monomials) for _ in rows]
@@ -85,8 +87,10 @@ class _Monomials:
         return [values[k] for k in self._outputs]
 
 
-def expanded(outputs: Sequence[Term]) -> tuple[list[Term], list[dict[Monomial, Fraction]]] | None:
-    """Factors, and every output as a polynomial in them; None if there is nothing to gain, or too much to write."""
+def expanded(
+    outputs: Sequence[Term], most: float = inf
+) -> tuple[list[Term], list[dict[Monomial, Fraction]]] | None:
+    """Factors, and every output as a polynomial in them; None if there are no factors, or more than `most` terms."""
     order = in_order(outputs)
     place: dict[Term, int] = {}
     for term in sorted(order, key=lambda term: term.op != "sin"):  # sines first in the order of the ring
@@ -111,6 +115,8 @@ def expanded(outputs: Sequence[Term]) -> tuple[list[Term], list[dict[Monomial, F
         for cosine in factors
         if sine.op == "sin" and cosine.op == "cos" and sine.args == cosine.args
     ]
+    if sum(len(value[term]) for term in outputs) > most:
+        return None
     return factors, [_written(value[term], relations) for term in outputs]
 
 
