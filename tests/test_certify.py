@@ -327,6 +327,16 @@ def test_a_point_is_said_to_be_near_a_zero_unless_it_is_one(expression, said):
     assert any(said in finding.message for finding in caught.value.findings)
 
 
+@pytest.mark.parametrize(
+    "expression", ["0*(1/(t + 1)) + x1", "(t/(t**2 + 1))**0 + x1", "exp((x1 - x1)/(x2 + t))"]
+)
+def test_what_depends_on_time_only_where_it_is_defined_needs_a_horizon(expression):
+    with pytest.raises(SpecError, match="horizon") as caught:
+        run(edited(THREE, ("0.1*sin(2*t)", expression)))
+    assert caught.value.findings[0].code == "TC204"
+    assert run(edited(THREE, ("0.1*sin(2*t)", "0*(1/(sin(t) + 2)) + 0.1")))["verdict"] == "certified"
+
+
 def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
     result = run(edited(THREE, ("B: [[0], [0], [1]]", 'B: [[0], [0], ["x1 + x2 - 0.05"]]')))
     assert result["verdict"] == "refuted"

@@ -495,7 +495,7 @@ def test_a_margin_around_is_the_margin_of_those_gains(regulated, problems):
         )
         for claim, margin in margins.items():
             assert data[claim][i] <= float(margin.lo)
-            assert data[claim][i] == pytest.approx(float(margin.lo), abs=1e-9)
+            assert data[claim][i] == pytest.approx(float(margin.lo), rel=1e-8, abs=1e-9)
 
 
 # -- Markdown

@@ -57,9 +57,13 @@ def missing_parts(spec: Spec) -> list[Finding]:
 
 
 def time_of(spec: Spec) -> tuple[list[Finding], Range | None]:
-    """The range of time that matters for h, or why there is none."""
-    h = spec.uncertainty.h
-    period = time_period(term.expression for term in h or ())
+    """The range of time that matters for h, or why there is none.
+
+    What must hold for h to be defined may depend on t where h does not, as in 0*(1/(t + 1)).
+    """
+    terms = spec.uncertainty.h or ()
+    owed = (duty.argument for term in terms for duty, _ in term.owed())
+    period = time_period([*(term.expression for term in terms), *owed])
     try:
         return [], time_range(spec.trajectory.horizon, period)
     except ValueError as error:
