@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, write_pages
+from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.cli.version import versions
-from tubecert.errors import ExitCode, TargetError
-from tubecert.findings import Finding
+from tubecert.errors import ExitCode
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
         name: numbers.positive(f"--{name.replace('_', '-')}", given[name]) for name in ("rho_a", "epsilon")
     }
     for name in ("bandwidth", "adaptation_rate"):
-        values[name] = numbers.gain(f"--{name.replace('_', '-')}", given[name])
+        values[name] = numbers.gain(flag(name), given[name])
     values["gap"] = numbers.positive("--gap", given["gap"], below=1)
     values["budget"] = numbers.count("--budget", given["budget"])
     numbers.check()
@@ -90,8 +90,7 @@ def _place(given: Mapping[str, Any]) -> Place:
         given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.certificate.json"
     )
     certificate.check_target(target)
-    if target != certificate.STDOUT:
-        _spare(target, {"specification": given["spec"], "metric file": given["metric"]})
+    spare(target, {"specification": given["spec"], "metric file": given["metric"]})
     return Place(target=target)
 
 
@@ -105,31 +104,23 @@ def _pages(given: Mapping[str, Any], place: Place) -> list[str]:
     return pages
 
 
-def _spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
-    """Raise `TargetError` for a target that would take the place of an input."""
-    for what, source in inputs.items():
-        if source is not None and certificate.same_file(target, source):
-            raise _refused(f"{target} is the {what} itself and would be overwritten")
-
-
 def _kept_place(given: Mapping[str, Any], system: Spec, place: Place) -> str | None:
     """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
-    table = system.trajectory.table
-    plan = None if table is None else Path(given["spec"]).parent / table.file
+    plan = plan_of(given, system)
     if place.is_stdout:
         return None
-    _spare(place.target, {"plan": plan})
+    spare(place.target, {"plan": plan})
     if system.metric is not None or system.synthesis is None:
         return None
     name = Path(place.target).name.removesuffix(".json").removesuffix(".certificate")
     target = str(Path(place.target).with_name(f"{name}.metric.json"))
     certificate.check_target(target)
-    _spare(target, {"specification": given["spec"], "plan": plan})
+    spare(target, {"specification": given["spec"], "plan": plan})
     if Path(target).exists() and not _synthesised(target):
-        raise _refused(
+        raise refused(
             f"{target} was not written by tubecert and would be overwritten by the metric that is synthesised"
         )
     return target
@@ -142,10 +133,6 @@ def _synthesised(path: str) -> bool:
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(content, dict) and "solver" in content and "verified_on" in content
-
-
-def _refused(message: str) -> TargetError:
-    return TargetError([Finding(code="TC120", message=message, help="choose another file with -o FILE")])
 
 
 def _kept_metric(result: Mapping[str, Any], target: str | None) -> str | None:

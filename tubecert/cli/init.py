@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
+from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
-from tubecert.findings import Finding
 
 
 def run(template: str, target: str | None, *, quiet: bool) -> None:
@@ -36,6 +36,4 @@ def _create(name: str, text: str) -> None:
 
 
 def _refused(message: str) -> TargetError:
-    return TargetError(
-        [Finding(code="TC120", message=message, help="choose another file: tubecert init FILE")]
-    )
+    return refused(message, "choose another file: tubecert init FILE")

@@ -45,6 +45,11 @@ SpecFile = Annotated[
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
 
 
+def flag(name: str) -> str:
+    """The option of a parameter."""
+    return f"--{name.replace('_', '-')}"
+
+
 def number_option(flag: str, help: str) -> object:
     """An option whose text is read as an exact number (see `Numbers`)."""
     return typer.Option(flag, metavar="NUMBER", help=help)

@@ -10,8 +10,8 @@ from typing import Any
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
+from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
-from tubecert.findings import Finding
 
 _HTML, _MARKDOWN = (".html", ".htm"), (".md", ".markdown")
 _REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
@@ -80,4 +80,4 @@ def _what(error: BaseException) -> str:
 
 
 def _refused(page: str, why: str, remedy: str) -> TargetError:
-    return TargetError([Finding(code="TC120", message=f"cannot write {page}: {why}", help=remedy)])
+    return refused(f"cannot write {page}: {why}", remedy)

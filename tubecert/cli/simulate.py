@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, SpecError
@@ -78,15 +78,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
-    values: dict[str, Any] = {name: numbers.positive(_flag(name), given[name]) for name in _POSITIVE}
-    values |= {name: numbers.gain(_flag(name), given[name]) for name in _GAINS}
-    values |= {name: numbers.whole(_flag(name), given[name]) for name in ("runs", "seed", "replay")}
+    values: dict[str, Any] = {name: numbers.positive(flag(name), given[name]) for name in _POSITIVE}
+    values |= {name: numbers.gain(flag(name), given[name]) for name in _GAINS}
+    values |= {name: numbers.whole(flag(name), given[name]) for name in ("runs", "seed", "replay")}
     numbers.check()
     return values
-
-
-def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def _controllers(text: str | None) -> tuple[str, ...]:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.places import OptionPlace
 from tubecert.cli.presenting import present
-from tubecert.errors import ExitCode, SpecError, TargetError
+from tubecert.cli.targets import plan_of, refused, spare
+from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
@@ -21,7 +22,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Synthesise; `given` holds the options by the names of their parameters."""
     numbers = Numbers()
     values = {
-        name: numbers.positive(f"--{name.replace('_', '-')}", given[name])
+        name: numbers.positive(flag(name), given[name])
         for name in ("rate", "condition_number", "rho_a", "epsilon")
     }
     budget = numbers.count("--budget", given["budget"])
@@ -29,17 +30,13 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
     for place in (target, *([given["plot"]] if given["plot"] else [])):
         certificate.check_target(place)
-        if place != certificate.STDOUT and certificate.same_file(place, given["spec"]):
-            raise TargetError([Finding(code="TC120", message=f"{place} is the specification itself")])
+        spare(place, {"specification": given["spec"]})
     if given["plot"] and Path(given["plot"]).suffix.lower() != ".svg":
-        message = f"cannot write {given['plot']}: the comparison is drawn as SVG"
-        raise TargetError([Finding(code="TC120", message=message, help="give a file FILE.svg")])
+        raise refused(f"cannot write {given['plot']}: the comparison is drawn as SVG", "give a file FILE.svg")
     from tubecert import spec
 
     system = spec.load(given["spec"])
-    table = system.trajectory.table
-    if table is not None and certificate.same_file(target, Path(given["spec"]).parent / table.file):
-        raise TargetError([Finding(code="TC120", message=f"{target} is the plan itself")])
+    spare(target, {"plan": plan_of(given, system)})
     wanted = _wanted(system, given, values)
     from tubecert import pipeline
     from tubecert.report import progress

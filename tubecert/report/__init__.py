@@ -9,5 +9,10 @@ no; numbers are not computed here, they are only shown.
 | `findings` | findings as text and as data |
 | `numbers`, `gains` | how numbers, and the gains of the three certificates, are shown |
 | `console`, `sections` | the report of a certification |
+| `synthesis`, `simulation`, `sweep` | the reports of synth and simulate; metrics compared, drawn |
+| `layout` | parts, titles and tables on a terminal |
+| `page`, `page_*`, `figures_*` | a certificate as a page with figures; `html` and `markdown` show it |
+| `github`, `junit`, `sarif` | findings for other programs |
+| `pages` | what `explain` shows |
 | `progress` | what is being proven right now, on stderr |
 """

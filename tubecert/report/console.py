@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich.padding import Padding
 from rich.text import Text
 
 from tubecert.report import sections
-from tubecert.report.gains import Gains, deciding
+from tubecert.report.gains import deciding
+from tubecert.report.layout import indented, titled
 from tubecert.report.numbers import up
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ def report(
     `target` is the file of the certificate, `pages` are those about it, `metric` that of a metric found for it.
     """
     result = certificate["result"]
-    parts: list[RenderableType] = [verdict_line(result), _indented(meaning(result))]
+    parts: list[RenderableType] = [verdict_line(result), indented(meaning(result))]
     for title, body in sections.of(result, verbose=verbose):
-        parts += [Text(), Text(title, style="bold"), *(_indented(item) for item in body)]
+        parts += titled(title, body)
     parts += [Text(), *_closing(certificate, target, pages)]
     if metric is not None:
         parts.append(_file("metric found for it", metric))
@@ -101,17 +101,10 @@ def _closing(certificate: Mapping[str, Any], target: str, pages: Sequence[str]) 
     """Where the certificate is, and how to see again that it is right."""
     again = "To check it later: the same command gives the same hash on this machine with these versions."
     sealed = [Text(certificate["hash"], style="dim"), Text(again, style="dim")]
-    return [_file("certificate", target), *map(_indented, sealed), *(_file("page", page) for page in pages)]
+    return [_file("certificate", target), *map(indented, sealed), *(_file("page", page) for page in pages)]
 
 
 def _file(what: str, path: str) -> Text:
     """A file that was written; its name is neither wrapped nor cut."""
     where = Text(f"{what} ", style="bold", no_wrap=True, overflow="ignore")
     return where.append(path, style="not bold")
-
-
-def _indented(item: RenderableType) -> Padding:
-    return Padding(item, (0, 0, 0, 2), expand=False)
-
-
-__all__ = ["Gains", "meaning", "name", "report", "verdict_line"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 from rich.padding import Padding
@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.report.gains import NAMES, rows
+from tubecert.report.layout import plain_table
 from tubecert.report.numbers import UNKNOWN, Number, down, exact, short, up
 
 if TYPE_CHECKING:
@@ -224,12 +225,3 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
         f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
     )
     return [Text(line) for line in [brief, *(believed if declared else [])]]
-
-
-def plain_table(*columns: str, wrapped: int | None = None) -> Table:
-    """A table without lines; columns named >... are aligned to the right, only the one at `wrapped` wraps."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for index, column in enumerate(columns):
-        justify: Literal["left", "right"] = "right" if column.startswith(">") else "left"
-        table.add_column(column.lstrip(">"), justify=justify, overflow="fold", no_wrap=index != wrapped)
-    return table

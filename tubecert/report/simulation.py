@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tubecert.report.layout import indented, titled
 from tubecert.report.numbers import UNKNOWN, short
 
 if TYPE_CHECKING:
@@ -46,9 +46,9 @@ def verdict_line(data: Data) -> Text:
 
 def report(data: Data, *, folder: str, files: int, verbose: bool) -> list[RenderableType]:
     """The whole report as renderables; `folder` holds the files."""
-    parts: list[RenderableType] = [verdict_line(data), _indented(Text(_CAVEAT))]
+    parts: list[RenderableType] = [verdict_line(data), indented(Text(_CAVEAT))]
     for title, body in _sections(data, verbose):
-        parts += [Text(), Text(title, style="bold"), *(_indented(item) for item in body)]
+        parts += titled(title, body)
     where = Text(f"{files} files ", style="bold", no_wrap=True, overflow="ignore").append(
         f"in {folder}: summary.json, runs.npz, tables (CSV) and figures (PNG, SVG)", style="not bold"
     )
@@ -247,7 +247,3 @@ def _table(first: str, *others: str) -> Table:
     for name in others:
         table.add_column(name)
     return table
-
-
-def _indented(item: RenderableType) -> Padding:
-    return Padding(item, (0, 0, 0, 2), expand=False)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich.padding import Padding
 from rich.text import Text
 
+from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.numbers import UNKNOWN, down, exact, short, up
-from tubecert.report.sections import VERDICTS, plain_table
+from tubecert.report.sections import VERDICTS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -37,9 +37,9 @@ def report(
     """The whole report as renderables; `target` is the metric file."""
     parts: list[RenderableType] = [verdict_line(data, file, name)]
     if file is not None:
-        parts += [_indented(line) for line in _proven(file)]
+        parts += map(indented, _proven(file))
     if rows := data.get("table"):
-        parts += [Text(), Text("Metrics compared", style="bold"), _indented(_compared(rows))]
+        parts += titled("Metrics compared", [_compared(rows)])
     if file is None:
         return [*parts, *_failure(data)]
     certify = f"certify with it: tubecert certify SPEC --metric {target}"
@@ -50,9 +50,9 @@ def _failure(data: Mapping[str, Any]) -> list[RenderableType]:
     """What would help, and what was tried."""
     parts: list[RenderableType] = []
     if relax := data.get("relax"):
-        parts.append(_indented(Text.assemble(("help: ", "green"), relax)))
+        parts.append(indented(Text.assemble(("help: ", "green"), relax)))
     if attempts := data["attempts"]:
-        parts += [Text(), Text("Tried", style="bold"), *(_indented(line) for line in _tried(attempts))]
+        parts += titled("Tried", _tried(attempts))
     return parts
 
 
@@ -99,7 +99,3 @@ def _tried(attempts: Sequence[Mapping[str, Any]]) -> list[Text]:
 
 def _number(value: float | None) -> str:
     return UNKNOWN if value is None else up(value)
-
-
-def _indented(item: RenderableType) -> Padding:
-    return Padding(item, (0, 0, 0, 2))

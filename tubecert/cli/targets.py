@@ -1,0 +1,32 @@
+"""Where commands write: refused before any work is done if it would take the place of an input."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tubecert import certificate
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
+from tubecert.spec import Spec
+
+REMEDY = "choose another file with -o FILE"
+
+
+def refused(message: str, help: str = REMEDY) -> TargetError:
+    """The error about a file that is not written."""
+    return TargetError([Finding(code="TC120", message=message, help=help)])
+
+
+def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
+    """Raise `TargetError` for a target that would take the place of an input; `inputs` are named by what they are."""
+    for what, source in inputs.items():
+        if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
+            raise refused(f"{target} is the {what} itself and would be overwritten")
+
+
+def plan_of(given: Mapping[str, Any], system: Spec) -> Path | None:
+    """The plan file of the specification that a command was given, if it has one."""
+    table = system.trajectory.table
+    return None if table is None else Path(given["spec"]).parent / table.file
