@@ -11,10 +11,10 @@ from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.spec import Spec
 
-REMEDY = "choose another file with -o FILE"
+_REMEDY = "choose another file with -o FILE"
 
 
-def refused(message: str, help: str = REMEDY) -> TargetError:
+def refused(message: str, help: str = _REMEDY) -> TargetError:
     """The error about a file that is not written."""
     return TargetError([Finding(code="TC120", message=message, help=help)])
 
