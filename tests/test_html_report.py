@@ -734,7 +734,9 @@ def test_layout_in_a_browser(shown, tmp_path, name, width, dark):
 def test_layout_on_paper(shown, tmp_path):
     sheet = 680  # A4 within its margins
     found = pages.measure(pages.on_paper(shown["orbit"], tmp_path), tmp_path, width=sheet, dark=True)
-    assert sum(map(int, re.findall(r"\d+", found["background"])[:3])) == 3 * 255, "ink is not spent on a ground"
+    assert sum(map(int, re.findall(r"\d+", found["background"])[:3])) == 3 * 255, (
+        "ink is not spent on a ground"
+    )
     assert found["scroll"] <= found["client"], "nothing is cut at the right"
     assert {position for _, position, _ in found["heads"]} == {"static"}, "tables keep their heads"
     assert all(lines <= len(words.split()) for words, _, lines in found["heads"]), "no word is broken"
