@@ -7,7 +7,6 @@ import shlex
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,30 +24,18 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where the certificate goes."""
-
-    target: str
-
-    @property
-    def is_stdout(self) -> bool:
-        """Whether stdout takes the certificate."""
-        return self.target == certificate.STDOUT
-
-
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Certify; `given` holds the options by the names of their parameters."""
     numbers = _numbers(given)
-    place = _place(given)
-    pages = _pages(given, place)
+    target = _target(given)
+    pages = _pages(given, target)
     from tubecert import spec
     from tubecert.spec.metric_file import with_metric
 
     system = spec.load(given["spec"])
     if given["metric"] is not None:
         system = with_metric(system, str(given["metric"]))
-    kept = _kept_place(given, system, place)
+    kept = _kept_place(given, system, target)
     from tubecert import pipeline  # numpy and the rest, once the input is known to be readable
     from tubecert.report import progress
 
@@ -59,11 +46,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         result = pipeline.certify(system, options, report)
     sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
-    if not place.is_stdout:
-        certificate.write(place.target, sealed)
+    if target != certificate.STDOUT:
+        certificate.write(target, sealed)
     metric = _kept_metric(result, kept)
     write_pages(pages, sealed)
-    _report(sealed, place, {"metric": metric, "pages": pages}, output)
+    _report(sealed, target, {"metric": metric, "pages": pages}, output)
     return certificate.exit_code(result)
 
 
@@ -71,7 +58,7 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
     values: dict[str, Any] = {
-        name: numbers.positive(f"--{name.replace('_', '-')}", given[name]) for name in ("rho_a", "epsilon")
+        name: numbers.positive(flag(name), given[name]) for name in ("rho_a", "epsilon")
     }
     for name in ("bandwidth", "adaptation_rate"):
         values[name] = numbers.gain(flag(name), given[name])
@@ -81,42 +68,41 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _place(given: Mapping[str, Any]) -> Place:
+def _target(given: Mapping[str, Any]) -> str:
     """Where the certificate goes, checked before any work is done.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input.
     """
-    target = (
-        given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.certificate.json"
-    )
+    given_out: str | None = given["output"]
+    target = f"{Path(given['spec']).stem}.certificate.json" if given_out is None else given_out
     certificate.check_target(target)
     spare(target, {"specification": given["spec"], "metric file": given["metric"]})
-    return Place(target=target)
+    return target
 
 
-def _pages(given: Mapping[str, Any], place: Place) -> list[str]:
+def _pages(given: Mapping[str, Any], target: str) -> list[str]:
     """Where the pages about the certificate go, checked before any work is done. Raises `TargetError`."""
     pages = list(given["report"] or ())
-    written = None if place.is_stdout else place.target
+    written = None if target == certificate.STDOUT else target
     check_pages(
         pages, {"specification": given["spec"], "metric file": given["metric"], "certificate": written}
     )
     return pages
 
 
-def _kept_place(given: Mapping[str, Any], system: Spec, place: Place) -> str | None:
+def _kept_place(given: Mapping[str, Any], system: Spec, beside: str) -> str | None:
     """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
     plan = plan_of(given, system)
-    if place.is_stdout:
+    if beside == certificate.STDOUT:
         return None
-    spare(place.target, {"plan": plan})
+    spare(beside, {"plan": plan})
     if system.metric is not None or system.synthesis is None:
         return None
-    name = Path(place.target).name.removesuffix(".json").removesuffix(".certificate")
-    target = str(Path(place.target).with_name(f"{name}.metric.json"))
+    name = Path(beside).name.removesuffix(".json").removesuffix(".certificate")
+    target = str(Path(beside).with_name(f"{name}.metric.json"))
     certificate.check_target(target)
     spare(target, {"specification": given["spec"], "plan": plan})
     if Path(target).exists() and not _synthesised(target):
@@ -156,7 +142,7 @@ def _record(started: datetime, seconds: float) -> dict[str, Any]:
     }
 
 
-def _report(sealed: Mapping[str, Any], place: Place, files: Mapping[str, Any], output: Output) -> None:
+def _report(sealed: Mapping[str, Any], target: str, files: Mapping[str, Any], output: Output) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
@@ -164,6 +150,6 @@ def _report(sealed: Mapping[str, Any], place: Place, files: Mapping[str, Any], o
     present(
         output,
         console.verdict_line(result),
-        lambda: console.report(sealed, target=place.target, verbose=output.verbose, **files),
-        certificate.dump(sealed) if output.json or place.is_stdout else None,
+        lambda: console.report(sealed, target=target, verbose=output.verbose, **files),
+        certificate.dump(sealed) if output.json or target == certificate.STDOUT else None,
     )
