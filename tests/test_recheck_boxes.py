@@ -296,9 +296,24 @@ def test_second_derivatives_do_where_third_ones_are_too_many(name, monkeypatch):
 def test_shares_are_proposals_only(proposal):
     """Whatever the shares are, a sum that is too large is never proven."""
     slope = [["x", "0"], ["0", "0"]]
-    with patched(SlopesBelow, _least=lambda self, at: [arb(proposal)]):
-        test = SlopesBelow([matrix(slope)], matrix([["4", "0"], ["0", "1"]]), Fraction(1, 5))
-        assert not test.over([(0.9, 1.0)]).proven
+    test = SlopesBelow([matrix(slope)], matrix([["4", "0"], ["0", "1"]]), Fraction(1, 5))
+    with patched(SlopesBelow, _least=lambda self, entries: [proposal]):
+        assert not test.over([(0.9, 1.0)]).proven  # it is 1/4 at 1
+    for share in ([proposal, 0.0], [0.2, proposal], [0.2 - proposal, proposal + 0.001]):
+        with patched(SlopesBelow, _proposed=lambda self, box, share=share: [share]):
+            assert not test.over([(0.9, 1.0)]).proven
+
+
+def test_shares_that_are_large_enough_must_stay_within_the_limit():
+    test = SlopesBelow(
+        [matrix([["x", "0"], ["0", "0"]]), matrix([["1", "0"], ["0", "0"]])],
+        matrix([["4", "0"], ["0", "1"]]),
+        Fraction(51, 100),
+    )
+    assert test.over([(0.9, 1.0)]).proven
+    for first, second, proven in (([0.001, 0.25], [0.258, 0.0], True), ([0.01, 0.25], [0.26, 0.0], False)):
+        with patched(SlopesBelow, _proposed=lambda self, box, both=(first, second): both):
+            assert test.over([(0.9, 1.0)]).proven is proven
 
 
 @pytest.mark.parametrize("y", [0.0, 0.7, 1.0, -3.0])

@@ -8,63 +8,67 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from math import sqrt
 
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import (
     Ball,
+    between,
     exact,
     is_indefinite,
     proposed_largest,
     whitening,
 )
 from tubecert.recheck.boxes import Box, Found
+from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
 from tubecert.recheck.statements import PositiveDefinite
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Rows, number, plus, scaled, times, turned, unit_matrix, variable
+from tubecert.recheck.terms import Rows, names, number, plus, scaled, times, turned, unit_matrix, variable
 
+_INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
 MU, _CURVE_MU, _LINE_MU = "mu#", "p#", "q#"  # no state can have these names
 
 
 class SlopesBelow:
     """The sum of the largest |eigenvalues| of the pencils (N_k, D) is at most `limit`.
 
-    The share of each N_k is proposed at the centre of the box; that it serves is proven: share D +- N_k > 0.
+    The share of each N_k is proposed on the box, as an affine function: a_k + g_k'x. That it serves is proven,
+    share_k(x) D +- N_k > 0, and that all shares together stay within the limit.
     """
 
     def __init__(self, matrices: Sequence[Rows], D: Rows, limit: Fraction) -> None:
-        self._limit = exact(limit)
-        self._n, self._values = len(D), {"share#": arb(0)}
-        share = variable("share#")
-        tests = []
-        for N in matrices:
-            for sign in (1, -1):
-                S = [
-                    [share * d + number(sign) * e for d, e in zip(dr, nr, strict=True)]
-                    for dr, nr in zip(D, N, strict=True)
-                ]
-                tests.append(PositiveDefinite(S, D, self._values))
-        self.variables = tuple(sorted({v for test in tests for v in test.variables}))
-        self._pencil = Program([e for rows in (D, *matrices) for row in rows for e in row], self.variables)
+        self._limit, self._n, self._count = exact(limit), len(D), len(matrices)
+        entries = [e for rows in (D, *matrices) for row in rows for e in row]
+        self.variables = tuple(sorted(names(entries)))
+        self._pencil = Combinations(entries, self.variables)
+        self._shares = ["share#", *(f"share#{v}" for v in self.variables)]
+        share = sum(
+            (variable(g) * variable(v) for g, v in zip(self._shares[1:], self.variables, strict=True)),
+            start=variable("share#"),
+        )
+        tests = [
+            PositiveDefinite(plus([[share * e for e in row] for row in D], N, sign), D, self._share_of([0.0]))
+            for N in matrices
+            for sign in (1, -1)
+        ]
         self._tests = [(test, [self.variables.index(v) for v in test.variables]) for test in tests]
 
     def over(self, box: Box) -> Found:
         """Every share on the whole box."""
-        at = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
-        least = self._least(at)
-        rest = self._limit - sum(least, start=arb(0))
-        total = sum(least, start=arb(0))
-        caused, spread = [hi - lo for lo, hi in box], [hi - lo for lo, hi in box]
-        if not rest > 0:
-            return Found(False, caused, spread)
-        for k, value in enumerate(least):
-            even = arb(1) / len(least) if len(least) == 1 or not total > 0 else value / total
-            share = (value + rest * even).lower()
+        wide = [hi - lo for lo, hi in box]
+        shares = self._proposed(box)
+        whole = [between(lo, hi) for lo, hi in box]
+        total = [sum((arb(x) for x in column), start=arb(0)) for column in zip(*shares, strict=True)]
+        most = sum((g * x for g, x in zip(total[1:], whole, strict=True)), start=total[0])
+        if not most <= self._limit:
+            return Found(False, wide, wide)
+        for k, share in enumerate(shares):
             for test, columns in self._tests[2 * k : 2 * k + 2]:
-                own = test.with_values({"share#": share})
-                found = own.over([box[i] for i in columns])
+                found = test.with_values(self._share_of(share)).over([box[i] for i in columns])
                 if not found.proven:
+                    caused, spread = list(wide), list(wide)
                     for c, i in enumerate(columns):
                         caused[i], spread[i] = found.caused[c], found.spread[c]
                     return Found(False, caused, spread)
@@ -72,20 +76,50 @@ class SlopesBelow:
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """Whether one matrix alone takes more than the limit."""
+        whole = {**self._share_of([0.0]), "share#": self._limit}
         return any(
-            test.with_values({"share#": self._limit}).broken([point[i] for i in columns])
-            for test, columns in self._tests
+            test.with_values(whole).broken([point[i] for i in columns]) for test, columns in self._tests
         )
 
-    def _least(self, at: Sequence[Ball]) -> list[Ball]:
-        """About the least share of each matrix at a point, a proposal in floats: |T N T'| where T D T' = I."""
+    def _share_of(self, share: Sequence[float]) -> dict[str, Ball]:
+        """The numbers of an affine function; slopes that are not given are 0."""
+        return dict(
+            zip(self._shares, map(arb, [*share, *[0.0] * (len(self._shares) - len(share))]), strict=True)
+        )
+
+    def _proposed(self, box: Box) -> list[list[float]]:
+        """[a_k, g_k] for every matrix: its least share, with its slopes, and what is left in proportion to it."""
+        centre = [0.5 * lo + 0.5 * hi for lo, hi in box]
+        steps = [0.25 * (hi - lo) for lo, hi in box]
+        near = [
+            [c + h * (i == j) for j, (c, h) in enumerate(zip(centre, steps, strict=True))]
+            for i in range(len(box))
+        ]
+        least, *further = (
+            self._least(entries)
+            for entries in self._pencil.run([list(map(arb, at)) for at in (centre, *near)])
+        )
+        total = sum(least)
+        left = (float(self._limit) - total) * _INSIDE
+        parts = [x / total if total > 0 else 1 / self._count for x in least]
+        slopes = [
+            [(x - y) / h if h > 0 else 0.0 for x, y in zip(there, least, strict=True)]
+            for there, h in zip(further, steps, strict=True)
+        ]
+        shares = []
+        for k, part in enumerate(parts):
+            g = [slope[k] - part * sum(slope) for slope in slopes]
+            shares.append([least[k] + part * left - sum(q * c for q, c in zip(g, centre, strict=True)), *g])
+        return shares
+
+    def _least(self, entries: list[Ball]) -> list[float]:
+        """About the least share of each matrix at a point, in floats: |T N T'| where T D T' = I."""
         n = self._n
-        entries = self._pencil.run(at)
         D, *slopes = [arb_mat(n, n, entries[k : k + n * n]) for k in range(0, len(entries), n * n)]
         T = arb_mat(whitening([[float(x.mid()) for x in row] for row in D.tolist()]))
         moved = [T * N * T.transpose() for N in slopes]
         squares = [[[float(x.mid()) for x in row] for row in (N * N.transpose()).tolist()] for N in moved]
-        return [arb(proposed_largest(square)).sqrt() for square in squares]
+        return [sqrt(proposed_largest(square)) for square in squares]
 
 
 class GainBelow:
