@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -69,3 +72,29 @@ def test_the_summary_groups_failures():
     assert "FAILED here: cases [0, 1, 2, 3, 4, 5," in text
     assert "18, 19]... (28)" in text
     assert isinstance(fuzz.options_of([]), argparse.Namespace)
+
+
+def test_an_alarm_that_is_swallowed_rings_again(monkeypatch):
+    said = []
+    monkeypatch.setattr(fuzz.Judge, "__call__", lambda judge, number: swallowing())
+    monkeypatch.setattr(fuzz.resource, "setrlimit", lambda *_: None)
+    pipe = type("Pipe", (), {"send": lambda self, item: said.append(item)})()
+    options = fuzz.options_of(["--alarm", "0.05"])
+    for name in ("OMP_NUM_THREADS", "XDG_STATE_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, os.environ.get(name, ""))
+    monkeypatch.chdir(".")
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        fuzz.work(0, 1, options, pipe)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert said[1][1] == "FAILED alarm after 0.05 s"
+
+
+def swallowing():
+    """Takes the first alarm for an error of its own, and goes on."""
+    with contextlib.suppress(fuzz.Alarm):
+        while True:
+            pass
+    while True:
+        pass

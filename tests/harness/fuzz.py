@@ -445,7 +445,8 @@ def work(first: int, last: int, options: argparse.Namespace, pipe: Connection) -
         pipe.send((number_, "started", 0.0))
         began = time.process_time()  # other work on the machine makes no case slow
         try:
-            signal.setitimer(signal.ITIMER_PROF, options.alarm)
+            # again and again: a library may take the first ring for an error of its own
+            signal.setitimer(signal.ITIMER_PROF, options.alarm, 0.2 * options.alarm)
             try:
                 said = judge(number_)
             finally:
