@@ -120,7 +120,7 @@ def suprema() -> None:
     cases = {
         "sup |f|": (SumOfNorms, ([column(model.f)],), [column(model.f)]),
         "sup |f_x|": (SumOfNorms, ([model.f_x],), [model.f_x]),
-        "sup lmax(W)": (Pencil, (model.W, [eye]), [model.W]),
+        "sup lmax(W)": (Pencil, (model.W, eye), [model.W]),
     }
     for name, (kind, arguments, matrices) in cases.items():
         seconds, found = timed(

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tubecert.bounds.feedback import over_mu
+from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import branch_and_bound as bnb
 from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, SumOfNorms
-from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, Weights, scalar
+from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.expression import ZERO, Expression, constant, cos, norm, parse, sin, sqrt, substitute, symbol
 from tubecert.expression.matrix import identity
 from tubecert.trajectory import Plan, constant_plan
@@ -76,11 +76,11 @@ CASES = {
     "input on a tube": (scalar(u + 0 * x), circle(0.5), 3),
     "input and state": (scalar(u + y), circle(0.5), 4.5),
     "difference": (scalar(u - 3 * y), circle(0.5), 1.5),
-    "pencil": (Pencil(((x, constant(1)), (constant(1), x)), [((1 + y * y, ZERO), (ZERO, 1 + y * y))]),
+    "pencil": (Pencil(((x, constant(1)), (constant(1), x)), ((1 + y * y, ZERO), (ZERO, 1 + y * y))),
                box(x=(-2, 1), y=(-1, 2)), 2),
-    "negative pencil": (Pencil(((-1 - x * x, ZERO), (ZERO, -2 - y * y)), [((2 + y, ZERO), (ZERO, 2 + y))]),
+    "negative pencil": (Pencil(((-1 - x * x, ZERO), (ZERO, -2 - y * y)), ((2 + y, ZERO), (ZERO, 2 + y))),
                         box(x=(-1, 1), y=(0, 1)), -1 / 3),
-    "inverse": (Pencil(identity(2), [((2 + x, ZERO), (ZERO, 3 + y * y))]), box(x=(-1, 1), y=(0, 1)), 1),
+    "inverse": (Pencil(identity(2), ((2 + x, ZERO), (ZERO, 3 + y * y))), box(x=(-1, 1), y=(0, 1)), 1),
     "pencils": (SumOfPencils([((x, ZERO), (ZERO, -2 * y)), ((y, ZERO), (ZERO, ZERO))],
                              ((constant(2), ZERO), (ZERO, constant(1)))), box(x=(-1, 1), y=(-1, 1)), 2.5),
     "least gain": (LeastInputGain(((1 + x,), (y,)), ((constant(2), ZERO), (ZERO, constant(4)))),
@@ -284,14 +284,14 @@ def test_nested_norms_have_the_product_of_their_slopes():
 def test_weights_below_the_exact_ones_never_lower_the_bound():
     """Sup over mu of v'Nv/(p/mu + mu q) is N/(2 sqrt(p q)), at mu = sqrt(p/q)."""
 
-    def ends(lo, hi):
-        return np.where(hi > 0, np.nextafter(1 / hi, 0), 0.0), lo
+    def simple(lo, hi):
+        return np.ones_like(lo), np.where(hi > 0, np.nextafter(1 / hi, 0), 0.0), lo
 
-    simple = Weights(variables=("mu",), below=ends, loss=lambda lo, hi: (hi - lo) / hi)
-    both = product(((6, 6 / (2 * math.sqrt(2 * 5))), (-6, 0.0)), (simple, over_mu(4.0)))
-    for (n, truth), weights in both:
-        objective = Pencil(((constant(n),),), [((constant(2),),), ((constant(5),),)], weights=weights)
-        found = supremum(objective, BoxDomain({weights.variables[0]: (0.0, 4.0)}), Effort(gap=1e-3))
+    n_truth = ((6, 6 / (2 * math.sqrt(2 * 5))), (-6, 0.0))
+    for (n, truth), ends in product(n_truth, (simple, tangents)):
+        weights = Weights(variables=("mu",), ends=ends, loss=lambda lo, hi: (hi - lo) / hi)
+        objective = WeightedPencil([((constant(n),),)], [((constant(2),),), ((constant(5),),)], weights)
+        found = supremum(objective, BoxDomain({"mu": (0.0, 4.0)}), Effort(gap=1e-3))
         assert found.below <= truth * (1 + 1e-12)
         assert found.above >= truth
         assert found.reached

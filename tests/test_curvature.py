@@ -17,11 +17,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tubecert.bounds.feedback import over_mu
+from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import LeastInputGain, SumOfNorms
-from tubecert.enclosure.pencil import Pencil, SumOfPencils, Weights, scalar
+from tubecert.enclosure.pencil import Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, exp, norm, sin, sqrt, symbol
@@ -446,8 +446,8 @@ def norms(points):
 
 USERS = {
     "norms": (SumOfNorms([F, V]), norms),
-    "pencil": (Pencil(F, [W]), lambda p: pencil_values(at(F, p), at(W, p))[:, -1]),
-    "inverse": (Pencil(identity(3), [W]), lambda p: 1 / np.linalg.eigvalsh(at(W, p))[:, 0]),
+    "pencil": (Pencil(F, W), lambda p: pencil_values(at(F, p), at(W, p))[:, -1]),
+    "inverse": (Pencil(identity(3), W), lambda p: 1 / np.linalg.eigvalsh(at(W, p))[:, 0]),
     "pencils": (SumOfPencils([F, W], multiply(W, W)), sums_of_pencils),
     "length": (MetricNorm(V, W), lengths),
     "input gain": (LeastInputGain(B, W), input_gains),
@@ -487,12 +487,14 @@ def test_values_inside_are_below_the_bounds_of_boxes(name):
 def test_weights_that_vary_with_a_further_variable():
     """N <= tau (D_1/mu + mu D_2) for mu in a range: the value is that of sampled mu, or 0."""
     D = [multiply(B, transpose(B)), W]
-    simple = Weights(
-        variables=("mu",), below=lambda lo, hi: (1 / hi * (1 - 1e-15), lo), loss=lambda lo, hi: hi - lo
-    )
+
+    def simple(lo, hi):
+        return np.ones_like(lo), 1 / hi * (1 - 1e-15), lo
+
     rng = np.random.default_rng(3)
-    for weights, width in product((simple, over_mu(4.0)), (0.3, 0.05)):
-        objective = Pencil(F, D, weights=weights)
+    for ends, width in product((simple, tangents), (0.3, 0.05)):
+        weights = Weights(variables=("mu",), ends=ends, loss=lambda lo, hi: hi - lo)
+        objective = WeightedPencil([F], D, weights)
         lo = rng.uniform(-0.6, 0.6, (20, 4))
         lo[:, 3] = rng.uniform(0.5, 3, 20)
         hi = lo + width
@@ -531,9 +533,10 @@ def diagonal(a, b):
 
 
 def weighted(N, D):
-    return Pencil(
-        N, [D], weights=Weights(variables=("mu",), below=lambda lo, hi: (lo,), loss=lambda lo, hi: hi - lo)
+    weights = Weights(
+        variables=("mu",), ends=lambda lo, hi: (np.ones_like(lo), lo), loss=lambda lo, hi: hi - lo
     )
+    return WeightedPencil([N], [D], weights)
 
 
 def beside(N, D):
@@ -546,11 +549,11 @@ BOWL, HILL = 1 + x**2, 2 - x**2
 TIGHT_USERS = {
     "norm": (SumOfNorms([[[x**2]]]), 1.0),
     "norms": (SumOfNorms([[[x**2]], [[-(x**2)]]]), 2.0),
-    "numerator": (Pencil([[x**2]], [[[ONE]]]), 1.0),
-    "negative numerator": (Pencil([[-BOWL]], [[[ONE]]]), -1.0),
-    "denominator at its ends": (Pencil([[ONE]], [[[HILL]]]), 1.0),
-    "denominator at its centre": (Pencil([[ONE]], [[[BOWL]]]), 1.0),
-    "denominator of a negative value": (Pencil([[-ONE]], [[[BOWL]]]), -0.5),
+    "numerator": (Pencil([[x**2]], [[ONE]]), 1.0),
+    "negative numerator": (Pencil([[-BOWL]], [[ONE]]), -1.0),
+    "denominator at its ends": (Pencil([[ONE]], [[HILL]]), 1.0),
+    "denominator at its centre": (Pencil([[ONE]], [[BOWL]]), 1.0),
+    "denominator of a negative value": (Pencil([[-ONE]], [[BOWL]]), -0.5),
     "weighted numerator": (weighted([[x**2]], [[ONE]]), 1.0),
     "weighted denominator": (weighted([[ONE]], [[HILL]]), 1.0),
     "sum": (SumOfPencils([[[x**2]], [[-(x**2)]]], [[ONE]]), 2.0),

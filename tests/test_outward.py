@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tubecert.bounds.feedback import ClosedFormGain, below_over_mu
+from tubecert.bounds.feedback import ClosedFormGain, down_to_zero, tangents
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, sin, symbol
@@ -116,13 +116,49 @@ def test_weights_of_the_denominator_lie_below_it():
     lo = rng.uniform(0.1, 10, (400, 1)) * 10.0 ** rng.integers(-8, 8, (400, 1))
     hi = lo * (1 + rng.choice([0, 1e-12, 1e-3, 0.5, 3, 9], (400, 1)))
     lo[0], hi[0] = 0, 1e-3
-    for row in np.concatenate([lo, hi, *below_over_mu(lo, hi)], axis=1).tolist():
+    ones, slopes, levels = tangents(lo, hi)
+    assert (ones == 1).all()
+    for row in np.concatenate([lo, hi, slopes, levels], axis=1).tolist():
         a, b, s0, s1, w0, w1 = map(Fraction, row)
         for part in (Fraction(k, 7) for k in range(8)):
             mu = a + part * (b - a)
             assert mu == 0 or (s0 + part * (s1 - s0)) * mu <= 1
             assert w0 + part * (w1 - w0) <= mu
             assert min(s0, s1, w0, w1) >= 0
+
+
+def test_ranges_down_to_zero_are_bounded_by_their_two_ends():
+    """For all mu in (0, h]; and where the cross terms alone count the bound is attained."""
+    rng = np.random.default_rng(11)
+    finite = 0
+    for trial in range(300):
+        F, L = rng.normal(size=(5, 5)), rng.normal(size=(5, 5))
+        F, W = F + F.T, L @ L.T + 0.1 * np.eye(5)
+        null = F[2:, 2:]
+        F[2:, 2:] -= (np.linalg.eigvalsh(null)[-1] + rng.choice([0, 0.3])) * np.eye(3)
+        if trial % 10 == 0:
+            F[:2, :2], W[:2, 2:], W[2:, :2] = 0, 0, 0
+        h = float(10 ** rng.uniform(-3, 0.5))
+        weights = down_to_zero(np.zeros((1, 1)), np.full((1, 1), h), inputs=2, states=5)
+        gram = np.diag([1.0, 1, 0, 0, 0])
+        tops = []
+        for end in range(2):
+            numerator = weights[0][0, end] * F
+            denominator = weights[1][0, end] * gram + weights[2][0, end] * W
+            if np.linalg.eigvalsh(denominator)[0] > 1e-9:
+                tops.append(pencil_top(numerator, denominator))
+        if len(tops) < 2:
+            continue
+        finite += 1
+        above = max(0.0, *tops)
+        for mu in h * np.append(np.logspace(-4, 0, 40), rng.uniform(0, 1, 10)):
+            assert pencil_top(F, gram / mu + mu * W) <= above * (1 + 1e-6) + 1e-9
+    assert finite > 150
+
+
+def pencil_top(numerator, denominator):
+    t = np.linalg.inv(np.linalg.cholesky(denominator))
+    return np.linalg.eigvalsh(t @ numerator @ t.T)[-1]
 
 
 def test_a_piece_is_searched_to_its_very_end():

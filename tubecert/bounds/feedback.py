@@ -1,8 +1,9 @@
 """The feedback gain du: the weights of its exact search over mu, and a closed form that needs no such search.
 
 2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2 makes du the supremum over (x, mu) of the pencil
-(F, B B'/mu + mu W). That denominator is convex in mu: over a range it lies above its tangent at the middle m, which is
-affine in mu, so that the two ends of the range suffice.
+(F, B B'/mu + mu W). Over a range of mu in which its ends are close, the denominator lies above its tangent at the
+middle, which is affine in mu, so that the two ends suffice. Over a range down to 0, in coordinates in which
+B B' = diag(I, 0), a congruence by powers of mu leaves something that is bounded by its two ends as well (theory 2.1).
 
 The closed form: in coordinates in which W is near the identity, v = R r + N n with R, N bases of range(B~') and
 null(B~); where v'F~v <= 0 on the null space (C2, certified before),
@@ -14,14 +15,18 @@ Implements: theory section 2, feedback gain, closed form.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import eigenvalues_midrad, midrad, product, spectral_norm_midrad, whitening
-from tubecert.enclosure.objective import Estimate
-from tubecert.enclosure.pencil import Weights
+from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.enclosure.pencil import FirstFinite, WeightedPencil, Weights
 from tubecert.enclosure.taylor import MatrixFunction
+from tubecert.expression import ONE, ZERO
+from tubecert.expression.matrix import multiply, transpose
 from tubecert.model import ControlAffineModel
 
 Ball = tuple[Array, Array]  # midpoints and radii of matrices
@@ -29,26 +34,56 @@ MU = "mu#"  # no state can have this name
 _WIDE = 4.0  # hi/lo of a range over which the tangent is worse than the values at the ends
 
 
-def over_mu(largest: float) -> Weights:
-    """Weights of (B B', W) below (1/mu, mu) over ranges of mu in [0, largest]."""
-    return Weights(variables=(MU,), below=below_over_mu, loss=lambda lo, hi: _loss(lo, hi, largest))
+def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
+    """du as a supremum over x and mu in (0, largest]; for constant B, C2 must hold at the model's rate."""
+    loss = partial(_loss, largest=largest)
+    exact = WeightedPencil(
+        [model.F], [model.BBt, model.W], Weights(variables=(MU,), ends=tangents, loss=loss)
+    )
+    if not (model.constant_input and model.annihilator):
+        return exact
+    n, m = len(model.states), len(model.inputs)
+    basis = tuple((*r, *c) for r, c in zip(transpose(model.B_pinv), model.annihilator, strict=True))
+    F, W = (multiply(transpose(basis), multiply(a, basis)) for a in (model.F, model.W))
+    gram = tuple(tuple(ONE if i == j < m else ZERO for j in range(n)) for i in range(n))
+    ends = partial(down_to_zero, inputs=m, states=n)
+    return FirstFinite(exact, WeightedPencil([F], [gram, W], Weights(variables=(MU,), ends=ends, loss=loss)))
 
 
-def below_over_mu(lo: Array, hi: Array) -> tuple[Array, Array]:
-    """The two ends of the tangent at the middle, (N, 2) each; (1/hi, lo) where the range is wide or reaches 0."""
+def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:
+    """Weights of F, B B' and W, (N, 2) each: the ends of the tangent, or (1, 1/hi, lo) for a wide range."""
     tangent = _narrow(lo, hi)
     ends = np.concatenate([lo, hi], axis=1)
     middle = np.where(tangent, 0.5 * (lo + hi), 1.0)
-    slope = (2 * middle - ends) / middle / middle * (1 - 1e-15)  # of B B': 1/m + (m - mu)/m^2, rounded down
-    least = np.where(hi > 0, np.nextafter(1 / np.where(hi > 0, hi, 1.0), 0.0), 0.0)
-    return np.where(tangent, slope, least), np.where(tangent, ends, lo)
+    slope = (2 * middle - ends) / middle / middle * (1 - 1e-15)  # 1/m + (m - mu)/m^2, rounded down
+    return np.ones_like(ends), np.where(tangent, slope, _inverse(hi)), np.where(tangent, ends, lo)
+
+
+def down_to_zero(lo: Array, hi: Array, *, inputs: int, states: int) -> tuple[Array, Array, Array]:
+    """Weights of F, B B' = diag(I, 0) and W, by entries, for all mu in (0, hi].
+
+    By the congruence diag(sqrt(mu/hi), sqrt(hi/mu)) and F_22 <= 0 (C2), F <= tau (B B'/mu + mu W) if
+        [mu/hi F_11, F_12; F_21, F_22] <= tau [I/hi, mu W_12; mu W_21, hi W_22],
+    which is affine in mu: mu = 0 and mu = hi suffice.
+    """
+    top = (np.arange(states) < inputs).astype(float)
+    own, rest = np.outer(top, top), np.outer(1 - top, 1 - top)
+    end = np.array([0.0, 1.0])[None, :, None, None]
+    F = np.broadcast_to(1 - own + end * own, (len(hi), 2, states, states))
+    W = hi[:, :, None, None] * (rest + end * (1 - own - rest))
+    return F, np.repeat(_inverse(hi), 2, axis=1), W
+
+
+def _inverse(mu: Array) -> Array:
+    """1/mu rounded down; 0 for 0."""
+    return np.where(mu > 0, np.nextafter(1 / np.where(mu > 0, mu, 1.0), 0.0), 0.0)
 
 
 def _narrow(lo: Array, hi: Array) -> NDArray[np.bool_]:
     return (lo > 1e-100) & (hi <= _WIDE * lo) & (hi < 1e100)  # nothing over- or underflows
 
 
-def _loss(lo: Array, hi: Array, largest: float) -> Array:
+def _loss(lo: Array, hi: Array, *, largest: float) -> Array:
     """What the weights lose, relative: of second order for narrow ranges.
 
     Where a range reaches 0, its part of the whole one, which shrinks: it would otherwise be halved for ever where only

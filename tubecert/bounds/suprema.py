@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Witness
-from tubecert.bounds.feedback import MU, ClosedFormGain, over_mu
+from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
@@ -63,8 +63,8 @@ class Suprema:
         """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1."""
         fine = replace(self.effort, gap=min(self.effort.gap, 1e-4))  # they enter every condition
         eye = identity(len(self.model.states))
-        largest = self._over_tube("lower", Pencil(self.model.W, [eye]), fine)
-        upper = self._over_tube("upper", Pencil(eye, [self.model.W]), fine)
+        largest = self._over_tube("lower", Pencil(self.model.W, eye), fine)
+        upper = self._over_tube("upper", Pencil(eye, self.model.W), fine)
         inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
         lower = Constant(below=float(inverse.lo), above=float(inverse.hi), at=self._witness(largest))
         return lower, self._constant(upper)
@@ -125,10 +125,9 @@ class Suprema:
 
         Exact: 2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2, attained at some mu <= smax(B~).
         """
-        top = self._over_tube("feedback_gain", Pencil(self.model.BBt, [self.model.W]))
+        top = self._over_tube("feedback_gain", Pencil(self.model.BBt, self.model.W))
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))
-        objective = Pencil(self.model.F, [self.model.BBt, self.model.W], weights=over_mu(largest))
-        found = self._over_tube("feedback_gain", objective, extra={MU: (0.0, largest)})
+        found = self._over_tube("feedback_gain", exact_gain(self.model, largest), extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
             cheap = replace(self.effort, budget=min(self.effort.budget, self.effort.cheap))
@@ -141,7 +140,7 @@ class Suprema:
 
     def contraction_excess(self) -> Constant:
         """sup lmax of the pencil (F, W), as in the printed (bounds:delta_u)."""
-        return self._constant(self._over_tube("contraction_excess", Pencil(self.model.F, [self.model.W])))
+        return self._constant(self._over_tube("contraction_excess", Pencil(self.model.F, self.model.W)))
 
     def input_gain_least(self) -> Constant:
         """inf over the tube of the smallest singular value of Theta B.
@@ -159,7 +158,7 @@ class Suprema:
         """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan."""
         on = self.plan.on
         objective = Pencil(
-            on(self.model, self.model.BBt), [on(self.model, self.model.W)], fixed=self.plan.fixed
+            on(self.model, self.model.BBt), on(self.model, self.model.W), fixed=self.plan.fixed
         )
         return self._root(self._search_plan("metric_input_gain", objective))
 
@@ -174,7 +173,7 @@ class Suprema:
         """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
         found = []
         for i, name in enumerate(self.model.states):
-            entry = Pencil([[self.model.W[i][i]]], [[[ONE]]])
+            entry = Pencil([[self.model.W[i][i]]], [[ONE]])
             found.append(self._root(self._over_tube(f"half width of {name}", entry)))
         return tuple(found)
 

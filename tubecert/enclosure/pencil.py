@@ -23,7 +23,7 @@ from tubecert.enclosure.linalg import (
     quadratic_form,
     whitening,
 )
-from tubecert.enclosure.objective import Estimate, edges, estimate_of
+from tubecert.enclosure.objective import Estimate, Objective, edges, estimate_of
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 from tubecert.expression import ONE, Expression
 from tubecert.expression.matrix import identity
@@ -36,49 +36,41 @@ Ball = tuple[Array, Array]  # midpoints and radii of matrices
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """D = sum_k w_k D_k with weights w_k >= 0 that depend on further variables.
+    """N and D as sums sum_k w_k M_k over matrices M_k, with weights that depend on further variables.
 
-    `below(lo, hi)`: K arrays (N, E) of weights; over the whole range of the variables, some convex combination of the
-    E sums is at most D in the Loewner order. At a point, each is within 4e-15 of the exact one.
+    `ends(lo, hi)`: for every matrix, numerators first, an array (N, E) of weights >= 0, or (N, E, n, n) of weights of
+    its entries. If N <= tau D holds, tau >= 0, for the sums with each of the E ends, it holds over the whole range of
+    the variables. At a point, they are within 4e-15 of the exact ones, or those of D are 0.
     `loss(lo, hi)`: how much of D is lost by that, relative, for each variable (N, d); it only steers the search.
     """
 
     variables: tuple[str, ...]
-    below: Callable[[Array, Array], Sequence[Array]]
+    ends: Callable[[Array, Array], Sequence[Array]]
     loss: Callable[[Array, Array], Array]
 
 
 class Pencil:
-    """The largest eigenvalue of the pencil (N(x), D(x)), D > 0: the least tau with N <= tau D.
+    """The largest eigenvalue of the pencil (N(x), D(x)), D > 0: the least tau with N <= tau D."""
 
-    D may be a weighted sum. Lower bounds of D bound N <= tau D for tau >= 0 only, so with weights the value is the
-    largest eigenvalue or 0, whichever is larger.
-    """
+    _weights: Weights | None = None
+    _top = 1  # so many of the matrices are numerators
 
     def __init__(
-        self,
-        numerator: Matrix,
-        denominators: Sequence[Matrix],
-        *,
-        weights: Weights | None = None,
-        fixed: frozenset[str] = frozenset(),
+        self, numerator: Matrix, denominator: Matrix, *, fixed: frozenset[str] = frozenset()
     ) -> None:
-        self._function = MatrixFunction([numerator, *denominators], fixed=fixed)
-        self._own = self._function.variables
-        self._weights = weights
-        self.variables = self._own if weights is None else (*self._own, *weights.variables)
-        self._count = len(denominators)
+        self._function = MatrixFunction([numerator, denominator], fixed=fixed)
+        self._own = self.variables = self._function.variables
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
         """`target` where N <= target D is proven at once, else the bound that the excess over it gives."""
         own = len(self._own)
         e = self._function.expand(lo[:, :own], hi[:, :own])
-        mid, rad = list(e.mid), _filled(e)
-        weights = self._below(lo, hi)
+        rad, top = _filled(e), self._top
+        weights = self._ends(lo, hi)
         ends = weights[0].shape[1]
-        numerator = np.tile(mid[0], (1, ends, 1, 1)), np.tile(rad[0], (1, ends, 1, 1))
-        denominator = _weighted(weights, mid[1:], rad[1:])
-        t = self._frame(hi, mid)
+        numerator = _weighted(weights[:top], e.mid[:top], rad[:top])
+        denominator = _weighted(weights[top:], e.mid[top:], rad[top:])
+        t = self._frame(hi, e.mid)
         tested = target if np.isfinite(target) else _guess(t, numerator)
         excess, above = _bound(t, numerator, denominator, tested)
         value = above.max(axis=1)
@@ -107,37 +99,77 @@ class Pencil:
     def lower(self, lo: Array, hi: Array) -> Array:
         """Rayleigh quotient of a proposed eigenvector, rounded down."""
         own = len(self._own)
-        values = [midrad(g) for g in self._function.at(lo[:, :own], hi[:, :own])]
-        numerator = values[0]
-        weights = [w[:, :1] for w in self._below(lo, hi)]
-        mid, rad = _weighted(
-            weights, [m[:, None] for m, _ in values[1:]], [r[:, None] for _, r in values[1:]]
+        mids, rads = zip(
+            *(midrad(g[:, None]) for g in self._function.at(lo[:, :own], hi[:, :own])), strict=True
         )
-        denominator = mid[:, 0], rad[:, 0]
+        weights, top = [w[:, :1] for w in self._ends(lo, hi)], self._top
+        numerator = _first(_weighted(weights[:top], mids[:top], rads[:top]))
+        denominator = _first(_weighted(weights[top:], mids[top:], rads[top:]))
         t = whitening(denominator[0])
         v = np.einsum("nji,nj->ni", t, _eigenvectors(t, numerator[0])[..., -1])
         quotient = quadratic_form(v, *numerator) / quadratic_form(v, *denominator)
         lower = quotient.lo - _EXACT * np.abs(quotient.lo)
         return np.where(np.isnan(lower), -np.inf, lower) if self._weights is None else np.fmax(lower, 0.0)
 
-    def _below(self, lo: Array, hi: Array) -> list[Array]:
-        """Weights of the denominators, each (N, E)."""
+    def _ends(self, lo: Array, hi: Array) -> list[Array]:
+        """Weights of the matrices, each (N, E)."""
         if self._weights is None:
-            return [np.ones((len(lo), 1))] * self._count
+            return [np.ones((len(lo), 1))] * 2
         own = len(self._own)
-        return list(self._weights.below(lo[:, own:], hi[:, own:]))
+        return list(self._weights.ends(lo[:, own:], hi[:, own:]))
 
     def _frame(self, hi: Array, mids: list[Array]) -> Array:
         """A congruence that makes the denominator, weighted as at the upper ends, nearly the identity."""
-        mid, _ = _weighted(self._below(hi, hi), mids[1:], mids[1:])
+        mid, _ = _weighted(self._ends(hi, hi)[self._top :], mids[self._top :], mids[self._top :])
         return whitening(mid.mean(axis=1))[:, None]
 
     def _caused(self, t: Array, e: Expansion, target: float, weights: list[Array]) -> Array:
         """How much each variable's rest adds to the excess, (d, N)."""
-        caused = _whitened_rest(t, e, 0)
+        caused = np.zeros((e.signs.shape[1], len(t)))
         for k, weight in enumerate(weights):
-            caused = caused + _scale(target) * weight.max(axis=1) * _whitened_rest(t, e, 1 + k)
+            scale = 1.0 if k < self._top else _scale(target)
+            caused += scale * weight.reshape(len(t), -1).max(axis=1) * _whitened_rest(t, e, k)
         return caused
+
+
+class WeightedPencil(Pencil):
+    """A pencil whose N and D are weighted sums of matrices.
+
+    The weights answer for tau >= 0 only, so the value is the largest eigenvalue or 0, whichever is larger.
+    """
+
+    def __init__(
+        self, numerators: Sequence[Matrix], denominators: Sequence[Matrix], weights: Weights
+    ) -> None:
+        self._function = MatrixFunction([*numerators, *denominators])
+        self._own = self._function.variables
+        self._top = len(numerators)
+        self._weights = weights
+        self.variables = (*self._own, *weights.variables)
+
+
+class FirstFinite:
+    """Two bounds of one function of the same variables: the second where the first is infinite."""
+
+    def __init__(self, first: Objective, second: Objective) -> None:
+        if set(first.variables) != set(second.variables):
+            raise ValueError("the objectives have different variables")
+        self._first, self._second = first, second
+        self.variables = first.variables
+        self._order = [first.variables.index(v) for v in second.variables]
+
+    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+        """The first bound, or the second."""
+        found = self._first.upper(lo, hi, target)
+        missing = np.isinf(found.upper)
+        if missing.any():
+            other = self._second.upper(lo[missing][:, self._order], hi[missing][:, self._order], target)
+            found.upper[missing] = other.upper
+        return found
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Values of the first."""
+        return self._first.lower(lo, hi)
 
 
 class Definite(Pencil):
@@ -148,7 +180,7 @@ class Definite(Pencil):
 
     def __init__(self, matrix: Matrix) -> None:
         negative = [[-e for e in row] for row in matrix]
-        super().__init__(negative, [identity(len(matrix))])
+        super().__init__(negative, identity(len(matrix)))
 
     def _frame(self, hi: Array, mids: list[Array]) -> Array:
         return whitening(-mids[0].mean(axis=1))[:, None]
@@ -199,7 +231,7 @@ class SumOfPencils:
 
 def scalar(e: Expression, fixed: frozenset[str] = frozenset()) -> Pencil:
     """The value of one expression, as the pencil (e, 1)."""
-    return Pencil([[e]], [[[ONE]]], fixed=fixed)
+    return Pencil([[e]], [[ONE]], fixed=fixed)
 
 
 # -- bounds at the vertices ------------------------------------------------------------------------------------
@@ -250,12 +282,16 @@ def _filled(e: Expansion) -> list[Array]:
     return [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
 
 
+def _first(ball: Ball) -> Ball:
+    return ball[0][:, 0], ball[1][:, 0]
+
+
 def _weighted(weights: Sequence[Array], mids: Sequence[Array], rads: Sequence[Array]) -> Ball:
     """sum_k w_k (mid_k +- rad_k) for every end of the weights, (N, E V, n, n), with the roundings in the radius."""
-    if len(mids) == 1 and np.all(weights[0] == 1.0):
+    if len(mids) == 1 and weights[0].shape == (len(mids[0]), 1) and np.all(weights[0] == 1.0):
         return mids[0], rads[0]
     zero = np.zeros(())
-    by_end = [w[:, :, None, None, None] for w in weights]
+    by_end = [w[:, :, None] if w.ndim == 4 else w[:, :, None, None, None] for w in weights]
     mid = sum((w * m[:, None] for w, m in zip(by_end, mids, strict=True)), start=zero)
     size = sum((w * np.abs(m)[:, None] for w, m in zip(by_end, mids, strict=True)), start=zero)
     rad = sum((w * r[:, None] for w, r in zip(by_end, rads, strict=True)), start=zero)

@@ -70,8 +70,8 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
             at=place(positive.at),
         )
     fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
-    largest = supremum(Pencil(model.W, [eye]), domain, fine)
-    upper = supremum(Pencil(eye, [model.W]), domain, fine)
+    largest = supremum(Pencil(model.W, eye), domain, fine)
+    upper = supremum(Pencil(eye, model.W), domain, fine)
     inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
     proof = MetricProof(
         verdict="certified",
@@ -110,7 +110,7 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
     basis = model.annihilator if model.constant_input else _moving_annihilator(model, domain, effort)
     objective: Objective
     if basis is not None:
-        objective = Pencil(_restrict(model.drift_form, basis), [_restrict(model.W, basis)])
+        objective = Pencil(_restrict(model.drift_form, basis), _restrict(model.W, basis))
     else:
         objective = ProjectedPencil(
             model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)

@@ -62,7 +62,7 @@ class Defect:
         """Delta; negligible is what is negligible for |p|, in the units of the metric."""
         W, fixed, domain = self.plan.on(self.model, self.model.W), self.plan.fixed, self.plan.domain
         name, eye = "plan_defect_metric", identity(len(self.p))
-        stretch = self.search(name, Pencil(eye, [W], fixed=fixed), domain, self.effort)
+        stretch = self.search(name, Pencil(eye, W, fixed=fixed), domain, self.effort)
         absolute = self._negligible * float(np.sqrt(max(stretch.below, 0.0)))
         return self.search(
             name, MetricNorm(self.p, W, fixed), domain, replace(self.effort, absolute=absolute)

@@ -67,7 +67,7 @@ def _contraction(model: ControlAffineModel) -> Objective:
         )
     N = model.annihilator
     drift, weight = (multiply(transpose(N), multiply(a, N)) for a in (model.drift_form, model.W))
-    return Pencil(drift, [weight])
+    return Pencil(drift, weight)
 
 
 def _failed(condition: Literal["C1", "C2"], found: Decision, problem: SynthesisProblem) -> Judgement:
