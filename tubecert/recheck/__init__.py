@@ -15,7 +15,7 @@ derivative, kernel, formula or rounding in the producer must not pass both.
 | `pencils`, `multiplier`, `lipschitz` | statements of other kinds: pencils, columns over a ball, an h with kinks |
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
-| `document`, `system` | the certificate and the specification inside it, read and checked for form |
+| `document`, `reading`, `system` | the certificate and the specification inside it, read and checked for form |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `filtering`, `predictor`, `conditions`, `sampling`, `gains` | the conditions A, B and C at printed gains |
 | `consistency`, `refuted`, `claims` | what must agree; what refutes; all claims in their order |

@@ -22,7 +22,8 @@ from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import Node, digest
 from tubecert.recheck.place import Place
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.system import TIME, Duty, System, read_curve, read_system
+from tubecert.recheck.reading import TIME, Duty
+from tubecert.recheck.system import System, read_curve, read_system
 
 _BITS = 64  # for boxes
 _SHARP = 160  # for formulas at decimals

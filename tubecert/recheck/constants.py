@@ -25,8 +25,9 @@ from tubecert.recheck.metric import (
 from tubecert.recheck.multiplier import column_below
 from tubecert.recheck.pencils import MU, GainBelow, LeastGain, SlopesBelow
 from tubecert.recheck.place import Place
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
-from tubecert.recheck.system import TIME, System
+from tubecert.recheck.system import System
 from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,

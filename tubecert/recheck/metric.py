@@ -15,8 +15,9 @@ from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
+from tubecert.recheck.reading import TIME, Duty
 from tubecert.recheck.statements import NotNegative, PositiveDefinite
-from tubecert.recheck.system import TIME, Duty, System, along
+from tubecert.recheck.system import System, along
 from tubecert.recheck.terms import (
     NOUGHT,
     UNIT,

@@ -12,8 +12,9 @@ from tubecert.recheck.balls import Ball
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import CLOCK, Curve, expressed
 from tubecert.recheck.metric import time_range, together
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
-from tubecert.recheck.system import TIME, System
+from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable
 from tubecert.recheck.tube import Tube
 

@@ -6,40 +6,24 @@ certificate rests on is written out. Whatever is not of this form is an error (T
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
-from tubecert.expression import Expression, ExpressionError, parse, symbol
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
 from tubecert.recheck.document import Node, wrong
+from tubecert.recheck.reading import TIME, Duty, Reader, rows_of, sized
 from tubecert.recheck.terms import (
     Matrix,
-    Term,
     all_zero,
-    from_expressions,
     matrix_slopes,
-    number_of,
     plus,
     scaled,
     times,
     turned,
     variable,
 )
-
-TIME = "t"
-
-
-@dataclass(frozen=True, slots=True)
-class Duty:
-    """What must hold for an expression to be defined: `argument` is nonzero, or positive."""
-
-    kind: str
-    argument: Term
-    text: str
-    over: str  # "set", "time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,73 +107,27 @@ def along(slopes_by_state: list[Matrix], direction: Matrix) -> Matrix:
     return total
 
 
-class _Reader:
-    """Expressions of the specification, and what they owe."""
-
-    def __init__(self, states: Iterable[str]) -> None:
-        self._states = {name: symbol(name) for name in states}
-        self.duties: list[Duty] = []
-
-    def term(
-        self, node: Node, over: str, *, time: bool = False, states: bool = True, kinks: bool = False
-    ) -> Term:
-        """One expression; `over` is where it must be defined."""
-        allowed: dict[str, Expression] = dict(self._states) if states else {}
-        if time:
-            allowed[TIME] = symbol(TIME)
-        try:
-            parsed = parse(node.text(), symbols=allowed, kinks=kinks)
-        except ExpressionError as error:
-            raise wrong("TC603", f"{node.path} is no expression of the specification: {error}") from None
-        arguments = from_expressions([parsed.expression, *(duty.argument for duty in parsed.obligations)])
-        for duty, argument in zip(parsed.obligations, arguments[1:], strict=True):
-            self.duties.append(Duty(duty.kind, argument, duty.text, over))
-        return arguments[0]
-
-    def column(self, node: Node, rows: int, over: str, **options: bool) -> Matrix:
-        """A list of expressions as a column."""
-        return [[self.term(item, over, **options)] for item in _sized(node, rows)]
-
-
-def _sized(node: Node, size: int) -> list[Node]:
-    items = node.entries()
-    if len(items) != size:
-        raise wrong("TC603", f"{node.path} has {len(items)} entries, not {size}")
-    return items
-
-
-def _rows(node: Node, p: int, q: int) -> list[list[Node]]:
-    return [_sized(row, q) for row in _sized(node, p)]
-
-
 def read_plant(spec: Node) -> Plant:
     """What a canonical specification says of the system alone."""
     return _plant(spec)[0]
 
 
-def _plant(spec: Node) -> tuple[Plant, _Reader]:
+def _plant(spec: Node) -> tuple[Plant, Reader]:
     _known(spec)
     system = spec["system"]
     states, inputs = tuple(system["states"].texts()), tuple(system["inputs"].texts())
     n, m = len(states), len(inputs)
     if not (0 < m <= n) or len({*states, *inputs, TIME}) != n + m + 1:
         raise wrong("TC603", f"{system.path} must name states, and at most as many inputs, all different")
-    reader = _Reader(states)
+    reader = Reader(states)
     plant = Plant(
         states=states,
         inputs=inputs,
         f=reader.column(system["f"], n, "set"),
-        B=[[reader.term(e, "set") for e in row] for row in _rows(system["B"], n, m)],
+        B=[[reader.term(e, "set") for e in row] for row in rows_of(system["B"], n, m)],
         safe_set=_safe_set(spec["safe_set"], states),
     )
     return plant, reader
-
-
-def constants(node: Node) -> list[Fraction] | None:
-    """A list of expressions as exact numbers; None if one of them is no rational constant."""
-    reader = _Reader(())
-    terms = [reader.term(item, "time", time=True) for item in node.entries()]
-    return [number_of(e) for e in terms] if all(e.op == "const" for e in terms) else None
 
 
 def read_system(spec: Node) -> System:
@@ -209,16 +147,16 @@ def read_system(spec: Node) -> System:
         inputs=plant.inputs,
         f=plant.f,
         B=plant.B,
-        W=[[reader.term(e, "set") for e in row] for row in _rows(metric["dual_metric"], n, n)],
+        W=[[reader.term(e, "set") for e in row] for row in rows_of(metric["dual_metric"], n, n)],
         rate=metric["rate"].number(),
         h=None if h is None else reader.column(h, m, "time", time=True, kinks=True),
         declared={} if bounds is None else {key: value.number() for key, value in bounds.items()},
         safe_set=plant.safe_set,
-        x0=None if at is None else [item.number() for item in _sized(at, n)],
+        x0=None if at is None else [item.number() for item in sized(at, n)],
         within=None if within is None else within.number(),
         epsilon=spec["tube"]["epsilon"].number(),
         rho_a=spec["tube"]["rho_a"].number(),
-        A_m=None if A_m.value == "auto" else [[e.number() for e in row] for row in _rows(A_m, n, n)],
+        A_m=None if A_m.value == "auto" else [[e.number() for e in row] for row in rows_of(A_m, n, n)],
         smooth=None if projection.value == "hard" else projection["smooth"].number(),
         kernel=_kernel(spec),
         horizon=None if horizon is None else horizon.number(),
@@ -293,7 +231,7 @@ def read_curve(spec: Node, plan: Node, s: System) -> tuple[Curve, list[Duty]]:
         horizon = knots.t[-1] if s.horizon is None else s.horizon
         drift = [row[0] for row in s.drift]
         return hermite(knots, drift, s.states, s.inputs, horizon), []
-    reader = _Reader(())
+    reader = Reader(())
     keys = ("at", "input") if kind == "equilibrium" else ("x", "u")
     sizes = len(s.states), len(s.inputs)
     x, u = (
@@ -311,7 +249,7 @@ def _knots(trajectory: Node, plan: Node, s: System) -> Knots:
     if s.horizon is not None and t[-1] < s.horizon:
         raise wrong("TC603", f"{data.path}.t ends before the horizon")
     rows = {
-        key: [[e.number() for e in _sized(row, size)] for row in _sized(data[key], len(t))]
+        key: [[e.number() for e in sized(row, size)] for row in sized(data[key], len(t))]
         for key, size in (("x", n), ("u", m))
     }
     interpolation = plan["interpolation"].text()

@@ -18,7 +18,8 @@ from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.system import Plant, constants, read_plant
+from tubecert.recheck.reading import constants
+from tubecert.recheck.system import Plant, read_plant
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, matrix_slopes, number, number_of
 
 
