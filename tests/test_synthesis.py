@@ -193,6 +193,28 @@ def test_the_rate_is_searched_up_to_what_is_possible():
     assert higher.condition_number.above > 20
 
 
+def test_advice_names_a_rate_and_a_box_that_work():
+    double = model(("x", "y"), ("u",), ("y", "0"), [["0"], ["1"]])
+    box = ((Fraction(-1), Fraction(1)),) * 2
+    rate = ladder(cegis.propose, double, box, limit=20.0).lower_rate(Fraction(8))
+    assert 0 < rate < 8
+    assert ladder(cegis.propose, double, box).metric(rate).condition_number.above <= 20
+    assert ladder(cegis.propose, double, box).metric(Fraction(8)).condition_number.above > 20
+    lonely = model(
+        ("x", "y"), ("u",), ("x**2 - x", "0"), [["0"], ["1"]]
+    )  # -1 + 2 x < -1/2 up to x = 1/4 only
+    assert ladder(cegis.propose, lonely, box, degree=0).metric(Fraction(1, 2)) is None
+    factor = ladder(cegis.propose, lonely, box, degree=0).smaller_box(Fraction(1, 2))
+    assert Fraction(1, 8) < factor < Fraction(1, 4)
+
+
+def test_a_proof_that_runs_out_of_boxes_asks_for_more_of_them(tmp_path):
+    spec = str(ROOT / "configs" / "quadrotor3d.yaml")
+    result = synth(spec, "--route", "cegis", "--budget", "1", "-o", str(tmp_path / "m"))
+    assert result.exit_code == 4
+    assert "raise --budget" in result.stdout
+
+
 def test_the_box_is_shrunk_about_its_centre():
     assert shrunk(((Fraction(0), Fraction(4)),), Fraction(1, 2)) == ((Fraction(1), Fraction(3)),)
 

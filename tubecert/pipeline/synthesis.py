@@ -268,19 +268,21 @@ class SynthesisRun:
         return f": {tried}; the last: {attempts[-1].outcome}"
 
     def _remedies(self, rate: Fraction | None) -> str:
+        if any(attempt.undecided for attempt in self.ladder.attempts):
+            return "raise --budget: a proof ran out of boxes"
         remedies = []
         if self.wanted.degree is not None and suggested(self.model):
             remedies.append(f"a degree above {self.wanted.degree}, or auto")
         if rate is not None:
             self._tell("looking for a rate that works")
-            lower = self.ladder.largest_rate(self.limit)
-            if lower is not None and lower.rate < rate:
-                remedies.append(f"a rate up to {float(lower.rate):g}, which works on this box")
+            lower = self.ladder.lower_rate(rate)
+            if lower is not None:
+                remedies.append(f"a rate up to {float(lower):g}, which works on this box")
             self._tell("looking for a box that works")
-            box = self.ladder.largest_box(rate)
+            box = self.ladder.smaller_box(rate)
             if box is not None:
                 remedies.append(
-                    f"the safe set shrunk to {box[0]:.3g} of its size about its centre, where {float(rate):g} works"
+                    f"the safe set shrunk to {float(box):.3g} of its size about its centre, where {float(rate):g} works"
                 )
         return "try " + "; or ".join(remedies) if remedies else "lower the rate, or shrink the safe set"
 

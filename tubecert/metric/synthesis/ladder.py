@@ -15,7 +15,7 @@ from math import floor, inf, isfinite, log10, sqrt
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.metric.synthesis.family import MetricFamily, metric_family
 from tubecert.metric.synthesis.problem import Floor, Proposal, Solver, SynthesisProblem
-from tubecert.metric.synthesis.rounding import VerifiedMetric, shortest_proven
+from tubecert.metric.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
 from tubecert.model import ControlAffineModel
 
 _DEGREES = (0, 1, 2, 3, 4)
@@ -25,6 +25,7 @@ _RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again w
 _LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
 _PAYS = 0.9  # a higher degree must lower the condition number to this share
 _SHARP = 1.01  # a searched rate is settled to this factor
+_LOOKS = 4  # for advice on what would work instead
 
 Route = Callable[[SynthesisProblem], Proposal]
 Box = tuple[tuple[Fraction, Fraction], ...]
@@ -35,7 +36,8 @@ class Request:
     """What is wanted: a metric of `model` on `safe_set`.
 
     `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
-    for constant W, backwards where W moves; `limit` of the condition number.
+    for constant W, backwards where W moves; `limit` of the condition number. Unless
+    `thorough`, only the first route and back-off are tried.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -45,13 +47,17 @@ class Request:
     variables: tuple[str, ...] | None = None
     limit: float | None = None
     solver: Solver = "clarabel"
+    thorough: bool = True
     effort: Effort = field(default_factory=Effort)
     progress: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """One proposal and what became of it; `condition_number` is proven, None if nothing was."""
+    """One proposal and what became of it; `condition_number` is proven, None if nothing was.
+
+    `undecided`: its proof ran out of boxes.
+    """
 
     rate: float
     degree: int
@@ -59,6 +65,7 @@ class Attempt:
     route: str
     outcome: str
     condition_number: float | None = None
+    undecided: bool = False
     seconds: float
     solver_seconds: float
 
@@ -104,19 +111,23 @@ class Ladder:
             best, failed = (found, failed) if found else (best, middle)
         return best
 
-    def largest_box(self, rate: Fraction) -> tuple[float, VerifiedMetric] | None:
-        """The largest factor by which the box, shrunk about its centre, has a metric at `rate`."""
-        works: tuple[float, VerifiedMetric] | None = None
-        low, high = 0.0, 1.0
-        for _ in range(6):
-            factor = 0.5 * (low + high)
-            inner = Ladder(replace(self.request, safe_set=shrunk(self.request.safe_set, Fraction(factor))))
-            found = inner.metric(rate, enough=inf)
-            if found:
-                low, works = factor, (factor, found)
-            else:
-                high = factor
-        return works
+    def lower_rate(self, rate: Fraction) -> Fraction | None:
+        """A rate below one that does not work, found with few quick attempts; None if none of them works."""
+        quick = Ladder(replace(self.request, thorough=False))
+        return _largest(
+            lambda factor: quick._within(two_digits(rate * factor), self.request.limit) is not None,
+            lambda factor: two_digits(rate * factor),
+        )
+
+    def smaller_box(self, rate: Fraction) -> Fraction | None:
+        """A factor by which the box, shrunk about its centre, has a metric at `rate`; likewise."""
+
+        def works(factor: Fraction) -> bool:
+            box = shrunk(self.request.safe_set, factor)
+            quick = Ladder(replace(self.request, thorough=False, safe_set=box))
+            return quick.metric(rate, enough=inf) is not None
+
+        return _largest(works, lambda factor: factor)
 
     # -- one rate -----------------------------------------------------------------------------------------------
 
@@ -153,7 +164,8 @@ class Ladder:
 
     def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
         known = self.request.routes
-        for name, route in known[::-1] if self._family(degree).degree else known:
+        order = known[::-1] if self._family(degree).degree else known
+        for name, route in order if self.request.thorough else order[:1]:
             found = self._route(rate, floor, degree, name, route)
             if found is not None:
                 return found
@@ -179,7 +191,7 @@ class Ladder:
         """One route at one degree: a smaller back-off if it finds nothing, a larger one if the proof fails."""
         retreated = False
         room = _ROOM if self._family(degree).degree else 1.0
-        back_offs = [room * part for part in _BACK_OFF]
+        back_offs = [room * part for part in (_BACK_OFF if self.request.thorough else _BACK_OFF[:1])]
         while back_offs:
             back_off = back_offs.pop(0)
             problem = self._problem(rate, floor, degree, back_off)
@@ -196,13 +208,14 @@ class Ladder:
                     condition_number=outcome.condition_number.above
                     if isinstance(outcome, VerifiedMetric)
                     else None,
+                    undecided=isinstance(outcome, Rejected) and outcome.undecided,
                     seconds=time.perf_counter() - started,
                     solver_seconds=proposal.solver_seconds,
                 )
             )
             if isinstance(outcome, VerifiedMetric):
                 return outcome
-            if proposal.coefficients is not None and not retreated:
+            if proposal.coefficients is not None and not retreated and self.request.thorough:
                 back_offs, retreated = [back_off * _RETREAT], True
             elif retreated:
                 return None
@@ -237,6 +250,15 @@ class Ladder:
             number = attempt.condition_number
             words = attempt.outcome if number is None else f"proven, condition number {number:.4g}"
             self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+
+
+def _largest(works: Callable[[Fraction], bool], value: Callable[[Fraction], Fraction]) -> Fraction | None:
+    """The value of the largest factor seen to work: bisected in (0, 1), a few times only."""
+    low, high = Fraction(0), Fraction(1)
+    for _ in range(_LOOKS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if works(middle) else (low, middle)
+    return value(low) if low else None
 
 
 def _kappa(metric: VerifiedMetric) -> float:

@@ -48,9 +48,13 @@ class VerifiedMetric:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rejected:
-    """Why no rounding of a proposal is a metric: what failed with the most digits."""
+    """Why no rounding of a proposal is a metric: what failed with the most digits.
+
+    `undecided`: it may be one, but the proof ran out of boxes.
+    """
 
     reason: str
+    undecided: bool = False
 
 
 def shortest_proven(
@@ -111,7 +115,7 @@ def _proven(
     dual = problem.family.dual_metric(rounded(proposal.coefficients, digits))
     proof = verify_metric(with_metric(problem.model, dual, rate), problem.safe_set, effort)
     if proof.verdict != "certified":
-        return Rejected(reason=f"{proposal.route}: {proof.reason}")
+        return Rejected(reason=f"{proposal.route}: {proof.reason}", undecided=proof.verdict == "undecided")
     condition = condition_number(proof)
     if not isfinite(condition.above):
         return Rejected(reason=f"{proposal.route}: the condition number could not be bounded")
