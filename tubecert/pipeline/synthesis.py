@@ -33,7 +33,8 @@ from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 
 _RATES = 6  # of the first sweep
-_REFINED = 4  # further rates, about the best
+_REFINED = 3  # times, about the best row
+_ROUGH = 1.25  # factor to which the largest rate is known for a sweep: the best rate is far below it
 _SHARE = 0.97  # of the largest rate: where the sweep ends
 _COARSE = Options(gap=Fraction(1, 20), conditions="distance", budget=200_000)
 
@@ -127,12 +128,14 @@ class SynthesisRun:
         if self.wanted.rate is not None:
             self._compared([self.wanted.rate])
         else:
-            top = self.ladder.largest_rate(self.limit)
+            top = self.ladder.largest_rate(self.limit, sharp=_ROUGH)
             if top is None:
                 return None
             self._sweep(top.rate)
             for _ in range(_REFINED):
-                self._compared(self._between(objective))
+                best = min(self.rows, key=lambda row: row.score(objective), default=None)
+                if best is not None:
+                    self._compared(self._around(best.rate), (best.floor,))
         if not self.rows:
             return None
         return min(self.rows, key=lambda row: row.score(objective)).metric
@@ -149,8 +152,7 @@ class SynthesisRun:
         last = _SHARE * float(top)
         self._compared([digits_below(last * (k + 1) / _RATES, 3) for k in range(_RATES)])
 
-    def _compared(self, rates: Sequence[Fraction]) -> None:
-        floors: tuple[Floor, ...] = ("identity", "input")
+    def _compared(self, rates: Sequence[Fraction], floors: tuple[Floor, ...] = ("identity", "input")) -> None:
         done = {(row.rate, row.floor) for row in self.rows}
         for rate in rates:
             for floor in floors:
@@ -160,9 +162,8 @@ class SynthesisRun:
                 if metric is not None and self._allowed(metric):
                     self.rows.append(self._row(metric, floor))
 
-    def _between(self, objective: str) -> list[Fraction]:
+    def _around(self, best: Fraction) -> list[Fraction]:
         """Rates halfway between the best one and its neighbours."""
-        best = min(self.rows, key=lambda row: row.score(objective)).rate
         rates = sorted({row.rate for row in self.rows})
         i = rates.index(best)
         neighbours = [rates[k] for k in (i - 1, i + 1) if 0 <= k < len(rates)]

@@ -91,8 +91,10 @@ class Ladder:
             self._found[key] = self._searched(rate, floor, enough)
         return self._found[key]
 
-    def largest_rate(self, limit: float | None, least: Fraction | None = None) -> VerifiedMetric | None:
-        """A metric of (nearly) the largest rate at which one is found, with a condition number up to `limit`."""
+    def largest_rate(
+        self, limit: float | None, least: Fraction | None = None, sharp: float = _SHARP
+    ) -> VerifiedMetric | None:
+        """A metric of the largest rate with one of condition number up to `limit`, to a factor `sharp`."""
         best = self._first(limit, least)
         if best is None:
             return None
@@ -103,7 +105,7 @@ class Ladder:
             best = found or best
         if failed is None:
             return best
-        while failed > best.rate * Fraction(_SHARP):
+        while failed > best.rate * Fraction(sharp):
             middle = digits_below(sqrt(best.rate * failed), 4)
             if not best.rate < middle < failed:
                 break
