@@ -296,6 +296,16 @@ def test_too_close_to_tell_is_undecided():
     )
 
 
+def test_a_ball_projected_to_what_does_not_move_needs_no_time():
+    tube = tube_of("line", 0.5)
+    assert tube.variables(("z",)) == ("z",)
+    assert tube.variables(("x", "z")) == ("x", "z", "t")
+    assert tube.variables(("u",)) == ("u", "t")
+    found = supremum(scalar(symbol("z") ** 2), tube, Effort())
+    assert found.above == pytest.approx((1 / 7 + 0.5) ** 2, rel=1e-3)
+    assert found.below <= (1 / 7 + 0.5) ** 2 <= found.above
+
+
 # -- what makes it false is noticed --------------------------------------------------------------------------
 
 

@@ -21,6 +21,7 @@ from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, down, up
 from tubecert.enclosure.objective import Estimate
 from tubecert.enclosure.pencil import scalar
+from tubecert.expression import free_symbols
 from tubecert.model import TIME
 from tubecert.trajectory import Plan
 from tubecert.trajectory.plan import PIECE
@@ -46,17 +47,22 @@ class Tube:
         self._free = BoxDomain({**({} if time is None else {TIME: time}), **(extra or {})})
 
     def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
-        """The needed variables, time if the plan moves, and the piece of the plan if several inputs jump.
+        """The needed variables, time if the plan moves in them, and the piece of the plan if several inputs jump.
 
         (One input at a jump may be searched as the range between its two sides: no convex objective is larger there.)
         """
-        if self._plan.is_constant:
+        if not self._moves(needed):
             return needed
         jumping = self._plan.spans is not None and sum(v in self._inputs for v in needed) > 1
         return (*needed, *([] if TIME in needed else [TIME]), *([PIECE] if jumping else []))
 
+    def _moves(self, needed: tuple[str, ...]) -> bool:
+        """Whether the plan moves in the needed variables: a ball projected to others is a ball that stays."""
+        curves = zip((*self._states, *self._inputs), (*self._plan.x, *self._plan.u), strict=True)
+        return bool(free_symbols([curve for name, curve in curves if name in needed]))
+
     def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
-        """Boxes around the plan, window by window of time."""
+        """Boxes around the plan, window by window of time if there are inputs: these are known through time only."""
         others = self._others(variables)
         free_lo, free_hi = self._free.boxes(others)
         if PIECE in variables:
@@ -65,8 +71,9 @@ class Tube:
             return lo, hi
         if TIME in others:
             column = others.index(TIME)
-            edges = np.linspace(free_lo[0, column], free_hi[0, column], _WINDOWS + 1)
-            free_lo, free_hi = np.repeat(free_lo, _WINDOWS, axis=0), np.repeat(free_hi, _WINDOWS, axis=0)
+            windows = _WINDOWS if any(v in self._inputs for v in variables) else 1
+            edges = np.linspace(free_lo[0, column], free_hi[0, column], windows + 1)
+            free_lo, free_hi = np.repeat(free_lo, windows, axis=0), np.repeat(free_hi, windows, axis=0)
             free_lo[:, column], free_hi[:, column] = edges[:-1], edges[1:]
         lo, hi = (
             np.full((len(free_lo), len(variables)), -np.inf),

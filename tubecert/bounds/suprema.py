@@ -221,6 +221,8 @@ class Suprema:
     def _witness(self, found: Supremum) -> Witness:
         """Where the value was found; states that do not matter are taken from the plan."""
         t = self.plan.moment(found.at)
+        if t is None and not self.plan.is_constant:  # a part of the plan that stays: any time will do
+            t = 0.0
         moment = np.array([0.0 if t is None else t])
         centre, _ = self.plan.enclose(moment, moment)
         x = tuple(float(found.at.get(name, centre.mid[0, i])) for i, name in enumerate(self.model.states))

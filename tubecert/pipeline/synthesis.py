@@ -66,6 +66,7 @@ class SynthesisRun:
             )
         )
         self.rows: list[Row] = []
+        self.fails: Fraction | None = None  # the least rate that was compared and had no metric
         self.said = 0
 
     def run(self, *, sweep: bool) -> Synthesised:
@@ -159,14 +160,18 @@ class SynthesisRun:
                 if (rate, floor) in done:
                     continue
                 metric = self.ladder.metric(rate, floor)
-                if metric is not None and self._allowed(metric):
+                if metric is None or not self._allowed(metric):
+                    self.fails = min(rate, self.fails or rate)
+                else:
                     self.rows.append(self._row(metric, floor))
 
     def _around(self, best: Fraction) -> list[Fraction]:
-        """Rates halfway between the best one and its neighbours."""
+        """Rates halfway between the best one and its neighbours, and one beyond all if the best is the last."""
         rates = sorted({row.rate for row in self.rows})
         i = rates.index(best)
         neighbours = [rates[k] for k in (i - 1, i + 1) if 0 <= k < len(rates)]
+        if best == rates[-1]:
+            neighbours.append(best + 2 * (best - rates[i - 1]) if self.fails is None else self.fails)
         return [digits_below((best + other) / 2, 3) for other in neighbours]
 
     def _row(self, metric: VerifiedMetric, floor: Floor) -> Row:
