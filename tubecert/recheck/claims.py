@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
-from flint import ctx
+from flint import arb, ctx
 
 from tubecert.recheck import consistency, gains, geodesics, metric, start
 from tubecert.recheck.balls import exact
@@ -100,13 +100,23 @@ class Case:
     def setting(self) -> Setting:
         """The constants on their safe sides."""
         with ctx.workprec(_SHARP):
-            values = {name: exact(self.bound(name)) for name in USED}
+            bounds = {name: self.bound_if_any(name) for name in USED}
+            # what has no bound is not a number: no comparison with what rests on it can hold
+            values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
         return Setting(self.system, Numbers(**values), self.place.rho)
 
     def bound(self, name: str) -> Fraction:
         """The side of a constant that the conditions use."""
+        return self._side(name).number()
+
+    def bound_if_any(self, name: str) -> Fraction | None:
+        """The same; None where the certificate states that none was found: it claims nothing of the constant then."""
+        side = self._side(name)
+        return None if side.value is None else side.number()
+
+    def _side(self, name: str) -> Node:
         side = "below" if name in ("lower", "input_gain_least") else "above"
-        return self.result["constants"][name][side].number()
+        return self.result["constants"][name][side]
 
     @cached_property
     def whole(self) -> tuple[object, ...]:
@@ -124,7 +134,7 @@ class Case:
     @cached_property
     def numbers(self) -> tuple[object, ...]:
         """What every claim about gains depends on."""
-        return *self.whole, self.place.rho, *(self.bound(name) for name in USED)
+        return *self.whole, self.place.rho, *(self.bound_if_any(name) for name in USED)
 
 
 _IDLE = {"name", "expect", "simulation", "obstacles"}
@@ -214,18 +224,21 @@ def _constants(case: Case) -> Iterator[Claim]:
     # smax(Theta B) <= |B| sqrt(A)
     largest = Fraction(float(B) * float(upper) ** 0.5) * _ROUND_UP if upper > 0 else Fraction(0)
     for name in OVER_TUBE:
-        limit = case.bound(name)
+        limit = case.bound_if_any(name)
+        if limit is None:
+            continue
         relation = ">=" if name in ("lower", "input_gain_least") else "<="
         yield Claim(
             f"{name} {relation} {float(limit):.6g}",
             (*over, limit, largest if name == "feedback_gain" else None),
             lambda name=name, limit=limit: bounded(place, name, limit, largest),  # type: ignore[misc]
         )
-    d0, H0 = case.bound("initial_distance"), case.bound("h_initial")
+    d0, H0 = case.bound("initial_distance"), case.bound_if_any("h_initial")
     yield Claim(
         f"initial_distance <= {float(d0):.6g}", (*over, d0, upper), lambda: start.distance(place, d0, upper)
     )
-    yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
+    if H0 is not None:
+        yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
     test = case.result["metric"].get("unique_geodesics")
     if test is not None and test["holds"].flag():
         value = test["value"].pair()[1].number()

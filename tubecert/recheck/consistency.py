@@ -92,8 +92,8 @@ def bounds(result: Node) -> Outcome:
 def _bounds(result: Node) -> Iterator[tuple[bool, str]]:
     constants, metric = result["constants"], result["metric"]
     for name in (*USED, *OTHERS, *(DERIVED if is_certified(result["conditions_26"]) else ())):
-        below, above = constants[name]["below"].number(), constants[name]["above"].number()
-        yield below <= above, f"constants.{name} is not an interval"
+        ends = [end for side in ("below", "above") if (end := constants[name][side]).value is not None]
+        yield len(ends) < 2 or ends[0].number() <= ends[1].number(), f"constants.{name} is not an interval"
     for name in ("lower", "upper"):
         pair = [item.number() for item in metric[name].pair()]
         own = [constants[name][side].number() for side in ("below", "above")]

@@ -1,0 +1,192 @@
+"""Bounds of pencils where little is to spare: against exact rationals, and whatever LAPACK answers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+
+from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils
+from tubecert.enclosure.taylor import Expansion
+from tubecert.expression import ONE, ZERO, constant, symbol
+
+x = symbol("x")
+UNIT = Fraction(1, 2**52)  # in the last place of what lies in [1, 2)
+NOWHERE = np.zeros((1, 0))
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    with np.errstate(all="ignore"):
+        yield
+
+
+def of_floats(rows):
+    return tuple(tuple(constant(Fraction(float(e))) for e in row) for row in rows)
+
+
+def left_of(tau, near, share):
+    """A float d with tau d further than `share` units below the float next to it, and that float."""
+    for k in range(10_000):
+        d = Fraction(near) + k * UNIT
+        product = Fraction(float(tau * d))
+        if product - tau * d > share * UNIT:
+            return d, product
+    raise AssertionError("there is none")
+
+
+def test_a_target_that_is_exceeded_by_less_than_a_rounding_is_not_said_to_hold():
+    """In floats N - tau D is -1 unit times I; exactly, its row sums are positive."""
+    tau, n = Fraction(1 + 3 * 2.0**-7 + 2.0**-40), 4
+    (own, own_product), (off, off_product) = left_of(tau, 1.875, 0.45), left_of(tau, 1.5, 0.45)
+    N = [[own_product - UNIT if i == j else off_product for j in range(n)] for i in range(n)]
+    D = [[own if i == j else off for j in range(n)] for i in range(n)]
+    excess = sum(N[i][j] - tau * D[i][j] for i in range(n) for j in range(n))
+    assert excess > 0
+    assert all(Fraction(float(q)) == q for rows in (N, D) for row in rows for q in row)
+    found = Pencil(of_floats(N), of_floats(D)).upper(NOWHERE, NOWHERE, float(tau)).upper[0]
+    assert float(tau) < found < float(tau) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("target", [0.0, 3.0, 3.4, 4.0, 30.0, np.inf, -np.inf])
+def test_what_is_left_below_a_target_is_divided_by_the_largest_eigenvalue(target):
+    """D varies in both directions, N with the larger one: the value is 10/3 everywhere."""
+    top = constant(Fraction(10, 3)) * (1 + x)
+    pencil = Pencil(((top, ZERO), (ZERO, ZERO)), ((1 + x, ZERO), (ZERO, 1 - x)))
+    found = pencil.upper(np.array([[-0.5]]), np.array([[0.5]]), target).upper[0]
+    assert Fraction(float(found)) >= Fraction(10, 3)
+
+
+def spectrum(N, D):
+    """Eigenvalues of a pencil, to 40 digits."""
+    with mpmath.workdps(40):
+        root = mpmath.cholesky(mpmath.matrix(D.tolist())) ** -1
+        S = root * mpmath.matrix(N.tolist()) * root.T
+        return sorted(mpmath.eigsy((S + S.T) / 2, eigvals_only=True))
+
+
+def definite(rng, n, condition):
+    q = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    a = q * 10.0 ** rng.uniform(-condition / 2, condition / 2, n) @ q.T
+    return 0.5 * (a + a.T)
+
+
+def test_badly_scaled_pencils_at_points():
+    """Condition numbers up to 1e11, values of every size and sign, targets on both sides: no tolerance."""
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        n = int(rng.integers(1, 5))
+        D = definite(rng, n, rng.uniform(0, 11)) * 10.0 ** rng.integers(-8, 9)
+        N = rng.normal(size=(n, n)) * 10.0 ** rng.integers(-8, 9)
+        N = 0.5 * (N + N.T) if rng.random() < 0.5 else -definite(rng, n, 3)
+        pencil, values = Pencil(of_floats(N), of_floats(D)), spectrum(N, D)
+        near = float(values[-1])
+        for target in (np.inf, -np.inf, np.nan, near, near - 1e-3 * abs(near), near + 0.1 * abs(near), 0.0):
+            assert pencil.upper(NOWHERE, NOWHERE, target).upper[0] >= values[-1]
+        assert pencil.lower(NOWHERE, NOWHERE)[0] <= values[-1]
+        both = SumOfPencils([of_floats(N), of_floats(D)], of_floats(D))
+        largest = max(abs(values[0]), abs(values[-1])) + 1
+        assert both.lower(NOWHERE, NOWHERE)[0] <= largest <= both.upper(NOWHERE, NOWHERE, np.inf).upper[0]
+
+
+def scaled_down(d, v):
+    return d, v * 1e-3
+
+
+def nothing(d, v):
+    return d, v * 0
+
+
+def reversed_order(d, v):
+    return d[..., ::-1], v
+
+
+def singular(d, v):
+    return d, np.repeat(v[..., :1], v.shape[-1], axis=-1)
+
+
+def no_numbers(d, v):
+    return d * np.nan, v * np.nan
+
+
+def too_small(d, v):
+    return d * 1e-20, v
+
+
+def turned(d, v):
+    return d + 1e3, np.swapaxes(v, -1, -2)
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0, np.nan])
+@pytest.mark.parametrize(
+    "lie",
+    [scaled_down, nothing, reversed_order, singular, no_numbers, too_small, turned],
+    ids=lambda f: f.__name__,
+)
+def test_whatever_lapack_answers_no_bound_is_false(lie, factor, monkeypatch):
+    """Also where D is not positive: then N <= tau D itself is what a finite answer says."""
+    rng = np.random.default_rng(2)
+    true_pairs, true_values = np.linalg.eigh, np.linalg.eigvalsh
+    with monkeypatch.context() as patch:
+        patch.setattr(np.linalg, "eigh", lambda a: lie(*true_pairs(a)))
+        patch.setattr(np.linalg, "eigvalsh", lambda a: true_values(a) * factor)
+        answers = []
+        for _ in range(5):
+            D = definite(rng, 3, 1) - rng.choice([0.0, 0.3]) * np.eye(3)
+            N = definite(rng, 3, 1) - np.eye(3)
+            for target in (np.inf, 0.0, -1.0, 1.0, 1e6):
+                answers.append(
+                    (N, D, Pencil(of_floats(N), of_floats(D)).upper(NOWHERE, NOWHERE, target).upper[0])
+                )
+            answers.append((-D, np.eye(3), Definite(of_floats(D)).upper(NOWHERE, NOWHERE, -5e-324).upper[0]))
+    for N, D, tau in answers:
+        assert not np.isnan(tau)
+        assert tau == np.inf or true_values(N - tau * D)[-1] <= 1e-9 * (1 + abs(tau))
+
+
+def test_radii_of_a_box_count_with_their_weights_at_every_vertex():
+    """Entries that are known to a radius only: N and D move against each other, whatever the sign of the target."""
+
+    class Known(Pencil):
+        def __init__(self, N, D, r, s):
+            super().__init__(((constant(N),),), ((constant(D),),))
+            self._r, self._s = r, s
+
+        def upper(self, lo, hi, target):
+            true = self._function.expand
+
+            def blurred(lo, hi):
+                e = true(lo, hi)
+                return Expansion(e.mid, [e.rad[0] + self._r, e.rad[1] + self._s], e.rest, e.signs)
+
+            self._function.expand = blurred
+            return super().upper(lo, hi, target)
+
+    for N, D, r, s in (
+        (1.0, 2.0, 0.0, 0.5),
+        (-1.0, 2.0, 0.0, 0.5),
+        (-1.0, 2.0, 0.5, 0.0),
+        (3.0, 1.0, 0.25, 0.125),
+    ):
+        true = max((N + r) / d for d in (D - s, D + s))
+        for target in (np.inf, true - 1e-9, true, 2 * true, -10.0, 10.0):
+            assert Known(Fraction(N), Fraction(D), r, s).upper(NOWHERE, NOWHERE, target).upper[0] >= true
+
+
+def test_the_value_of_a_box_is_that_of_its_worst_vertex():
+    for low, high in pairwise((-0.9, -0.3, 0.2, 0.8)):
+        box = np.array([[low]]), np.array([[high]])
+        for N, most in ((x, high), (-x, -low)):
+            pencil = Pencil(((N, ZERO), (ZERO, constant(-5))), ((ONE, ZERO), (ZERO, ONE)))
+            for target in (np.inf, most - 0.01, 0.5 * (low + high) if N is x else -0.5 * (low + high)):
+                assert pencil.upper(*box, target).upper[0] >= most
+
+
+def test_a_ball_that_is_not_positive_bounds_nothing():
+    pencil = Pencil(((ONE, ZERO), (ZERO, ONE)), ((x, ZERO), (ZERO, constant(2))))
+    for low, high in ((-1.0, 1.0), (0.0, 1.0), (-2.0, -1.0)):
+        for target in (np.inf, 1.0, 1e9):
+            assert pencil.upper(np.array([[low]]), np.array([[high]]), target).upper[0] == np.inf

@@ -1,0 +1,223 @@
+"""Recheck's statements on boxes with one false constant each, just beyond the truth; and constants without a bound.
+
+The value on every box is known exactly: what is said to hold a little beyond it is wrong.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import pytest
+from flint import arb
+
+from tubecert import certificate, pipeline, spec
+from tubecert.bounds.suprema import Suprema
+from tubecert.errors import ExitCode
+from tubecert.expression import parse, symbol
+from tubecert.recheck import boxes
+from tubecert.recheck.boxes import Field
+from tubecert.recheck.pencils import GainBelow
+from tubecert.recheck.run import recheck
+from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
+from tubecert.recheck.terms import from_expressions, number
+
+SYMBOLS = {name: symbol(name) for name in ("a", "b", "c", "d", "e", "f", "g", "x", "y")}
+LITTLE = Fraction(1, 10**6)
+SQUARES = "a**2 + b**2 + c**2 + d**2 + e**2 + f**2 + g**2"
+
+
+def term(text):
+    return from_expressions([parse(text, symbols=SYMBOLS).expression])[0]
+
+
+def rows(matrix):
+    return [[term(e) for e in row] for row in matrix]
+
+
+# text, box (one for all variables), the exact supremum
+SUPREMA = {
+    "far from the ends of a parabola": ("1.8*x - x**2", (-1.0, 1.0), Fraction(81, 100)),
+    "its other side": ("-1.8*x - x**2", (-1.0, 1.0), Fraction(81, 100)),
+    "more squares than vertices": (SQUARES, (-1.0, 1.0), Fraction(7)),
+    "more variables than corners": (
+        f"a + b + c + d + e + f + g - 1e-9*({SQUARES})",
+        (-1.0, 1.0),
+        7 - 7 * Fraction(1, 10**9),
+    ),
+    "products of what has no corners": (f"f*g + 1e-9*({SQUARES})", (-1.0, 1.0), 1 + 7 * Fraction(1, 10**9)),
+    "a product of a corner and what has none": (
+        f"a*g + 1e-9*({SQUARES})",
+        (-1.0, 1.0),
+        1 + 7 * Fraction(1, 10**9),
+    ),
+    "a cube": ("x**3 - 0.75*x", (-1.0, 1.0), Fraction(1, 4)),
+    "cubes that are mixed": ("x**2*y + x*y**2", (-1.0, 1.0), Fraction(2)),
+    "an affine variable": ("x*a**2", (-1.0, 1.0), Fraction(1)),
+    "one unit in the last place": ("1e10*(x - 1) + (x - 1)**2", (1.0, 1 + 2.0**-52), Fraction(10**10, 2**52)),
+    "the unit below": ("1e10*(1 - x) + (x - 1)**2", (1 - 2.0**-53, 1.0), Fraction(10**10, 2**53)),
+}
+
+
+@pytest.mark.parametrize("turning", [4, -1])
+@pytest.mark.parametrize("name", SUPREMA)
+def test_a_supremum_is_not_said_to_be_smaller(name, turning, monkeypatch):
+    """With third derivatives, and where second ones must do."""
+    monkeypatch.setattr(boxes, "_TURNING", turning)
+    text, ends, most = SUPREMA[name]
+    e = term(text)
+    below = most - most * LITTLE
+    box = [ends] * len(NotNegative(e).variables)
+    assert not NotNegative(number(below) - e).over(box).proven
+    assert not NotNegative(number(most) - e, strict=True).over(box).proven
+    assert Field([e]).hull(box)[0].upper() >= arb(float(below))
+    assert not NormsBelow([[[e]]], below).over(box).proven
+    assert NormsBelow([[[e]]], below).bound(box) >= arb(float(below))
+    assert not PositiveDefinite([[number(below) - e, number(0)], [number(0), number(1)]]).over(box).proven
+    generous = 40 * (1 + most)
+    assert NotNegative(number(generous) - e).over(box).proven
+    assert NormsBelow([[[e]]], generous).over(box).proven
+
+
+def test_a_remainder_of_second_order_counts_in_full(monkeypatch):
+    """x - sin x about 0 bends by nothing at the centre: half of what its curvature can be would not hold its end."""
+    monkeypatch.setattr(boxes, "_TURNING", -1)
+    e = term("x - sin(x)")
+    most = Fraction(3) - Fraction(math.sin(3)) - LITTLE
+    assert not NotNegative(number(most) - e).over([(-3.0, 3.0)]).proven
+    assert Field([e]).hull([(-3.0, 3.0)])[0].upper() > arb(2.858)
+
+
+def test_every_corner_of_an_affine_variable_counts():
+    """Positive at one end of y and not at the other."""
+    for first, second in (("2 + y", "2 - y"), ("2 - y", "2 + y")):
+        S = rows([[f"{first} - x**2", "0"], ["0", f"3*({second}) + x**2"]])
+        assert PositiveDefinite(S).over([(-0.5, 0.5), (-1.0, 1.0)]).proven
+        assert not PositiveDefinite(S).over([(-0.5, 0.5), (-1.9, 1.9)]).proven
+
+
+@pytest.mark.parametrize(
+    "S",
+    [
+        [["0"]],
+        [["0", "0"], ["0", "0"]],
+        [["1", "1"], ["1", "1"]],
+        [["x**2", "x"], ["x", "1"]],
+        [["1 + x", "0"], ["0", "x"]],
+        [["1", "x", "y"], ["x", "x**2", "x*y"], ["y", "x*y", "y**2"]],
+        [["2", "-1", "-1"], ["-1", "2", "-1"], ["-1", "-1", "2"]],
+        [["-1", "0"], ["0", "-1"]],
+        [["-1", "0", "0"], ["0", "-1", "0"], ["0", "0", "1"]],
+        [["1/x", "0"], ["0", "1"]],
+    ],
+)
+def test_what_is_not_definite_is_never_said_to_be(S):
+    """Singular, zero, twice negative, undefined: on points and on boxes about them."""
+    S = rows(S)
+    for half in (0.0, 1e-300, 1e-9, 0.5):
+        for unit in (None, rows([["1" if i == j else "0" for j in range(len(S))] for i in range(len(S))])):
+            test = PositiveDefinite(S, unit)
+            assert not test.over([(-half, half)] * len(test.variables)).proven
+            assert not PositiveDefinite(S, unit).broken([arb(0)] * len(test.variables)) or len(S) > 1
+
+
+def gain(limit, F="2", W="1", BBt="1"):
+    (f,), (w,), (b,) = ([term(text)] for text in (F, W, BBt))
+    return GainBelow(
+        SimpleNamespace(
+            states=["x"],
+            inputs=["u"],
+            F=[[f]],
+            W=[[w]],
+            BBt=[[b]],
+            safe_set={"x": (Fraction(-1), Fraction(1))},
+        ),
+        Fraction(limit),
+    )
+
+
+@pytest.mark.parametrize(
+    "ends", [(0.0, 1.0), (0.5, 2.0), (0.9, 1.1), (1.0, 1.0), (1.0, 4.0), (0.25, 1.0), (0.1, 10.0)]
+)
+def test_a_gain_is_not_said_to_be_smaller(ends):
+    """2 <= t (1/mu + mu) holds for t >= 1, and fails below at mu = 1."""
+    assert not gain(1 - LITTLE).over([ends]).proven
+    assert gain(1 - LITTLE).broken([arb(1)])
+    assert not gain(1).broken([arb(1)])
+
+
+def test_a_gain_at_the_ends_of_a_range():
+    """Towards mu = 0 a gain that B does not reach has no bound; elsewhere the least of 1/mu + mu is at an end."""
+    assert not gain(100, BBt="0*x").over([(0.0, 1.0)] * len(gain(100, BBt="0*x").variables)).proven
+    for ends, least in (((2.0, 3.0), Fraction(5, 2)), ((0.25, 0.5), Fraction(5, 2))):
+        assert not gain(2 / least - LITTLE).over([ends]).proven
+        assert gain(2 / least + Fraction(1, 2)).over([ends]).proven
+
+
+# -- constants without a bound
+
+SPEC = """
+tubecert: 1
+name: small
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + y", "-y + 0.3*sin(x)"]
+  B: [[0], [1]]
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t) + 0.05*x"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+initial_state: {at: [0.05, 0]}
+metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+adaptation: {A_m: -10}
+"""
+
+
+def sealed(result):
+    return json.loads(certificate.dump(certificate.seal(result, {})))
+
+
+@pytest.mark.parametrize("name", ["metric_slope", "contraction_excess", "input_gain_least"])
+def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
+    """B does not rest on it: its certificate is confirmed."""
+    honest = getattr(Suprema, name)
+    monkeypatch.setattr(
+        Suprema,
+        name,
+        lambda self: replace(
+            honest(self), above=math.inf, **({"below": -math.inf} if name == "input_gain_least" else {})
+        ),
+    )
+    options = pipeline.Options(conditions="distance")
+    document = sealed(pipeline.certify(spec.load_text(SPEC, "small.yaml"), options))
+    assert document["result"]["verdict"] == "certified"
+    found = recheck(json.dumps(document), "certificate", 20_000)
+    assert [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds] == []
+    assert found.exit_code == ExitCode.CERTIFIED
+
+
+def test_nothing_rests_on_a_constant_without_a_bound():
+    """Whichever bound is struck out of a certificate, every section that rests on it is no longer confirmed."""
+    document = sealed(
+        pipeline.certify(spec.load_text(SPEC, "small.yaml"), pipeline.Options(conditions="all"))
+    )
+    assert document["result"]["verdict"] == "certified"
+    rests = (
+        "f_x",
+        "M_x",
+        "feedback_gain",
+        "h_initial",
+        "metric_input_gain",
+        "drift_on_plan",
+        "plan_defect_metric",
+        "B_pinv",
+    )
+    for name in rests:
+        result = json.loads(json.dumps(document["result"]))
+        result["constants"][name]["above"] = None
+        found = recheck(json.dumps(sealed(result)), "certificate", 2_000, to_first_failure=True)
+        assert found.verdict != "confirmed", name
