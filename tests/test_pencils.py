@@ -9,9 +9,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils
+from tubecert.bounds.feedback import MU, exact_gain
+from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights
 from tubecert.enclosure.taylor import Expansion
 from tubecert.expression import ONE, ZERO, constant, symbol
+from tubecert.model import ControlAffineModel
 
 x = symbol("x")
 UNIT = Fraction(1, 2**52)  # in the last place of what lies in [1, 2)
@@ -53,17 +55,18 @@ def test_a_target_that_is_exceeded_by_less_than_a_rounding_is_not_said_to_hold()
 
 @pytest.mark.parametrize("target", [0.0, 3.0, 3.4, 4.0, 30.0, np.inf, -np.inf])
 def test_what_is_left_below_a_target_is_divided_by_the_largest_eigenvalue(target):
-    """D varies in both directions, N with the larger one: the value is 10/3 everywhere."""
-    top = constant(Fraction(10, 3)) * (1 + x)
-    pencil = Pencil(((top, ZERO), (ZERO, ZERO)), ((1 + x, ZERO), (ZERO, 1 - x)))
-    found = pencil.upper(np.array([[-0.5]]), np.array([[0.5]]), target).upper[0]
+    """D is as small as 1/2 in directions that have nothing to do with the value, which is 10/3 everywhere."""
+    diagonals = (constant(Fraction(10, 3)), ZERO, ZERO), (ONE, 1 + x, 1 - x)
+    N, D = (tuple(tuple(d[i] if i == j else ZERO for j in range(3)) for i in range(3)) for d in diagonals)
+    found = Pencil(N, D).upper(np.array([[-0.5]]), np.array([[0.5]]), target).upper[0]
     assert Fraction(float(found)) >= Fraction(10, 3)
 
 
-def spectrum(N, D):
-    """Eigenvalues of a pencil, to 40 digits."""
+def spectrum(N, *terms):
+    """Eigenvalues of a pencil, to 40 digits; D is a sum of floats times matrices of floats."""
     with mpmath.workdps(40):
-        root = mpmath.cholesky(mpmath.matrix(D.tolist())) ** -1
+        D = sum((mpmath.mpf(w) * mpmath.matrix(d.tolist()) for w, d in terms), start=mpmath.zeros(len(N)))
+        root = mpmath.cholesky(D) ** -1
         S = root * mpmath.matrix(N.tolist()) * root.T
         return sorted(mpmath.eigsy((S + S.T) / 2, eigvals_only=True))
 
@@ -82,7 +85,7 @@ def test_badly_scaled_pencils_at_points():
         D = definite(rng, n, rng.uniform(0, 11)) * 10.0 ** rng.integers(-8, 9)
         N = rng.normal(size=(n, n)) * 10.0 ** rng.integers(-8, 9)
         N = 0.5 * (N + N.T) if rng.random() < 0.5 else -definite(rng, n, 3)
-        pencil, values = Pencil(of_floats(N), of_floats(D)), spectrum(N, D)
+        pencil, values = Pencil(of_floats(N), of_floats(D)), spectrum(N, (1, D))
         near = float(values[-1])
         for target in (np.inf, -np.inf, np.nan, near, near - 1e-3 * abs(near), near + 0.1 * abs(near), 0.0):
             assert pencil.upper(NOWHERE, NOWHERE, target).upper[0] >= values[-1]
@@ -190,3 +193,76 @@ def test_a_ball_that_is_not_positive_bounds_nothing():
     for low, high in ((-1.0, 1.0), (0.0, 1.0), (-2.0, -1.0)):
         for target in (np.inf, 1.0, 1e9):
             assert pencil.upper(np.array([[low]]), np.array([[high]]), target).upper[0] == np.inf
+
+
+A = np.array([[-3.0, 1.0, 0.5], [0.25, -2.0, 1.0], [2.0, -1.0, 1.0]])
+W = np.array([[2.0, 0.25, -0.5], [0.25, 1.5, 0.125], [-0.5, 0.125, 1.0]])
+INPUTS = {
+    "along an axis": [[0], [0], [4]],
+    "askew": [[1], [-1], [4]],
+    "two": [[0, 1], [1, 0], [4, 1]],
+    "all": [[2, 0, 0], [0, 1, 0], [1, 0, 4]],
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_the_feedback_gain_holds_over_ranges_of_mu(name):
+    """x' = A x + B u with a constant W for which C2 holds: every range of mu, down to 0 among them, against values."""
+    B = np.array(INPUTS[name], dtype=float)
+    n, m = B.shape
+    states = tuple(f"x{i}" for i in range(n))
+    f = tuple(
+        sum((constant(Fraction(a)) * symbol(s) for a, s in zip(row, states, strict=True)), start=ZERO)
+        for row in A
+    )
+    model = ControlAffineModel(
+        states=states,
+        inputs=tuple(f"u{j}" for j in range(m)),
+        f=f,
+        B=of_floats(B),
+        W=of_floats(W),
+        rate=Fraction(1, 2),
+        h=None,
+    )
+    F = A @ W + W @ A.T + W
+    null = np.linalg.svd(B)[0][:, m:]
+    assert m == n or np.linalg.eigvalsh(null.T @ F @ null)[-1] < 0
+    largest = np.sqrt(float(spectrum(B @ B.T, (1, W))[-1]))
+    gain = exact_gain(model, largest)
+    assert gain.variables == (MU,)
+    ends = [0.0, *(largest * 2.0 ** np.arange(-12, 1, 1.5))]
+    ranges = (
+        [(0.0, high) for high in ends[1:]] + list(pairwise(ends)) + list(zip(ends, ends[3:], strict=False))
+    )
+    finite = 0
+    for low, high in ranges:
+        inside = [low + share * (high - low) for share in (1e-6, 1e-3, 0.03, 0.3, 0.6, 1.0)]
+        values = [float(spectrum(F, (1 / mu, B @ B.T), (mu, W))[-1]) for mu in inside]
+        most = max(0.0, *values)
+        for target in (np.inf, 0.99 * most, 1.01 * most, -1.0):
+            found = gain.upper(np.array([[low]]), np.array([[high]]), target).upper[0]
+            assert found >= most * (1 - 1e-12)
+            finite += low == 0 and bool(np.isfinite(found))
+        for mu, value in zip(inside, values, strict=True):
+            at = np.array([[mu]])
+            assert gain.lower(at, at)[0] <= max(0.0, value * (1 + np.sign(value) * 1e-12))
+    assert finite >= 4 or m == n  # C2 is void then, and nothing bounds the gain towards mu = 0 at once
+    assert gain.lower(np.array([[0.0]]), np.array([[0.0]]))[0] == 0.0
+
+
+@pytest.mark.parametrize("per_entry", [False, True])
+def test_radii_count_with_the_weights_of_their_matrices(per_entry):
+    """Bowls and hills that the vertices do not show, in numerators and denominators of which each has its weight."""
+    bowl, hill = ((1 + x**2,),), ((3 - x**2,),)
+    box = np.array([[-1.0]]), np.array([[1.0]])
+
+    def ends(lo, hi):
+        return [np.full((len(lo), 1, 1, 1) if per_entry else (len(lo), 1), w) for w in (0.5, 4.0, 0.25, 2.0)]
+
+    weights = Weights(variables=(), ends=ends, loss=lambda lo, hi: np.zeros((len(lo), 0)))
+    cases = (([bowl, bowl], [hill, hill], 9.0 / 4.5), ([hill, hill], [bowl, bowl], 13.5 / 2.25))
+    for numerators, denominators, most in cases:
+        pencil = WeightedPencil(numerators, denominators, weights)
+        for target in (np.inf, 0.0, 0.9 * most, most - 1e-9, -1.0):
+            assert pencil.upper(*box, target).upper[0] >= most
+        assert pencil.upper(*box, 10 * most).upper[0] <= 10 * most
