@@ -20,6 +20,8 @@ from tubecert.errors import ExitCode
 from tubecert.expression import parse, symbol
 from tubecert.recheck import boxes
 from tubecert.recheck.boxes import Field
+from tubecert.recheck.claims import Case, of_certified
+from tubecert.recheck.document import Node
 from tubecert.recheck.pencils import GainBelow
 from tubecert.recheck.run import recheck
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
@@ -198,6 +200,17 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
     found = recheck(json.dumps(document), "certificate", 20_000)
     assert [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds] == []
     assert found.exit_code == ExitCode.CERTIFIED
+
+
+def test_a_pole_in_the_safe_set_is_found():
+    """What an expression owes is read with it, and the curve between the poles proves nothing."""
+    document = sealed(pipeline.certify(spec.load_text(SPEC, "small.yaml"), pipeline.Options()))
+    for pole, found in (("1e-9/(x - 0.9)", True), ("1e-9/(x - 1.1)", False), ("1e-9*sqrt(x + 0.9)", True)):
+        result = json.loads(json.dumps(document["result"]))
+        result["spec"]["effective"]["system"]["f"][0] = f"-x + y + {pole}"
+        case = Case(Node(result, "result"), 2_000)
+        claim = next(item for item in of_certified(case) if item.name == "f, B, W, h are smooth")
+        assert claim.outcome(None).holds is not found
 
 
 def test_nothing_rests_on_a_constant_without_a_bound():
