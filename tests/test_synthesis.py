@@ -22,7 +22,7 @@ from tubecert.metric.synthesis.ladder import Ladder, Request, digits_below, shru
 from tubecert.metric.synthesis.problem import Proposal
 from tubecert.metric.synthesis.rounding import Rejected, VerifiedMetric, rounded, shortest_proven
 from tubecert.metric.verify import verify_metric
-from tubecert.model import ControlAffineModel
+from tubecert.model import ControlAffineModel, build
 from tubecert.spec import load, load_text
 from tubecert.spec.metric_file import with_metric
 
@@ -375,6 +375,17 @@ def test_certify_synthesises_by_itself_and_keeps_the_metric(tmp_path):
     done = CliRunner().invoke(app, ["certify", str(spec), "-o", str(certificate)])
     assert done.exit_code == 1
     assert "uncontrollable mode" in done.output
+
+
+def test_the_shipped_metric_is_proven_where_the_tube_is():
+    """On the whole safe set `certify` proves it, which takes half a minute."""
+    file = str(ROOT / "configs" / "pvtol_adaptation.metric.json")
+    spec = with_metric(load(str(ROOT / "configs" / "pvtol.yaml")), file)
+    assert spec.metric.rate == Fraction("1.84")
+    tube = ((Fraction(-3, 10), Fraction(3, 10)),) * 6
+    proof = verify_metric(build(spec), tube, Effort(gap=0.1))
+    assert proof.verdict == "certified"
+    assert proof.margin.below > 0.008
 
 
 def test_a_plot_that_is_no_svg_is_refused(tmp_path):

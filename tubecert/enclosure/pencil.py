@@ -75,6 +75,7 @@ class Pencil:
         excess, above = _bound(t, numerator, denominator, tested)
         value = above.max(axis=1)
         if np.isfinite(target):
+            # a T that is singular proves nothing: 0 is an eigenvalue then, and its bound is rounded above 0
             value = np.where((excess <= 0).all(axis=1), np.fmin(target, value), value)
         if self._weights is not None:
             value = np.maximum(value, 0.0)
