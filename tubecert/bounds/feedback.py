@@ -47,7 +47,9 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     F, W = (multiply(transpose(basis), multiply(a, basis)) for a in (model.F, model.W))
     gram = tuple(tuple(ONE if i == j < m else ZERO for j in range(n)) for i in range(n))
     ends = partial(down_to_zero, inputs=m, states=n)
-    return FirstFinite(exact, WeightedPencil([F], [gram, W], Weights(variables=(MU,), ends=ends, loss=loss)))
+    split = WeightedPencil([F], [gram, W], Weights(variables=(MU,), ends=ends, loss=loss))
+    # products may hide from simplification that a variable cancels
+    return FirstFinite(exact, split) if set(split.variables) <= set(exact.variables) else exact
 
 
 def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:

@@ -150,11 +150,11 @@ class WeightedPencil(Pencil):
 
 
 class FirstFinite:
-    """Two bounds of one function of the same variables: the second where the first is infinite."""
+    """Two bounds of one function: the second, in variables of the first, where the first is infinite."""
 
     def __init__(self, first: Objective, second: Objective) -> None:
-        if set(first.variables) != set(second.variables):
-            raise ValueError("the objectives have different variables")
+        if not set(second.variables) <= set(first.variables):
+            raise ValueError("the second objective has other variables")
         self._first, self._second = first, second
         self.variables = first.variables
         self._order = [first.variables.index(v) for v in second.variables]
