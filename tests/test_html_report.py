@@ -25,6 +25,7 @@ from tubecert.expression import to_text
 from tubecert.pipeline import Options, certify, gains
 from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
+from tubecert.report.figures_tube import Plane
 from tubecert.report.numbers import percent, up
 from tubecert.report.page_sections import page_of
 from tubecert.spec import load, load_text
@@ -791,3 +792,20 @@ def test_colours_have_contrast():
     for scheme in schemes:
         for front, back in pairs:
             assert contrast(scheme[front], scheme[back]) >= 4.5, (front, back)
+
+
+def test_a_tube_much_narrower_than_rho_can_be_seen():
+    plane = Plane(
+        names=("x", "y"),
+        units=("", ""),
+        index=(0, 1),
+        plan=((1.0, 2.0),),
+        rho=0.3,
+        sides=(1e-3, 0.3),
+        safe=((-10.0, -10.0), (10.0, 10.0)),
+    )
+    x, y = plane.axes([])
+    assert 0.99 < x.low < 0.999
+    assert 1.001 < x.high < 1.01
+    assert y.low < 1.7
+    assert y.high > 2.3

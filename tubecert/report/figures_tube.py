@@ -40,7 +40,7 @@ class Plane:
         return self._axis(0, [mark[0] for mark in marks]), self._axis(1, [mark[1] for mark in marks])
 
     def _axis(self, i: int, marks: list[float]) -> Axis:
-        reach = self.rho or 0.0
+        reach = min(self.rho or 0.0, self.sides[i] if self.sides else math.inf)
         shown = [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
         low, high = self.safe[0][i], self.safe[1][i]
         near = not self.plan or high - low <= _ZOOM * (max(shown) - min(shown))
