@@ -60,14 +60,6 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
-@pytest.fixture(autouse=True)
-def interruptible():
-    """A shell starts jobs in the background deaf to interruptions, and children would inherit that."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 def process(*arguments, code=None, **options):
     """The command in a process of its own; `code` runs in place of `-m tubecert`."""
     start = ["-m", "tubecert"] if code is None else ["-c", code]
