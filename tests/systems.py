@@ -119,3 +119,21 @@ def two_forms(x: Sequence[Any], q: Any) -> dict[str, Any]:
 
 def times(a: Rows, b: Rows) -> Rows:
     return [[sum(a[i][k] * b[k][j] for k in range(len(b))) for j in range(len(b[0]))] for i in range(len(a))]
+
+
+SMALL = """
+tubecert: 1
+name: small
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + y", "-y + 0.3*sin(x)"]
+  B: [[0], [1]]
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t) + 0.05*x"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+initial_state: {at: [0.05, 0]}
+metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+adaptation: {A_m: -10}
+"""

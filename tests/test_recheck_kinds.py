@@ -6,6 +6,7 @@ from fractions import Fraction
 from functools import cache
 
 import pytest
+from systems import SMALL
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline, spec
@@ -19,22 +20,6 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.run import recheck
 from tubecert.recheck.terms import from_expressions, matrix_replaced, number
 
-BASE = """
-tubecert: 1
-name: small
-system:
-  states: [x, y]
-  inputs: [u]
-  f: ["-x + y", "-y + 0.3*sin(x)"]
-  B: [[0], [1]]
-safe_set: {x: [-1, 1], y: [-1, 1]}
-uncertainty: {h: ["0.1*sin(t) + 0.05*x"]}
-trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
-initial_state: {at: [0.05, 0]}
-metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
-tube: {epsilon: 0.2, rho_a: 0.1}
-adaptation: {A_m: -10}
-"""
 TWO_INPUTS = """
 tubecert: 1
 name: two_inputs
@@ -67,19 +52,19 @@ WIGGLE = (
     'u: ["-0.4*sin(2*t) + 0.2*cos(2*t) + 0.2*sin(t)*cos(t) + 0.2*cos(2*t) - 0.3*sin(0.1*sin(2*t))"]}'
 )
 KINDS = {
-    "a root on the plan": (BASE, ("0.3*sin(x)", "0.3*sin(x) + 0.1*sqrt(4 + x) - 0.18 - 0.02*exp(x)")),
-    "start within a radius": (BASE, (START, "initial_state: {within: 0.03}")),
-    "start on the plan": (BASE, (START, "initial_state: {at: [0, 0]}")),
-    "matrix A_m": (BASE, (LOOP, "A_m: [[-10, 1], [0, -12]]")),
-    "automatic A_m": (BASE, (LOOP, "A_m: auto")),
-    "smooth projection": (BASE, (LOOP, "A_m: -10, projection: {smooth: 0.1}")),
-    "declared bounds only": (BASE, (H, "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")),
-    "declared beside derived": (BASE, (H, H + ", bounds: {h: 0.2}")),
-    "an h with a kink": (BASE, (H, 'h: ["0.1*norm(x, y) + 0.05*abs(x)"]')),
-    "the paper's kernel": (BASE, (LOOP, LOOP + "}\nconditions: {kernel: paper")),
-    "declared bounds of the metric": (BASE, ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1.2}, ")),
+    "a root on the plan": (SMALL, ("0.3*sin(x)", "0.3*sin(x) + 0.1*sqrt(4 + x) - 0.18 - 0.02*exp(x)")),
+    "start within a radius": (SMALL, (START, "initial_state: {within: 0.03}")),
+    "start on the plan": (SMALL, (START, "initial_state: {at: [0, 0]}")),
+    "matrix A_m": (SMALL, (LOOP, "A_m: [[-10, 1], [0, -12]]")),
+    "automatic A_m": (SMALL, (LOOP, "A_m: auto")),
+    "smooth projection": (SMALL, (LOOP, "A_m: -10, projection: {smooth: 0.1}")),
+    "declared bounds only": (SMALL, (H, "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")),
+    "declared beside derived": (SMALL, (H, H + ", bounds: {h: 0.2}")),
+    "an h with a kink": (SMALL, (H, 'h: ["0.1*norm(x, y) + 0.05*abs(x)"]')),
+    "the paper's kernel": (SMALL, (LOOP, LOOP + "}\nconditions: {kernel: paper")),
+    "declared bounds of the metric": (SMALL, ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1.2}, ")),
     "a plan of expressions": (
-        BASE,
+        SMALL,
         (
             PLAN,
             'trajectory: {kind: expressions, x: ["0.1*sin(t)", "0.1*sin(t) + 0.1*cos(t)"], '
@@ -144,10 +129,10 @@ def test_no_kind_of_certificate_may_claim_more(kind):
 
 
 def test_gains_that_were_asked_for():
-    enough = certified(BASE, bandwidth=Fraction(300), adaptation_rate=Fraction(10**12))
+    enough = certified(SMALL, bandwidth=Fraction(300), adaptation_rate=Fraction(10**12))
     assert enough["result"]["verdict"] == "certified"
     assert failing(examine(enough)) == []
-    little = certified(BASE, bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1), conditions="26")
+    little = certified(SMALL, bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1), conditions="26")
     assert little["result"]["verdict"] == "refuted"
     assert examine(little).exit_code == ExitCode.NOT_CERTIFIED
     section = enough["result"]["conditions_26"]
@@ -167,7 +152,7 @@ def test_gains_that_were_asked_for():
     ids=["the tube leaves the set", "the metric fails", "declared bounds of the metric fail"],
 )
 def test_what_is_not_certified_is_never_certified(change, verdict, code):
-    document = certified(replaced(BASE, change))
+    document = certified(replaced(SMALL, change))
     assert document["result"]["verdict"] == verdict
     found = examine(document)
     assert found.exit_code == code
@@ -199,7 +184,7 @@ UNREACHED = {
 
 @pytest.mark.parametrize("kind", UNREACHED)
 def test_a_mode_that_no_input_reaches_is_confirmed(kind):
-    document = certified(replaced(BASE, SYNTHESISED, *UNREACHED[kind]))
+    document = certified(replaced(SMALL, SYNTHESISED, *UNREACHED[kind]))
     assert document["result"]["verdict"] == "refuted"
     found = examine(document)
     assert failing(found) == []
@@ -220,7 +205,7 @@ def test_a_mode_that_no_input_reaches_is_confirmed(kind):
 )
 def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
     kind = "at a forced equilibrium" if value == "1.2" else "a real mode"
-    document = certified(replaced(BASE, SYNTHESISED, *UNREACHED[kind]))
+    document = certified(replaced(SMALL, SYNTHESISED, *UNREACHED[kind]))
     place = document["result"]["spec"]["effective"]
     for key in path[:-1]:
         place = place[key]
@@ -233,14 +218,14 @@ def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
 
 
 def test_what_was_left_undecided_stays_so():
-    document = certified(BASE, formulas="as-printed")
+    document = certified(SMALL, formulas="as-printed")
     assert document["result"]["verdict"] == "undecided"
     assert examine(document).exit_code == ExitCode.UNDECIDED
 
 
 def test_a_radius_is_proven_with_sharper_bounds_where_those_that_are_printed_fall_short():
     """What is printed is rounded outward: rho may be a little less than it asks for, but not less than the truth."""
-    document = certified(BASE, conditions="distance")
+    document = certified(SMALL, conditions="distance")
     needed = Fraction(str(document["result"]["tube"]["rho"]))
     for factor, verdict in ((Fraction(100001, 100000), "confirmed"), (Fraction(98, 100), "contradicted")):
         changed = copy.deepcopy(document)
@@ -284,8 +269,8 @@ def command(*arguments):
     ],
 )
 def test_what_no_claim_rests_on_makes_no_other_system(files, change, words):
-    path, target = files(BASE)
-    path.write_text(replaced(BASE, change), encoding="utf-8")
+    path, target = files(SMALL)
+    path.write_text(replaced(SMALL, change), encoding="utf-8")
     done = command(target, "--spec", path)
     assert done.exit_code == 0, done.stderr
     assert f"nothing rests on what differs: {words}" in done.stdout
@@ -304,8 +289,8 @@ def test_what_no_claim_rests_on_makes_no_other_system(files, change, words):
     ],
 )
 def test_what_claims_rest_on_makes_another_system(files, change, words):
-    path, target = files(BASE)
-    path.write_text(replaced(BASE, change), encoding="utf-8")
+    path, target = files(SMALL)
+    path.write_text(replaced(SMALL, change), encoding="utf-8")
     done = command(target, "--spec", path)
     assert done.exit_code == ExitCode.NOT_CERTIFIED
     assert "TC604" in done.stderr
@@ -313,7 +298,7 @@ def test_what_claims_rest_on_makes_another_system(files, change, words):
 
 
 def test_what_the_command_line_replaced_is_said(files):
-    path, target = files(BASE, epsilon=Fraction("0.3"))
+    path, target = files(SMALL, epsilon=Fraction("0.3"))
     done = command(target, "--spec", path)
     assert done.exit_code == 0, done.stderr
     assert "with epsilon given on the command line" in done.stdout
@@ -321,7 +306,7 @@ def test_what_the_command_line_replaced_is_said(files):
 
 def test_a_synthesised_metric_belongs_to_the_file_that_asked_for_it(tmp_path):
     text = replaced(
-        BASE,
+        SMALL,
         ('metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}', "metric: {synthesise: {rate: 0.5}}"),
     )
     path = tmp_path / "small.yaml"
@@ -342,7 +327,7 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     plan = tmp_path / "plan.csv"
     plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
     path, target = tmp_path / "small.yaml", tmp_path / "small.certificate.json"
-    text = replaced(BASE, (PLAN, "trajectory: {kind: csv, file: plan.csv, interpolation: hold}"))
+    text = replaced(SMALL, (PLAN, "trajectory: {kind: csv, file: plan.csv, interpolation: hold}"))
     path.write_text(text, encoding="utf-8")
     options = pipeline.Options(conditions="distance")
     result = pipeline.certify(spec.load(path), options)
@@ -359,7 +344,7 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
 
 @cache
 def wiggling():
-    return json.dumps(certified(replaced(BASE, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))))
+    return json.dumps(certified(replaced(SMALL, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))))
 
 
 def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
@@ -379,7 +364,7 @@ def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
 
 
 def test_a_defect_that_is_denied_is_contradicted():
-    document = certified(replaced(BASE, (PLAN, PLAN.replace("[0, 0]", "[0.02, 0]"))))
+    document = certified(replaced(SMALL, (PLAN, PLAN.replace("[0, 0]", "[0.02, 0]"))))
     assert document["result"]["constants"]["plan_defect_metric"]["below"] > 0
     for name in ("plan_defect", "plan_defect_metric"):
         document["result"]["constants"][name] |= {"below": 0.0, "above": 0.0}

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 from flint import arb
+from systems import SMALL
 
 from tubecert import certificate, pipeline, spec
 from tubecert.bounds.suprema import Suprema
@@ -161,23 +162,6 @@ def test_a_gain_at_the_ends_of_a_range():
 
 # -- constants without a bound
 
-SPEC = """
-tubecert: 1
-name: small
-system:
-  states: [x, y]
-  inputs: [u]
-  f: ["-x + y", "-y + 0.3*sin(x)"]
-  B: [[0], [1]]
-safe_set: {x: [-1, 1], y: [-1, 1]}
-uncertainty: {h: ["0.1*sin(t) + 0.05*x"]}
-trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
-initial_state: {at: [0.05, 0]}
-metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
-tube: {epsilon: 0.2, rho_a: 0.1}
-adaptation: {A_m: -10}
-"""
-
 
 def sealed(result):
     return json.loads(certificate.dump(certificate.seal(result, {})))
@@ -195,7 +179,7 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
         ),
     )
     options = pipeline.Options(conditions="distance")
-    document = sealed(pipeline.certify(spec.load_text(SPEC, "small.yaml"), options))
+    document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), options))
     assert document["result"]["verdict"] == "certified"
     found = recheck(json.dumps(document), "certificate", 20_000)
     assert [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds] == []
@@ -204,7 +188,7 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
 
 def test_a_pole_in_the_safe_set_is_found():
     """What an expression owes is read with it, and the curve between the poles proves nothing."""
-    document = sealed(pipeline.certify(spec.load_text(SPEC, "small.yaml"), pipeline.Options()))
+    document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), pipeline.Options()))
     for pole, found in (("1e-9/(x - 0.9)", True), ("1e-9/(x - 1.1)", False), ("1e-9*sqrt(x + 0.9)", True)):
         result = json.loads(json.dumps(document["result"]))
         result["spec"]["effective"]["system"]["f"][0] = f"-x + y + {pole}"
@@ -216,7 +200,7 @@ def test_a_pole_in_the_safe_set_is_found():
 def test_nothing_rests_on_a_constant_without_a_bound():
     """Whichever bound is struck out of a certificate, every section that rests on it is no longer confirmed."""
     document = sealed(
-        pipeline.certify(spec.load_text(SPEC, "small.yaml"), pipeline.Options(conditions="all"))
+        pipeline.certify(spec.load_text(SMALL, "small.yaml"), pipeline.Options(conditions="all"))
     )
     assert document["result"]["verdict"] == "certified"
     rests = (

@@ -52,6 +52,14 @@ def declared_data(spec: Spec) -> Result:
     return {name: constant.above for name, constant in declared_uncertainty(spec).items()}
 
 
+def safe_set_data(spec: Spec) -> dict[str, Any]:
+    """[low, high] of every state, as decimals."""
+    return {
+        name: [decimal_data(low), decimal_data(high)]
+        for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
+    }
+
+
 def metric_data(spec: Spec, proof: MetricProof) -> Result:
     """`result.metric` as far as C1-C3 on the safe set tell."""
     metric = spec.metric

@@ -27,6 +27,7 @@ from tubecert.certificate.sections import (
     metric_data,
     pair_data,
     plan_data,
+    safe_set_data,
     witness_data,
 )
 from tubecert.conditions.kernels import Kernel
@@ -79,10 +80,7 @@ class Certification:
             "overrides": overrides_data(options),
             "effort": {"gap": decimal_data(options.gap), "budget": options.budget},
             "plan": {"kind": spec.trajectory.kind},
-            "safe_set": {
-                name: [decimal_data(low), decimal_data(high)]
-                for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
-            },
+            "safe_set": safe_set_data(spec),
             "assumptions": assumptions(spec, self.model),
             "declared": declared_data(spec),
             "reasons": [],

@@ -15,7 +15,7 @@ from fractions import Fraction
 from math import sqrt
 from typing import Any
 
-from tubecert.certificate.sections import decimal_data, metric_data
+from tubecert.certificate.sections import decimal_data, metric_data, safe_set_data
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
@@ -224,15 +224,11 @@ class SynthesisRun:
             return self._failed(
                 f"the metric as written could not be proven: {proof.reason}", "raise --budget"
             )
-        safe_set = {
-            name: [decimal_data(low), decimal_data(high)]
-            for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
-        }
         return Synthesised(
             verdict="certified",
             wanted=self.wanted,
             spec=spec,
-            file=metric_file(safe_set, metric_data(spec, proof), _solver(metric)),
+            file=metric_file(safe_set_data(spec), metric_data(spec, proof), _solver(metric)),
             rows=tuple(sorted(self.rows, key=lambda row: (row.rate, row.floor))),
             attempts=tuple(self.ladder.attempts),
         )

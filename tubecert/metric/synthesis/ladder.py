@@ -116,10 +116,8 @@ class Ladder:
     def lower_rate(self, rate: Fraction) -> Fraction | None:
         """A rate below one that does not work, found with few quick attempts; None if none of them works."""
         quick = Ladder(replace(self.request, thorough=False))
-        return _largest(
-            lambda factor: quick._within(two_digits(rate * factor), self.request.limit) is not None,
-            lambda factor: two_digits(rate * factor),
-        )
+        factor = _largest(lambda f: quick._within(two_digits(rate * f), self.request.limit) is not None)
+        return factor and two_digits(rate * factor)
 
     def smaller_box(self, rate: Fraction) -> Fraction | None:
         """A factor by which the box, shrunk about its centre, has a metric at `rate`; likewise."""
@@ -129,7 +127,7 @@ class Ladder:
             quick = Ladder(replace(self.request, thorough=False, safe_set=box))
             return quick.metric(rate, enough=inf) is not None
 
-        return _largest(works, lambda factor: factor)
+        return _largest(works)
 
     # -- one rate -----------------------------------------------------------------------------------------------
 
@@ -254,13 +252,13 @@ class Ladder:
             self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
 
 
-def _largest(works: Callable[[Fraction], bool], value: Callable[[Fraction], Fraction]) -> Fraction | None:
-    """The value of the largest factor seen to work: bisected in (0, 1), a few times only."""
+def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:
+    """The largest factor seen to work: bisected in (0, 1), a few times only."""
     low, high = Fraction(0), Fraction(1)
     for _ in range(_LOOKS):
         middle = (low + high) / 2
         low, high = (middle, high) if works(middle) else (low, middle)
-    return value(low) if low else None
+    return low or None
 
 
 def _kappa(metric: VerifiedMetric) -> float:
