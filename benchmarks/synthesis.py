@@ -23,12 +23,12 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, symbol
 from tubecert.expression.matrix import Matrix
-from tubecert.metric.synthesis.family import metric_family
-from tubecert.metric.synthesis.polynomial import Conditions, polynomial_conditions
-from tubecert.metric.synthesis.problem import Proposal, SynthesisProblem
-from tubecert.metric.synthesis.rounding import VerifiedMetric, shortest_proven
-from tubecert.metric.synthesis.sos import propose_sos
 from tubecert.model import ControlAffineModel
+from tubecert.synthesis.family import metric_family
+from tubecert.synthesis.polynomial import Conditions, polynomial_conditions
+from tubecert.synthesis.problem import Proposal, SynthesisProblem
+from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
+from tubecert.synthesis.sos import propose_sos
 
 ANGLE = "1.0471975512"
 

@@ -19,18 +19,18 @@ from tubecert.certificate.sections import decimal_data, metric_data, safe_set_da
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
-from tubecert.metric.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
-from tubecert.metric.synthesis.family import suggested
-from tubecert.metric.synthesis.ladder import Ladder, Request, digits_below
-from tubecert.metric.synthesis.problem import Floor
-from tubecert.metric.synthesis.rounding import VerifiedMetric
-from tubecert.metric.synthesis.routes import routes
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, place, rank_decision
 from tubecert.pipeline.options import Options, Progress, Step
 from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
+from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
+from tubecert.synthesis.family import suggested
+from tubecert.synthesis.ladder import Ladder, Request, digits_below
+from tubecert.synthesis.problem import Floor
+from tubecert.synthesis.rounding import VerifiedMetric
+from tubecert.synthesis.routes import routes
 
 _RATES = 6  # of the first sweep
 _REFINED = 3  # times, about the best row

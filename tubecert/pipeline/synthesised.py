@@ -14,11 +14,11 @@ from typing import Any
 from tubecert.certificate.sections import decimal_data, pair_data
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
-from tubecert.metric.synthesis.ladder import Attempt
-from tubecert.metric.synthesis.problem import Floor
-from tubecert.metric.synthesis.rounding import VerifiedMetric
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT
+from tubecert.synthesis.ladder import Attempt
+from tubecert.synthesis.problem import Floor
+from tubecert.synthesis.rounding import VerifiedMetric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

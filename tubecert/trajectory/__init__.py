@@ -9,8 +9,6 @@ of its defect p = x*' - f(x*) - B(x*) u*. Trusted: yes, but for the planner.
 | `pieces`, `hermite` | a plan through knots: cubic Hermite pieces, and their data as intervals | yes |
 | `defect` | sup |p| and sup |Theta(x*) p| | yes |
 | `make` | specification -> plan; sub-knots until the defect is negligible | yes |
-| `rollout`, `ilqr` | dynamics in floats, and the planner: they only propose knots | no |
-| `cache` | the planner's inputs, kept between runs | no |
 """
 
 from tubecert.trajectory.plan import Plan, constant_plan, inputs

@@ -19,12 +19,12 @@ from tubecert.errors import SpecError
 from tubecert.expression import number_text
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
+from tubecert.planner import cache, ilqr
+from tubecert.planner.rollout import Dynamics
 from tubecert.spec import Interpolation, Knots, Spec, Task, canonical
-from tubecert.trajectory import cache, ilqr
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.trajectory.plan import Plan
-from tubecert.trajectory.rollout import Dynamics
 
 Report = Callable[[str, int, str], None]  # what is done, how many, of what
 

@@ -1,0 +1,749 @@
+"""The command line: exit codes, streams, files; one located error per mistake, and never a traceback."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import certificates
+import pytest
+from typer.testing import CliRunner
+
+from tubecert import __version__, pipeline
+from tubecert.certificate import digest
+from tubecert.cli.app import app
+from tubecert.cli.belonging import ForeignError
+from tubecert.errors import SpecError
+from tubecert.findings import Finding, Severity
+from tubecert.spec import canonical
+
+ROOT = Path(__file__).parents[2]
+SPEC = ROOT / "configs" / "three_state.yaml"
+TEXT = SPEC.read_text(encoding="utf-8")
+LOCATED = re.compile(r"^(\S+:\d+:\d+|--[a-z-]+): error TC\d{3}: ", re.MULTILINE)
+
+pytestmark = pytest.mark.timeout(60)  # a hang guard
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """An empty current folder."""
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
+    return work
+
+
+@pytest.fixture
+def proven(monkeypatch):
+    """Certification that answers at once; gives access to what it was asked."""
+    asked = {"result": certificates.certified()}
+
+    def certify(spec, options, progress=None):
+        asked.update(spec=spec, options=options)
+        if isinstance(asked["result"], BaseException):
+            raise asked["result"]
+        return asked["result"]
+
+    monkeypatch.setattr(pipeline, "certify", certify)
+    return asked
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+
+
+def process(*arguments, code=None, **options):
+    """The command in a process of its own; `code` runs in place of `-m tubecert`."""
+    start = ["-m", "tubecert"] if code is None else ["-c", code]
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    return subprocess.Popen(
+        [sys.executable, *start, *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdin=subprocess.DEVNULL,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options},
+    )
+
+
+STUBBED = """
+import sys, time
+import certificates
+from tubecert import pipeline
+def certify(spec, options, progress=None):
+    {body}
+    return certificates.certified()
+pipeline.certify = certify
+from tubecert.cli import main
+main()
+"""
+
+
+def quiet_failure(result, code):
+    assert result.exit_code == code, result.output
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+
+
+# help and version
+
+
+def test_alone_it_prints_help():
+    alone, asked = run(), run("--help")
+    assert alone.exit_code == asked.exit_code == 0
+    assert alone.stdout == asked.stdout
+    assert "certify" in alone.stdout
+
+
+@pytest.mark.parametrize("command", [(), ("certify",), ("check",), ("version",)])
+def test_help_has_an_example(command):
+    result = run(*command, "--help")
+    assert result.exit_code == 0
+    assert "Example" in result.stdout
+    assert f"tubecert {command[0]}" if command else "tubecert certify" in result.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--version"], ["certify", "--version"], ["version"], ["-q", "version"]]
+)
+def test_version(arguments):
+    result = run(*arguments)
+    assert (result.exit_code, result.stdout) == (0, f"tubecert {__version__}\n")
+
+
+def test_version_of_what_results_rest_on():
+    assert "numpy" in run("version", "-v").stdout
+    assert json.loads(run("--json", "version").stdout)["tubecert"] == __version__
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["certfy"],
+        ["certify"],
+        ["certify", SPEC, "--rho"],
+        ["certify", SPEC, "--rho-a"],
+        ["certify", SPEC, "--conditions", "27"],
+        ["certify", SPEC, "--bandwidth", "5"],
+        ["certify", SPEC, "--adaptation-rate", "5"],
+        ["certify", SPEC, "-q", "-v"],
+        ["-q", "certify", SPEC, "-v"],
+        ["check"],
+        ["--color", "sometimes", "version"],
+    ],
+)
+def test_usage_errors(arguments, folder):
+    quiet_failure(run(*arguments), 2)
+    assert not list(folder.iterdir())
+
+
+# certify
+
+
+def test_a_certificate_is_written_and_reported(folder, proven):
+    result = run("certify", SPEC)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    assert result.stdout.startswith("certified pendulum: rho = 0.04124; ")
+    assert "\x1b" not in result.stdout
+    [file] = folder.iterdir()
+    assert file.name == "three_state.certificate.json"
+    certificate = json.loads(file.read_text(encoding="utf-8"))
+    assert set(certificate) == {"format", "hash", "result", "run"}
+    assert certificate["hash"] == digest(certificate["result"])
+    assert certificate["run"]["versions"]["tubecert"] == __version__
+
+
+@pytest.mark.parametrize(
+    ("result", "code"),
+    [
+        (certificates.certified(), 0),
+        (certificates.refuted_metric(), 1),
+        (certificates.refuted_gains(), 1),
+        (certificates.undecided(), 4),
+    ],
+)
+@pytest.mark.parametrize("how", [(), ("-q",), ("-v",), ("--json",)])
+def test_every_verdict_has_its_code_and_its_certificate(folder, proven, result, code, how):
+    proven["result"] = result
+    answer = run("certify", SPEC, *how)
+    assert answer.exit_code == code
+    assert json.loads(next(folder.iterdir()).read_text())["result"] == result
+    assert result["verdict"] in answer.stdout
+
+
+def test_quiet_is_one_line(proven):
+    for arguments in (["-q", "certify", SPEC], ["certify", SPEC, "-q"]):
+        assert run(*arguments).stdout.count("\n") == 1
+
+
+def test_json_is_the_certificate(folder, proven):
+    result = run("certify", SPEC, "--json", "-o", "x.json")
+    assert json.loads(result.stdout) == json.loads((folder / "x.json").read_text())
+    assert result.stderr.startswith("certified pendulum")
+    assert run("certify", SPEC, "--json", "-q").stderr == ""
+
+
+def test_the_certificate_can_go_to_stdout(folder, proven):
+    result = run("certify", SPEC, "-o", "-")
+    assert json.loads(result.stdout)["result"]["verdict"] == "certified"
+    assert not list(folder.iterdir())
+
+
+def test_colour_can_be_forced(proven):
+    assert "\x1b[" in run("certify", SPEC, "--color", "always").stdout
+    assert "\x1b[" in run("--color", "always", "certify", SPEC).stdout
+    assert "\x1b[" not in run("--color", "always", "certify", SPEC, "--color", "never").stdout
+
+
+def test_options_are_exact(proven):
+    numbers = ["--rho-a", "1/3", "--epsilon", "1e-2", "--bandwidth", "50", "--adaptation-rate", "2e7"]
+    assert run("certify", SPEC, *numbers, "--gap", "0.5", "--budget", "1e4").exit_code == 0
+    options = proven["options"]
+    assert [str(getattr(options, name)) for name in ("rho_a", "epsilon", "bandwidth", "adaptation_rate")] == [
+        "1/3", "1/100", "50", "20000000",
+    ]  # fmt: skip
+    assert (str(options.gap), options.budget) == ("1/2", 10000)
+    run("certify", SPEC, "--conditions", "all", "--formulas", "as-printed")
+    assert proven["options"] == pipeline.Options(conditions="all", formulas="as-printed")
+
+
+@pytest.mark.parametrize("option", ["--rho-a", "--epsilon", "--gap", "--budget"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "nan",
+        "inf",
+        "-1",
+        "0",
+        "abc",
+        "",
+        "1e10000000",
+        "0x10",
+        "1_000",
+        "--",
+        "1/0",
+        "9**9**9",
+        "__import__('os')",
+    ],
+)
+def test_bad_numbers(folder, option, text):
+    result = run("certify", SPEC, option, text)
+    quiet_failure(result, 2)
+    assert len(LOCATED.findall(result.stderr)) == 1
+    assert result.stderr.startswith(f"{option}: error TC")
+    assert not list(folder.iterdir())
+
+
+def test_all_bad_numbers_at_once():
+    result = run("certify", SPEC, "--rho-a", "x", "--epsilon", "-1", "--gap", "1", "--budget", "0.5")
+    assert len(LOCATED.findall(result.stderr)) == 4
+    assert result.stderr.endswith("4 errors\n")
+
+
+# bad input
+
+
+def replaced(old, new):
+    assert old in TEXT
+    return TEXT.replace(old, new)
+
+
+BOMB = "a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\n"
+F3 = "    - -x2\n"
+BAD = {
+    "malformed YAML": (TEXT + "x: [1, 2\n", "not YAML"),
+    "unknown key": (replaced("safe_set:", "safeset:"), "did you mean safe_set"),
+    "duplicate key": (TEXT + "name: again\n", "name"),
+    "alias": (replaced("[0, 0, 0]", "*x"), "alias"),
+    "caret": (replaced("x1**2 -", "x1^2 -"), "write **"),
+    "unknown symbol": (replaced("- -x1 + x3", "- -x1 + x4"), "unknown symbol x4"),
+    "wrong shape": (replaced("[[0], [0], [1]]", "[[0], [1]]"), ""),
+    "NaN": (replaced("rate: 0.9999", "rate: .nan"), "not a finite number"),
+    "B of rank zero": (replaced("[[0], [0], [1]]", "[[0], [0], [0]]"), "B is zero"),
+    "unstable A_m": (replaced("A_m: -1", "A_m: 1"), "A_m"),
+    "negative epsilon": (replaced("epsilon: 0.01", "epsilon: -0.01"), "epsilon"),
+    "200 000 brackets": (replaced("[[0], [0], [1]]", "[" * 200_000), "nested"),
+    "huge exponent": (replaced("rate: 0.9999", "rate: 1e10000000"), "exponent"),
+    "import": (replaced(F3, "    - __import__('os').system('x')\n"), ""),
+    "attribute": (replaced(F3, "    - x1.__class__\n"), ""),
+    "power tower": (replaced(F3, "    - 9**9**9\n"), ""),
+    "10 000 parentheses": (replaced(F3, f"    - {'(' * 10_000}x1{')' * 10_000}\n"), ""),
+    "3 000 parentheses": (replaced(F3, f"    - {'(' * 1_500}x1{')' * 1_500}\n"), "nested"),
+    "50 000 signs": (replaced(F3, f'    - "{"-" * 50_000}x1"\n'), ""),
+    "empty": ("", ""),
+    "control character": (replaced("three_state", "three\x00state"), "U+0000"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("command", ["certify", "check"])
+def test_bad_specifications(folder, tmp_path, name, command):
+    text, fragment = BAD[name]
+    file = tmp_path / "plant.yaml"
+    file.write_text(text, encoding="utf-8")
+    result = run(command, file)
+    assert result.exit_code == 2, result.output
+    found = LOCATED.findall(result.output)
+    assert found
+    assert found[0].startswith(f"{file}:"), "the place is the file's"
+    assert len(found) == 1, result.output
+    assert fragment in result.output
+    assert "Traceback" not in result.output
+    assert len(result.output) < 5_000
+    assert not list(folder.iterdir())
+
+
+def test_an_alias_bomb_is_refused(tmp_path, folder):
+    file = tmp_path / "plant.yaml"
+    file.write_text(BOMB + TEXT, encoding="utf-8")
+    result = run("certify", file)
+    quiet_failure(result, 2)
+    assert LOCATED.search(result.stderr)
+
+
+def test_every_problem_is_reported_at_once(tmp_path):
+    file = tmp_path / "plant.yaml"
+    file.write_text(replaced("x1**2 -", "x1^2 -").replace("rate: 0.9999", "rate: no"), encoding="utf-8")
+    result = run("certify", file)
+    assert len(LOCATED.findall(result.stderr)) == 2
+    assert result.stderr.endswith("2 errors\n")
+
+
+@pytest.mark.parametrize("command", ["certify", "check"])
+def test_unreadable_files(folder, tmp_path, command):
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"tubecert: 1\nname: \xff\xfe")
+    for path in (tmp_path / "none.yaml", binary, "", "a\0b"):
+        result = run(command, path)
+        assert result.exit_code == 2, path
+        assert "error TC100: " in result.output
+        assert result.output.endswith("1 error\n")
+        assert "Traceback" not in result.output
+    assert not list(folder.iterdir())
+
+
+def test_a_folder_is_no_specification(tmp_path):
+    result = run("certify", tmp_path)
+    quiet_failure(result, 2)
+    assert "directory" in result.stderr or "folder" in result.stderr
+
+
+# metric files
+
+
+METRIC = {
+    "format": "tubecert-metric/1",
+    "rate": 0.25,
+    "dual_metric": [["1", "0", "0.1*x1"], ["0", "1/3", "0"], ["0.1*x1", "0", 2]],
+    "margin": 1e9,
+    "lower": "believed by nobody",
+    "solver": {"name": "any"},
+}
+
+
+def test_a_metric_file_takes_the_place_of_the_metric(folder, proven):
+    (folder / "w.json").write_text(json.dumps(METRIC, indent=1))
+    assert run("certify", SPEC, "--metric", "w.json").exit_code == 0
+    assert proven["options"].metric == Path("w.json")
+    data = canonical(proven["spec"])["metric"]
+    assert data == {
+        "rate": "0.25",
+        "dual_metric": [["1", "0", "0.1*x1"], ["0", "1/3", "0"], ["0.1*x1", "0", "2"]],
+    }
+    assert proven["spec"].metric.lower is None
+
+
+@pytest.mark.parametrize(
+    ("change", "fragment"),
+    [
+        ({"rate": -1}, "must be > 0"),
+        ({"rate": "fast"}, "unknown symbol"),
+        ({"format": "tubecert-metric/9"}, "tubecert-metric/1"),
+        ({"dual_metric": [["1"]]}, "dual_metric"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["x4", "0", "1"]]}, "unknown symbol x4"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["x1", "0", "1"]]}, "not symmetric"),
+        ({"rates": 1}, "unknown key rates"),
+    ],
+)
+def test_bad_metric_files(folder, proven, change, fragment):
+    (folder / "w.json").write_text(json.dumps(METRIC | change, indent=1))
+    result = run("certify", SPEC, "--metric", "w.json")
+    quiet_failure(result, 2)
+    assert len(LOCATED.findall(result.stderr)) == 1, result.stderr
+    assert result.stderr.startswith("w.json:")
+    assert fragment in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "this is not JSON: "),
+        ("hello", "the metric file must be a mapping with the keys format, rate, dual_metric"),
+        (json.dumps({key: METRIC[key] for key in METRIC if key != "rate"}), "the metric file lacks rate"),
+        (json.dumps(METRIC | {"rate": -1}), "error TC112: rate is -1; it must be > 0"),
+        (
+            '{"format": "tubecert-certificate/1", "hash": "", "result": {}}',
+            "this is a certificate, not a metric",
+        ),
+        (TEXT, "this is a specification, not a metric file"),
+    ],
+)
+def test_errors_of_metric_files_name_the_file_and_its_keys(folder, unused, text, said):
+    (folder / "w.json").write_text(text)
+    result = run("certify", SPEC, "--metric", "w.json")
+    quiet_failure(result, 2)
+    assert said in result.stderr.splitlines()[0], result.stderr
+    assert result.stderr.endswith("1 error\n")
+
+
+def test_metric_files_that_are_none(folder, proven):
+    (folder / "bad.json").write_text("{")
+    (folder / "empty.json").write_text("")
+    for name in ("missing.json", ".", "bad.json", "empty.json"):
+        result = run("certify", SPEC, "--metric", name)
+        quiet_failure(result, 2)
+        assert result.stderr.endswith("1 error\n")
+
+
+def test_a_metric_file_is_never_overwritten(folder, unused):
+    (folder / "w.json").write_text(json.dumps(METRIC))
+    result = run("certify", SPEC, "--metric", "w.json", "-o", "w.json")
+    quiet_failure(result, 2)
+    assert "is the metric file itself" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("change", "claim"),
+    [
+        ({"rate": 5}, "metric, C2"),
+        ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, C3"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, C1"),
+    ],
+)
+def test_a_metric_file_is_verified(folder, change, claim):
+    (folder / "w.json").write_text(json.dumps(METRIC | change))
+    result = run("certify", SPEC, "--metric", "w.json")
+    assert result.exit_code == 1
+    assert result.stdout.startswith(f"refuted three_state: {claim}: ")
+
+
+# targets
+
+
+@pytest.fixture
+def unused(monkeypatch):
+    """Certification that must not be reached."""
+
+    def certify(*_):
+        raise AssertionError("the target is checked before the work starts")
+
+    monkeypatch.setattr(pipeline, "certify", certify)
+
+
+@pytest.mark.parametrize("target", ["missing/x.json", ".", "/", "three_state.yaml/x.json"])
+def test_targets_are_checked_first(folder, unused, target):
+    before = sorted(folder.iterdir())
+    result = run("certify", SPEC, "-o", target)
+    quiet_failure(result, 2)
+    assert result.stderr.startswith("error TC120: ")
+    assert result.stderr.endswith("1 error\n")
+    assert sorted(folder.iterdir()) == before
+
+
+def test_the_specification_is_never_overwritten(folder, unused):
+    file = folder / "plant.yaml"
+    file.write_text(TEXT, encoding="utf-8")
+    (folder / "link.json").symlink_to(file)
+    for target in ("plant.yaml", "./plant.yaml", file, "link.json"):
+        result = run("certify", file, "-o", target)
+        quiet_failure(result, 2)
+        assert "would be overwritten" in result.stderr
+    assert file.read_text(encoding="utf-8") == TEXT
+
+
+@pytest.mark.parametrize("target", ["/dev/full", "/proc/x.json"])
+def test_targets_that_take_nothing(folder, proven, target):
+    if not Path(target).parent.is_dir() or (target == "/dev/full" and not Path(target).exists()):
+        pytest.skip(f"there is no {target}")
+    result = run("certify", SPEC, "-o", target)
+    quiet_failure(result, 2)
+    assert result.stderr.startswith(f"error TC120: cannot write {target}: ")
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    "arguments", [["certify", SPEC], ["certify", SPEC, "-o", "-"], ["--help"], ["version"]]
+)
+def test_a_full_stdout(arguments):
+    with open("/dev/full", "w") as full:
+        command = process(*arguments, code=STUBBED.format(body="pass"), stdout=full)
+        _, errors = command.communicate()
+    assert command.returncode == 2
+    assert len(errors.splitlines()) <= 2
+    assert "TC120: cannot write to stdout: " in errors
+
+
+def test_a_disk_that_fills_up_leaves_no_part(folder, proven, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    (folder / "x.json").write_text("old")
+    result = run("certify", SPEC, "-o", "x.json")
+    quiet_failure(result, 2)
+    assert "no space left" in result.stderr.lower()
+    assert [file.name for file in folder.iterdir()] == ["x.json"]
+    assert (folder / "x.json").read_text() == "old"
+
+
+@pytest.mark.parametrize("gain", ["1e-300", "1e300", "1e60"])
+def test_gains_that_nothing_can_have_are_refused(unused, gain):
+    for options in (
+        ["--bandwidth", gain, "--adaptation-rate", "1"],
+        ["--bandwidth", 1, "--adaptation-rate", gain],
+    ):
+        result = run("certify", SPEC, *options)
+        quiet_failure(result, 2)
+        assert f"{gain} is not a gain that anything can have" in result.stderr
+        assert "write a number between 1e-60 and 1e60" in result.stderr
+
+
+# the ways to end
+
+
+def test_a_pipe_that_closes_is_no_error(folder):
+    command = process("certify", SPEC, "-v", code=STUBBED.format(body="time.sleep(0.2)"))
+    command.stdout.close()
+    errors = command.stderr.read()
+    assert command.wait() == 0
+    assert errors == ""
+    command.stderr.close()
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_closed_streams(folder):
+    code = STUBBED.format(body="pass").replace("main()", "sys.stdout = sys.stderr = None\nmain()")
+    command = process("certify", SPEC, code=code)
+    assert command.communicate() == ("", "")
+    assert command.returncode == 0
+
+
+def test_an_ascii_terminal_is_served(folder):
+    code = STUBBED.format(body="pass") + "\n"
+    command = process(
+        "certify", SPEC, "-v", code=f"import sys\nsys.stdout.reconfigure(encoding='ascii')\n{code}"
+    )
+    output, errors = command.communicate()
+    assert (output[:9], errors) == ("certified", "")
+
+
+def test_interrupted(folder):
+    body = "print('at work', file=sys.stderr, flush=True); time.sleep(50)"
+    command = process("certify", SPEC, code=STUBBED.format(body=body))
+    assert command.stderr.readline() == "at work\n"
+    command.send_signal(signal.SIGINT)
+    output, errors = command.communicate()
+    assert command.returncode == 130
+    assert output == ""
+    assert errors == "tubecert: interrupted\n"
+    assert not list(folder.iterdir())
+
+
+def test_interrupted_in_the_middle_of_a_real_run(folder):
+    command = process("certify", SPEC, "--gap", "1e-12", "--budget", "1e12")
+    time.sleep(3)
+    if command.poll() is None:
+        command.send_signal(signal.SIGINT)
+        output, errors = command.communicate()
+        assert (command.returncode, output, errors) == (130, "", "tubecert: interrupted\n")
+        assert not list(folder.iterdir())
+    else:
+        command.communicate()
+
+
+INTERRUPTING = """
+import os, signal, sys
+class Interrupt:
+    def find_spec(self, name, path, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupt())
+from tubecert.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["tubecert.cli.app", "typer", "tubecert.cli.certify", "tubecert.spec"])
+def test_interrupted_while_modules_are_imported(folder, name):
+    command = process("certify", SPEC, code=INTERRUPTING.format(name=name))
+    output, errors = command.communicate()
+    assert (command.returncode, output, errors) == (130, "", "tubecert: interrupted\n")
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError("oops"), RecursionError("deep"), MemoryError(), AssertionError()]
+)
+def test_internal_errors_leave_a_log(folder, tmp_path, proven, error):
+    proven["result"] = error
+    result = run("certify", SPEC)
+    quiet_failure(result, 3)
+    assert result.stderr.startswith("tubecert: internal error: ")
+    assert "this is a defect of tubecert" in result.stderr
+    [log] = (tmp_path / "state" / "tubecert").iterdir()
+    assert str(log) in result.stderr
+    assert "Traceback" in log.read_text()
+    assert not list(folder.iterdir())
+
+
+def test_debug_shows_the_traceback(proven):
+    proven["result"] = ZeroDivisionError("oops")
+    for arguments in (["certify", SPEC, "--debug"], ["--debug", "certify", SPEC]):
+        result = run(*arguments)
+        assert result.exit_code == 3
+        assert "Traceback" in result.stderr
+
+
+def test_a_log_that_cannot_be_written(proven, monkeypatch):
+    proven["result"] = ZeroDivisionError("oops")
+    monkeypatch.setattr(Path, "mkdir", lambda *_, **__: (_ for _ in ()).throw(OSError(13, "no")))
+    result = run("certify", SPEC)
+    quiet_failure(result, 3)
+    assert "no log could be written" in result.stderr
+
+
+def test_errors_bring_their_code(proven):
+    finding = Finding(code="TC203", message="B loses rank")
+    for error, code in ((SpecError([finding]), 2), (ForeignError([finding]), 1)):
+        proven["result"] = error
+        result = run("certify", SPEC)
+        quiet_failure(result, code)
+        assert result.stderr == "error TC203: B loses rank\n1 error\n"
+
+
+# check
+
+
+def test_check_clean(folder):
+    result = run("check", SPEC)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == "1 specification checked: no errors\n"
+    assert json.loads(run("check", SPEC, "--json").stdout) == []
+    assert not list(folder.iterdir())
+
+
+def test_check_folders(folder):
+    (folder / "sub").mkdir()
+    (folder / ".hidden").mkdir()
+    for name in ("b.yaml", "sub/a.yml", ".hidden/c.yaml", "notes.txt"):
+        (folder / name).write_text(TEXT if name != "b.yaml" else "tubecert: 1\n", encoding="utf-8")
+    result = run("check", folder, folder / "b.yaml")
+    assert result.exit_code == 2
+    assert "2 specifications checked: " in result.stdout
+    assert str(folder / "b.yaml") in result.stdout
+    assert "hidden" not in result.stdout
+    quiet = run("check", folder, "-q")
+    assert quiet.exit_code == 2
+    assert quiet.stdout.count("\n") == 1
+    [first, *_] = json.loads(run("check", folder, "--json").stdout)
+    assert first["code"] == "TC105"
+    assert first["file"] == str(folder / "b.yaml")
+
+
+def test_check_an_empty_folder(folder):
+    result = run("check", folder)
+    assert result.exit_code == 2
+    assert "no specification in" in result.stdout
+
+
+def test_check_mathematics(folder, monkeypatch):
+    warning = Finding(code="TC299", message="odd", severity=Severity.WARNING)
+    error = Finding(code="TC203", message="B loses rank in the safe set, at x1 = 0")
+    for found, code, words in (
+        ([warning], 0, "1 warning"),
+        ([warning, error], 1, "1 error, 1 warning"),
+    ):
+        monkeypatch.setattr(pipeline, "inspect", lambda _, found=found: found)
+        result = run("check", SPEC, "--no-cache")
+        assert result.exit_code == code
+        assert result.stdout.endswith(f"1 specification checked: {words}\n")
+
+
+# the real thing
+
+
+def test_a_real_certificate(folder):
+    first, second = run("certify", SPEC, "-o", "1.json"), run("certify", SPEC, "-o", "2.json", "-q")
+    assert (first.exit_code, second.exit_code) == (0, 0)
+    assert first.stdout.splitlines()[0] == second.stdout.splitlines()[0]
+    one, two = (json.loads((folder / name).read_text(encoding="utf-8")) for name in ("1.json", "2.json"))
+    assert one["hash"] == two["hash"] == digest(one["result"])
+    assert one["result"]["verdict"] == "certified"
+    assert f"rho = {one['result']['tube']['rho']:.4g}"[:9] in first.stdout
+
+
+def test_a_real_refusal(folder):
+    file = folder / "fast.yaml"
+    file.write_text(replaced("rate: 0.9999", "rate: 1"), encoding="utf-8")
+    result = run("certify", file)
+    assert result.exit_code == 1
+    assert result.stdout.startswith("refuted three_state: metric, C2: ")
+    assert "the largest rate that this metric supports is 0.9999" in result.stdout
+    reason = json.loads((folder / "fast.certificate.json").read_text(encoding="utf-8"))["result"]["reasons"][
+        0
+    ]
+    assert reason["verdict"] == "refuted"
+    assert len(reason["at"]["x"]) == 3
+
+
+def test_printed_formulas_prove_nothing(folder):
+    result = run("certify", SPEC, "--formulas", "as-printed", "-q")
+    assert result.exit_code == 4
+    assert result.stdout.startswith("undecided three_state: ")
+
+
+def test_a_budget_that_runs_out_is_undecided(folder):
+    result = run("certify", SPEC, "--budget", "10")
+    assert result.exit_code == 4
+    assert result.stdout.startswith("undecided three_state: ")
+
+
+# the README
+
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_specification_of_the_readme_certifies(folder):
+    [text] = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)
+    (folder / "example.yaml").write_text(text, encoding="utf-8")
+    assert run("check", "example.yaml").exit_code == 0
+    assert run("certify", "example.yaml").exit_code == 0
+
+
+def test_the_output_of_the_readme_is_real(folder):
+    [command] = re.findall(r"tubecert (certify configs/\S+.*)", README)
+    _, spec, *options = command.split()
+    shown = README.split("```text\n")[1].split("```")[0]
+    real = run("certify", ROOT / spec, *options).stdout
+    # numbers are those of the pinned versions, so only what does not depend on them is compared
+    assert titles(shown) == titles(real)
+
+
+def titles(report):
+    return [line.split()[0] for line in report.splitlines() if line and not line.startswith(" ")]
+
+
+def test_ci_runs_what_the_readme_says():
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    for part in ('install --quiet -c constraints.txt -e ".[dev]"', "-m pytest\n"):
+        assert part in script
+        assert part.replace(" --quiet", "").strip() in README

@@ -1,0 +1,182 @@
+"""The corridor: rooms import only from earlier rooms, heavy libraries come late, nothing is evaluated."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import tubecert
+
+PACKAGE = Path(tubecert.__file__).parent
+ROOT = PACKAGE.parent
+ROOMS = [
+    "errors",
+    "findings",
+    "files",
+    "expression",
+    "recheck",
+    "spec",
+    "enclosure",
+    "model",
+    "metric",
+    "synthesis",
+    "planner",
+    "trajectory",
+    "tube",
+    "bounds",
+    "conditions",
+    "search",
+    "lint",
+    "certificate",
+    "simulate",
+    "pipeline",
+    "checking",
+    "report",
+    "cli",
+]
+MODULES = sorted(PACKAGE.rglob("*.py"))
+HEAVY = {
+    "numpy",
+    "scipy",
+    "cvxpy",
+    "clarabel",
+    "yaml",
+    "rich",
+    "pydantic",
+    "matplotlib",
+    "jinja2",
+    "flint",
+    "numba",
+}
+ALLOWED_AT_START = {"typer"}
+FORBIDDEN_CALLS = {"eval", "exec", "compile", "sympify", "safe_load", "unsafe_load", "full_load", "load_all"}
+
+
+def room_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).parts
+    return parts[0].removesuffix(".py")
+
+
+def modules(*skipped: str) -> list[pytest.param]:
+    kept = [path for path in MODULES if room_of(path) not in skipped]
+    return [pytest.param(path, id=str(path.relative_to(PACKAGE))) for path in kept]
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """Every module that a file imports, anywhere in it, under its full name."""
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            module = node.module or ""
+            names |= {f"{module}.{a.name}" for a in node.names} if module == "tubecert" else {module}
+    return names
+
+
+def only_for_types(tree: ast.Module) -> set[ast.AST]:
+    """Nodes below `if TYPE_CHECKING:`."""
+    blocks = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+    ]
+    return {inner for block in blocks for inner in ast.walk(block)}
+
+
+@pytest.mark.parametrize("path", modules("__init__", "__main__"))
+def test_a_room_imports_only_from_earlier_rooms(path):
+    own = room_of(path)
+    assert own in ROOMS, f"{own} is not a room of the corridor"
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    typed = only_for_types(tree)
+    for node in ast.walk(tree):
+        if node in typed or not isinstance(node, (ast.Import, ast.ImportFrom)):
+            continue
+        for name in imported(node):
+            if name.startswith("tubecert.") and name != "tubecert.__version__":
+                other = name.split(".")[1]
+                assert ROOMS.index(other) <= ROOMS.index(own), f"line {node.lineno}: {own} imports {other}"
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in MODULES if room_of(path) == "recheck"], ids=lambda p: p.name
+)
+def test_recheck_shares_nothing_with_the_producer(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    rooms = {name.split(".")[1] for name in imported(tree) if name.startswith("tubecert.")}
+    assert rooms <= {"errors", "findings", "expression", "recheck"}
+    shared = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "tubecert.expression"
+        for alias in node.names
+    }
+    # the parser and the node types, never the derivative rules or the zero test
+    assert shared <= {"Expression", "ExpressionError", "parse", "parse_number", "symbol", "topological"}
+    assert not any(name.startswith("tubecert.expression.") for name in imported(tree))
+    assert not {name.split(".")[0] for name in imported(tree)} & {"numpy", "scipy", "cvxpy", "sympy"}
+
+
+@pytest.mark.parametrize("path", modules())
+def test_nothing_is_evaluated(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            function = node.func
+            name = function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
+            qualified = isinstance(function, ast.Attribute) and ast.unparse(function) == "re.compile"
+            assert qualified or name not in FORBIDDEN_CALLS, f"line {node.lineno} calls {name}"
+
+
+def loaded_by(statement: str) -> set[str]:
+    code = f"import sys; {statement}; print(' '.join(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    return {name.split(".")[0] for name in done.stdout.split()}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import tubecert.cli",
+        "from typer.testing import CliRunner; from tubecert.cli.app import app; CliRunner().invoke(app, ['--help'])",
+        "import tubecert.expression",
+        "import tubecert.errors, tubecert.findings",
+    ],
+)
+def test_heavy_libraries_come_late(statement):
+    assert not loaded_by(statement) & HEAVY
+
+
+def test_reading_a_specification_needs_no_numerics():
+    statement = f"import tubecert.spec as s; s.load({str(ROOT / 'configs' / 'three_state.yaml')!r})"
+    assert not loaded_by(statement) & {"numpy", "scipy", "cvxpy"}
+
+
+def test_the_command_line_starts_with_typer_and_errors_only():
+    for path in (PACKAGE / "cli" / "app.py", PACKAGE / "cli" / "options.py", PACKAGE / "cli" / "guard.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = set()
+        for node in tree.body:
+            if isinstance(node, (ast.Import, ast.ImportFrom)):
+                names |= imported(node)
+        own = {name for name in names if name.startswith("tubecert")}
+        assert all(name.startswith(("tubecert.cli", "tubecert.errors")) for name in own), own
+        foreign = {name.split(".")[0] for name in names - own} - set(sys.stdlib_module_names)
+        assert foreign <= ALLOWED_AT_START
+
+
+def test_constraints_pin_every_dependency_by_name_and_version():
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line for line in lines if not line.startswith("#")]
+    assert all(line.count("==") == 1 and not set(line) & set(" @/:") for line in pins)
+    pinned = {line.split("==")[0].lower().replace("_", "-") for line in pins}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = project["dependencies"] + project["optional-dependencies"]["dev"]
+    names = {line.split(">")[0].strip().lower() for line in needed}
+    assert names <= pinned

@@ -1,0 +1,66 @@
+"""The tutorial, followed to the letter: its files, its commands in their order, its output."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from tubecert.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
+BLOCKS = re.findall(r"```(yaml|sh|text)\n(.*?)```", TUTORIAL, re.DOTALL)
+
+
+def shape(line: str) -> str:
+    """A line without its numbers, which may differ in their last digits with other versions."""
+    return re.sub(r"\s+", " ", re.sub(r"\d[\d.]*(e-?\d+)?", "#", line)).strip()
+
+
+@pytest.mark.timeout(300)
+def test_the_tutorial(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
+    said = ""
+    for kind, text in BLOCKS:
+        if kind == "yaml":
+            with Path("arm.yaml").open("a", encoding="utf-8") as file:
+                file.write(("\n" if file.tell() else "") + text)
+        elif kind == "sh":
+            program, *arguments = shlex.split(text)
+            assert program == "tubecert"
+            result = CliRunner().invoke(app, arguments, prog_name="tubecert")
+            assert result.exit_code == 0, result.output
+            said = result.stdout
+        else:
+            real = {shape(line) for line in said.splitlines()}
+            missing = [line for line in text.splitlines() if shape(line) not in real]
+            assert not missing, (missing, said)
+    assert {"arm.yaml", "arm.metric.json", "arm.certificate.json", "arm.html"} <= {
+        p.name for p in tmp_path.iterdir()
+    }
+
+
+def test_the_example_is_in_none_of_the_configs():
+    names = {yaml.safe_load(path.read_text("utf-8"))["name"] for path in (ROOT / "configs").glob("*.yaml")}
+    assert "arm" not in names
+
+
+def test_the_finding_that_it_shows_is_real(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = next(text for kind, text in BLOCKS if kind == "yaml")
+    text, count = re.subn(r'  u: \["-J.*"\]', '  u: ["m*g*l*sin(0.6*sin(t))"]', text)
+    assert count == 1
+    Path("arm.yaml").write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(app, ["check", "arm.yaml", "--no-cache", "--format", "text"])
+    shown = TUTORIAL.split("it would have said\n\n")[1].split("\n\n")[0]
+    expected = [line[4:] for line in shown.splitlines()]
+    assert [shape(line) for line in expected] == [
+        shape(line) for line in result.stdout.splitlines()[: len(expected)]
+    ]

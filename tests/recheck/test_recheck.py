@@ -1,0 +1,358 @@
+"""Recheck: shipped certificates are confirmed; changed ones, and those of a broken producer, are not."""
+
+import copy
+import hashlib
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+import tampers
+from flint import ctx
+from typer.testing import CliRunner
+
+import tubecert.bounds.start
+import tubecert.conditions.derived
+import tubecert.conditions.kernels
+import tubecert.conditions.rates
+import tubecert.enclosure.interval
+import tubecert.expression.graph
+import tubecert.model
+from tubecert import certificate, pipeline, spec
+from tubecert.cli.app import app
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.model import ControlAffineModel
+from tubecert.recheck.claims import Case
+from tubecert.recheck.constants import OVER_TUBE, bounded
+from tubecert.recheck.document import read
+from tubecert.recheck.run import recheck
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*state*.yaml"))
+THREE = next(path for path in CONFIGS if path.stem == "three_state")
+TWO = next(path for path in CONFIGS if path.stem == "two_state")
+
+
+def written(result):
+    """A result as the certificate that a reader finds."""
+    return json.loads(certificate.dump(certificate.seal(result, {})))
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    """Certificates of the shipped configurations, made once."""
+    made = {}
+
+    def of(path):
+        if path not in made:
+            made[path] = written(pipeline.certify(spec.load(path), pipeline.Options(conditions="all")))
+        return copy.deepcopy(made[path])
+
+    return of
+
+
+def sealed(changed):
+    """The hash made right again."""
+    text = json.dumps(changed["result"], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return {**changed, "hash": "sha256:" + hashlib.sha256(text.encode()).hexdigest()}
+
+
+def examine(document, budget=20_000, memory=None):
+    return recheck(json.dumps(document), "certificate", budget, memory=memory)
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_a_shipped_certificate_is_confirmed(shipped, path):
+    found = examine(shipped(path))
+    assert [claim for claim in found.claims if not claim.outcome.holds] == []
+    assert found.exit_code == ExitCode.CERTIFIED
+    assert len(found.claims) > 45
+
+
+@pytest.mark.parametrize("path", CONFIGS[:3], ids=lambda path: path.stem)
+def test_the_bounds_of_both_arithmetics_agree_within_the_gap(shipped, path):
+    """Above: confirmed (the test before). A bound a little below the producer's `below` is never confirmed."""
+    case = Case(read(json.dumps(shipped(path)), "certificate")["result"], 400)
+    constants = case.result["constants"]
+    refuted = 0
+    with ctx.workprec(64):
+        for name in OVER_TUBE:
+            side = "above" if name in ("lower", "input_gain_least") else "below"
+            value = constants[name][side].number()
+            if value <= 0:
+                continue
+            within = value * Fraction(1001 if side == "above" else 999, 1000)
+            outcome = bounded(case.place, name, within, Fraction(5))
+            assert not outcome.holds, name
+            refuted += outcome.verdict == "contradicted"
+    assert refuted >= 10
+
+
+@pytest.mark.parametrize(("path", "count"), [(THREE, 150), (TWO, 40)], ids=["three_state", "two_state"])
+def test_a_changed_field_is_never_confirmed_unless_it_is_harmless(shipped, path, count):
+    refused, accepted, wrong = tampers.campaign(shipped(path), count, seed=7)
+    assert wrong == []
+    assert refused > count / 3
+    assert accepted  # harmless changes are not refused
+
+
+def test_every_constant_that_is_understated_is_named(shipped):
+    document, memory = shipped(THREE), {}
+    examine(document, memory=memory)
+    for name, entry in document["result"]["constants"].items():
+        side, factor = ("below", 1.05) if name in ("lower", "input_gain_least") else ("above", 0.95)
+        if not entry[side] or name == "zeta_3":
+            continue
+        changed = copy.deepcopy(document)
+        changed["result"]["constants"][name][side] *= factor
+        found = examine(sealed(changed), 2_000, memory)
+        failing = [claim.name for claim in found.claims if not claim.outcome.holds]
+        assert any(name in claim or claim == "A: derived constants" for claim in failing), name
+        assert found.exit_code == ExitCode.NOT_CERTIFIED, name
+
+
+def test_a_change_without_the_hash_is_contradicted(shipped):
+    document = shipped(THREE)
+    document["result"]["reasons"][0]["message"] = "trust me"
+    assert examine(document).failing.name == "the hash is that of the result"
+
+
+# -- planted bugs ------------------------------------------------------------------------------------------------
+
+
+def half_slope(e, d):
+    return true_slope(e, d) * Fraction(1, 2) if e.op == "sin" else true_slope(e, d)
+
+
+def narrow_sine(x):
+    value = true_sine(x)
+    return tubecert.enclosure.interval.Interval(value.lo * 0.9, value.hi * 0.9)
+
+
+def half_filter_error(problem, n, terms, omega, p):
+    gain = n.DBpx * terms.speed + (omega + p.norm) * n.DBp
+    return gain * tubecert.conditions.derived.prediction_error(terms.hs, terms.s1, p.q)
+
+
+def small_kernel(c, w, s0, s1):
+    return true_kernel(c, w, s0, s1) * 0.9
+
+
+def small_supremum(D):
+    return true_supremum(D) * 0.97
+
+
+def short_segment(self, suprema, metric):
+    found = true_segment(self, suprema, metric)
+    return type(found)(below=found.below * 0.9, above=found.above * 0.9)
+
+
+def without_rate(self):
+    return self.drift_form
+
+
+true_slope = tubecert.expression.graph._slope
+true_sine = tubecert.enclosure.interval.sin
+true_kernel = tubecert.conditions.derived.tight_kernel
+true_supremum = tubecert.conditions.kernels._supremum
+true_segment = tubecert.bounds.start.KnownStart.distance
+
+BUGS = {
+    "derivative of sin": (tubecert.expression.graph, "_slope", half_slope, "h_t"),
+    "interval sine": (tubecert.enclosure.interval, "sin", narrow_sine, "h"),
+    "filter error": (tubecert.conditions.rates, "filter_error", half_filter_error, "A: derived"),
+    "kernel J": (tubecert.conditions.derived, "tight_kernel", small_kernel, "A: derived"),
+    "sup D": (tubecert.conditions.kernels, "_supremum", small_supremum, "A: ultimate|B: sup D"),
+    "length of the segment": (
+        tubecert.bounds.start.KnownStart,
+        "distance",
+        short_segment,
+        "initial_distance",
+    ),
+    "F without the rate": (ControlAffineModel, "F", property(without_rate), "feedback_gain"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
+    place, name, broken, claims = BUGS[bug]
+    system = spec.load(THREE)
+    with monkeypatch.context() as patch:
+        patch.setattr(place, name, broken)
+        result = pipeline.certify(system, pipeline.Options(conditions="all"))
+    assert result["verdict"] == "certified", "the bug must pass the producer to be of interest"
+    found = examine(written(result), 5_000)
+    assert found.exit_code != ExitCode.CERTIFIED
+    failing = [claim.name for claim in found.claims if not claim.outcome.holds]
+    assert any(part in claim for part in claims.split("|") for claim in failing), failing
+
+
+# -- documents ---------------------------------------------------------------------------------------------------
+
+
+def code_of(text):
+    with pytest.raises(TubecertError) as raised:
+        recheck(text, "file.json")
+    assert raised.value.exit_code == ExitCode.INVALID
+    return raised.value.findings[0].code
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", "TC600"),
+        ("{", "TC600"),
+        ('{"format": "tubecert-certificate/1", "format": "x"}', "TC600"),
+        ('{"format": NaN}', "TC600"),
+        ('{"x": 1e999}', "TC600"),
+        ("[" * 100_000, "TC600"),
+        ('{"x": ' + "9" * 10_000 + "}", "TC600"),
+        ("{}", "TC601"),
+        ("[]", "TC601"),
+        ('"tubecert-certificate/1"', "TC601"),
+        ('{"format": "tubecert-certificate/2"}', "TC602"),
+        ('{"format": "tubecert-certificate/999999999999999999999999"}', "TC602"),
+        ('{"format": "tubecert-certificate/1"}', "TC603"),
+        (
+            '{"format": "tubecert-certificate/1", "run": {}, "hash": "x", "result": {"verdict": "maybe"}}',
+            "TC603",
+        ),
+        (
+            '{"format": "tubecert-certificate/1", "run": {}, "hash": "x", "result": {"verdict": "certified"}}',
+            "TC603",
+        ),
+    ],
+)
+def test_what_is_no_certificate_is_named(text, code):
+    assert code_of(text) == code
+
+
+def consistently(document, change):
+    """The specification inside a certificate changed, with everything that repeats it, and both hashes."""
+    effective = document["result"]["spec"]["effective"]
+    change(effective)
+    document["result"]["metric"]["dual_metric"] = effective["metric"]["dual_metric"]
+    text = json.dumps(effective, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    document["result"]["spec"]["effective_hash"] = "sha256:" + hashlib.sha256(text.encode()).hexdigest()
+    return sealed(document)
+
+
+def louder(effective):
+    effective["uncertainty"]["h"] = ["0.11*sin(2*t)"]
+
+
+def faster(effective):
+    effective["system"]["f"][0] = "x3 - 0.9*x1"
+
+
+def longer(effective):
+    effective["initial_state"]["at"] = ["0.011", "-0.01", "0.01"]
+
+
+def other_metric(effective):
+    effective["metric"]["dual_metric"][0][0] = "0.2"
+
+
+@pytest.mark.parametrize(
+    ("change", "claim"),
+    [(louder, "h <="), (faster, "C2"), (longer, "rho ="), (other_metric, "C")],
+    ids=["uncertainty", "dynamics", "start", "metric"],
+)
+def test_a_certificate_forged_for_another_system_fails_by_name(shipped, change, claim):
+    found = examine(consistently(shipped(THREE), change), 5_000)
+    assert found.exit_code == ExitCode.NOT_CERTIFIED
+    assert claim in found.failing.name
+
+
+def test_another_metric_in_the_section_alone_is_named(shipped):
+    document = shipped(THREE)
+    document["result"]["metric"]["dual_metric"][0][0] = "0.20366"
+    assert "dual_metric" in examine(sealed(document), 100).failing.outcome.why
+
+
+def test_a_refuted_metric_is_confirmed_at_its_witness():
+    text = THREE.read_text(encoding="utf-8").replace("rate: 0.9999", "rate: 1")
+    result = pipeline.certify(spec.load_text(text, "faster.yaml"), pipeline.Options())
+    assert result["verdict"] == "refuted"
+    found = examine(written(result))
+    assert found.exit_code == ExitCode.NOT_CERTIFIED
+    assert found.failing is None
+    result["reasons"][0]["at"]["x"] = [0.0, 0.0, 0.0]
+    assert examine(written(result)).failing is not None
+    result["verdict"] = "certified"
+    with pytest.raises(TubecertError):
+        examine(written(result))
+
+
+def test_as_printed_formulas_never_certify():
+    options = pipeline.Options(formulas="as-printed")
+    result = pipeline.certify(spec.load(THREE), options)
+    assert examine(written(result)).exit_code == ExitCode.UNDECIDED
+    result["verdict"] = "certified"
+    assert examine(written(result), 2_000).exit_code == ExitCode.NOT_CERTIFIED
+
+
+# -- the command -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def certified(shipped, tmp_path):
+    path = tmp_path / "three_state.certificate.json"
+    path.write_text(json.dumps(shipped(THREE)), encoding="utf-8")
+    return path
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ["recheck", *map(str, arguments)])
+
+
+def test_the_command_confirms_and_says_so(certified):
+    done = command(certified, "--spec", THREE)
+    assert done.exit_code == 0
+    assert done.stdout.startswith(f"confirmed {certified}: the certificate says certified\n")
+    assert f"belongs to {THREE}\n" in done.stdout
+    assert "feedback_gain <=" in done.stdout
+    assert command(certified, "-q").stdout.count("\n") == 1
+
+
+def test_the_command_answers_in_json(certified):
+    data = json.loads(command(certified, "--json").stdout)
+    assert data["verdict"] == "confirmed"
+    assert data["first_failing"] is None
+    assert {claim["verdict"] for claim in data["claims"]} == {"confirmed"}
+
+
+def test_another_specification_is_a_named_error(certified):
+    done = command(certified, "--spec", TWO)
+    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert "TC604" in done.stderr
+    assert "system" in done.stderr
+
+
+def test_a_comment_in_the_specification_changes_its_text_only(certified, tmp_path):
+    other = tmp_path / "commented.yaml"
+    other.write_text("# mine\n" + THREE.read_text(encoding="utf-8"), encoding="utf-8")
+    done = command(certified, "--spec", other, "-q")
+    assert done.exit_code == 0
+    assert "the text of the file has changed" in done.stdout
+
+
+def test_a_failing_claim_is_named_first(certified):
+    document = json.loads(certified.read_text(encoding="utf-8"))
+    document["result"]["constants"]["f_x"] |= {"below": 1.7, "above": 1.8}
+    certified.write_text(json.dumps(sealed(document)), encoding="utf-8")
+    done = command(certified)
+    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert done.stdout.splitlines()[1].startswith("  first failing claim: f_x <= 1.8: false at x1 = ")
+
+
+def test_a_small_budget_is_undecided(certified):
+    done = command(certified, "--budget", "3")
+    assert done.exit_code == ExitCode.UNDECIDED
+    assert "within 3 boxes" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["nothing.json", "."])
+def test_an_unreadable_file_is_one_clear_error(name):
+    done = command(name)
+    assert done.exit_code == ExitCode.INVALID
+    assert "TC600" in done.stderr

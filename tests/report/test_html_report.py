@@ -1,0 +1,811 @@
+"""Pages from certificates: what they say, that no text can break them, and how a browser shows them."""
+
+import copy
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import certificates
+import pages
+import pytest
+import sympy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from tubecert import certificate, pipeline
+from tubecert.cli.app import app
+from tubecert.conditions.rates import RateRecipe, margins_26
+from tubecert.expression import to_text
+from tubecert.pipeline import Options, certify, gains
+from tubecert.report import html, markdown
+from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
+from tubecert.report.figures_tube import Plane
+from tubecert.report.numbers import percent, up
+from tubecert.report.page_sections import page_of
+from tubecert.spec import load, load_text
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ROOT / "configs"
+ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
+MADE = {
+    "certified": certificates.certified,
+    "refuted metric": certificates.refuted_metric,
+    "refuted gains": certificates.refuted_gains,
+    "undecided": certificates.undecided,
+}
+RUN = {
+    "command": "tubecert certify plant.yaml",
+    "started": "2026-01-02T03:04:05+00:00",
+    "seconds": 1.5,
+    "versions": {"tubecert": "0.1.0", "numpy": "2.4"},
+}
+
+
+def sealed(result):
+    return certificate.seal(result, RUN)
+
+
+@pytest.fixture(scope="module")
+def orbit():
+    """A real certificate with a plan that moves, an obstacle beside the tube, and units."""
+    text = ORBIT + "\nobstacles:\n  - {states: [x2, x1], disc: {center: [3, 3], radius: 1/2}}\n"
+    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()))))
+
+
+@pytest.fixture(scope="module")
+def problems():
+    """The problems for which margins were asked, as `regulated` comes into being."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def regulated(problems):
+    """A real certificate of three states at an equilibrium."""
+    original = gains.margins_26_around
+
+    def keep(problem, pair):
+        problems.append(problem)
+        return original(problem, pair)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gains, "margins_26_around", keep)
+        result = certify(load(str(CONFIGS / "three_state.yaml")), Options())
+    return json.loads(certificate.dump(sealed(result)))
+
+
+@pytest.fixture(scope="module")
+def outside():
+    """A real refusal with a witness: the tube leaves the safe set."""
+    text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8").replace("rho_a: 0.01", "rho_a: 0.09")
+    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()))))
+
+
+@pytest.fixture(params=["orbit", "regulated", "outside", *MADE])
+def any_certificate(request):
+    return sealed(MADE[request.param]()) if request.param in MADE else request.getfixturevalue(request.param)
+
+
+def parsed(certificate):
+    return pages.Page(html.render(certificate))
+
+
+# -- the page as a document
+
+
+def test_well_formed_with_unique_anchors_that_resolve(any_certificate):
+    page = parsed(any_certificate)
+    ids = page.values("id") + [x.get("id") for d in page.drawings for x in d.iter() if x.get("id")]
+    assert len(page.values("id")) == len(set(page.values("id"))), ids
+    used = {link.removeprefix("#") for link in page.values("href") if link.startswith("#")}
+    used |= {
+        m
+        for d in page.drawings
+        for x in d.iter()
+        for v in x.attrib.values()
+        for m in re.findall(r"url\(#(.*?)\)", v)
+    }
+    assert used
+    assert used <= set(ids)
+    assert page.tags.count("h1") == 1
+
+
+def test_nothing_is_loaded_and_nothing_runs(any_certificate):
+    source = html.render(any_certificate)
+    page = pages.Page(source)
+    assert not {"script", "iframe", "object", "embed", "img", "form"} & set(page.tags)
+    assert all(link.startswith(("#", "data:,")) for link in page.values("href") + page.values("src"))
+    assert not [name for name, _ in page.attributes if name.startswith("on")]
+    assert not re.search(r"@import|url\((?!#)", page.styles)
+    assert not re.search(r"(https?:)?//\w", source)
+    assert "default-src 'none'" in source
+
+
+def test_every_style_of_a_mark_is_in_the_style_sheet(orbit, outside, regulated):
+    for each in (orbit, outside, regulated):
+        page = parsed(each)
+        used = {name for d in page.drawings for x in d.iter() for name in x.get("class", "").split()}
+        known = set(re.findall(r"\.([a-z0-9-]+)", page.styles))
+        assert used - known <= {"start", "axis"}, "drawn as every dot and every text is"
+
+
+def test_the_same_certificate_gives_the_same_page_before_and_after_it_is_written(any_certificate):
+    read_back = json.loads(certificate.dump(any_certificate))
+    shuffled = {key: read_back[key] for key in reversed(read_back)}
+    shuffled["result"] = {key: read_back["result"][key] for key in reversed(read_back["result"])}
+    for render in (html.render, markdown.render):
+        assert render(any_certificate) == render(read_back) == render(shuffled)
+
+
+def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
+    file = tmp_path / "orbit.json"
+    file.write_text(certificate.dump(orbit), encoding="utf-8")
+    code = (
+        "import json, sys; from tubecert.report import html;"
+        "sys.stdout.buffer.write(html.render(json.load(open(sys.argv[1]))).encode())"
+    )
+    outputs = set()
+    for seed in ("0", "1234"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT), "TZ": f"UTC+{seed[0]}"}
+        command = [sys.executable, "-c", code, str(file)]
+        done = subprocess.run(command, capture_output=True, check=True, env=environment, timeout=60)
+        outputs.add(done.stdout)
+    assert outputs == {html.render(orbit).encode()}
+
+
+HOSTILE = st.text(
+    st.sampled_from("<>&\"'`|*_\\{}%#[]()-;=/ \n\taé\u202e") | st.characters(codec="utf-8"), max_size=12
+)
+
+
+def _planted(text):
+    """A certificate with a text of one's own wherever a text stands."""
+    result = certificates.refuted_gains()
+    effective = result["spec"]["effective"]
+    effective["name"] = text
+    effective["system"]["units"] = {"angle": text, "speed": "rad/s"}
+    effective["system"]["f"] = [text, "speed"]
+    effective["system"]["B"] = [["0"], [text]]
+    effective["uncertainty"] = {"h": [text]}
+    effective["trajectory"]["at"] = [text, "0"]
+    result["plan"]["samples"] = {"t": [0.0], "x": [[0.0, 0.0]]}
+    result["assumptions"] = [text, f"x {text}"]
+    result["reasons"][0] |= {"message": text, "relax": f"{text}!", "claim": text, "at": {"x": [0.1, 0.2]}}
+    result["constants"]["h"] |= {"symbol": text, "meaning": text, "unit": text, "equation": text}
+    result["elasticities"] = {"conditions_26": {"h": 1.5, "lower": -2.0}, "distance": {}}
+    result["metric"]["dual_metric"] = [[text, "0"], ["0", "1"]]
+    return certificate.seal(result, {**RUN, "command": text, "versions": {text or "a": text}})
+
+
+@settings(deadline=None, max_examples=60)
+@given(HOSTILE)
+def test_no_text_becomes_markup(text):
+    text = "".join(c for c in text if c.isprintable() or c in "\n\t")
+    benign, hostile = parsed(_planted("plain")), parsed(_planted(text))
+    assert hostile.tags.count("script") == 0
+    differing = set(hostile.tags) ^ set(benign.tags)
+    assert not differing
+    assert [n for n, _ in hostile.attributes if n.startswith("on")] == []
+    shown = " ".join(f"x {text}".split())
+    assert shown.replace("<=", "≤").replace(">=", "≥") in hostile.text
+
+
+def test_scripts_in_texts_are_shown_as_texts():
+    page = parsed(_planted("<script>alert(1)</script>"))
+    assert page.text.count("<script>alert(1)</script>") > 10
+    assert any("<script>" in (x.text or "") for d in page.drawings for x in d.iter()), "units label the axes"
+
+
+# -- what it says
+
+
+def test_verdict_gains_margins(regulated):
+    page = parsed(regulated)
+    rates = regulated["result"]["conditions_26"]
+    assert page.text.startswith("certified: three_state tubecert certificate three_state certified")
+    for value in (rates["bandwidth"], regulated["result"]["sampled"]["sample_time"]):
+        assert str(value) in page.text
+    assert up(rates["adaptation_rate"]) in page.text
+    assert percent(rates["margins"]["26a"]) in page.text
+
+
+def test_every_constant_with_symbol_meaning_equation_value_and_place(orbit):
+    text = parsed(orbit).text
+    constants = orbit["result"]["constants"]
+    assert len(constants) > 30
+    for item in constants.values():
+        for what in ("symbol", "meaning", "equation"):
+            assert item[what] in text
+    at = constants["f"]["at"]
+    assert f"at t = {at['t']:.6g} s, x1 = {at['x'][0]:.6g}" in text
+
+
+def test_bounds_are_rounded_to_the_side_that_stays_true(orbit):
+    (table,) = (
+        block
+        for section in page_of(orbit).sections
+        if section.key == "constants"
+        for block in section.blocks
+        if block.block == "table"
+    )
+    by_symbol = {item["symbol"]: item for item in orbit["result"]["constants"].values()}
+    for symbol, _, proven, *_ in table.rows:
+        sign, value = proven.text.split()
+        item = by_symbol[symbol.text]
+        if sign == "<=":
+            assert Fraction(value) >= Fraction(repr(item["above"]))
+        else:
+            assert Fraction(value) <= Fraction(repr(item["below"]))
+
+
+def test_proven_declared_assumed_are_kept_apart(any_certificate):
+    (section,) = (s for s in page_of(any_certificate).sections if s.key == "rests-on")
+    proven, declared, assumed = section.blocks
+    result = any_certificate["result"]
+    assert assumed.items == tuple(result["assumptions"])
+    assert declared.items == ("nothing",)
+    claims = [item for item in proven.items if item.startswith(("A (26)", "B distance", "C sampled"))]
+    holding = [
+        k for k in ("conditions_26", "distance", "sampled") if result.get(k, {}).get("verdict") == "certified"
+    ]
+    assert len(claims) == len(holding)
+    assert any("C2" in item for item in proven.items) == (result["metric"]["verdict"] == "certified")
+
+
+def test_declared_bounds_are_called_believed():
+    (section,) = (
+        s
+        for s in page_of(sealed(certificates.certified(declared={"h": 0.25}))).sections
+        if s.key == "rests-on"
+    )
+    assert section.blocks[1].items == ("|h| <= 0.25 on the tube",)
+
+
+def test_printed_formulas_prove_nothing_about_the_gains():
+    result = certificates.certified(verdict="undecided", formulas="as-printed")
+    result["reasons"][0] |= {"verdict": "undecided"}
+    page = page_of(sealed(result))
+    (section,) = (s for s in page.sections if s.key == "rests-on")
+    assert not [item for item in section.blocks[0].items if item.startswith(("A ", "B distance", "C "))]
+    assert page.tiles == ()
+
+
+def test_what_is_not_certified_has_no_numbers_to_rely_on_and_shows_its_witness(outside):
+    page = page_of(outside)
+    assert page.verdict == "refuted"
+    assert page.tiles == ()
+    parsed_page = parsed(outside)
+    at = outside["result"]["reasons"][0]["at"]
+    assert f"x1 = {at['x'][0]:.6g}" in parsed_page.text
+    witnesses = [x for d in parsed_page.drawings for x in d.iter("circle") if "witness" in x.get("class")]
+    assert len(witnesses) == 3, "one per plane"
+    assert "not proven to stay in the safe set" in parsed_page.text
+    assert "certified" not in re.sub(
+        "Not certified|is certified|tubecert certif", "", parsed_page.text.split("Metric")[0]
+    )
+
+
+def test_undecided_is_never_shown_as_another_verdict():
+    page = parsed(sealed(certificates.undecided()))
+    assert page.text.startswith("undecided: pendulum")
+    assert "neither proven nor refuted" in page.text
+
+
+def test_provenance_and_how_to_check(any_certificate):
+    text = parsed(any_certificate).text
+    for word in (any_certificate["hash"], RUN["command"], "numpy 2.4", RUN["started"], "tubecert recheck"):
+        assert word in text
+
+
+# -- figures
+
+
+def figure(page_certificate, key):
+    found = [
+        f
+        for section in page_of(page_certificate).sections
+        for block in section.blocks
+        if block.block == "figures"
+        for f in block.figures
+        if f.key == key
+    ]
+    return found[0] if found else None
+
+
+def test_which_figures_there_are(orbit, regulated, outside):
+    def keys(page_certificate):
+        return {
+            f.key
+            for section in page_of(page_certificate).sections
+            for block in section.blocks
+            if block.block == "figures"
+            for f in block.figures
+        }
+
+    gains = {"trade-off", "sample-time", "margins-a", "margins-b", "elasticities"}
+    assert keys(orbit) == gains | {"tube-0-1", "suprema-0-1"}
+    assert keys(regulated) == gains | {f"{w}-{p}" for w in ("tube", "suprema") for p in ("0-1", "0-2", "1-2")}
+    assert keys(outside) == {"tube-0-1", "tube-0-2", "tube-1-2"}
+
+
+def test_the_tube_is_drawn_in_its_true_size(orbit):
+    drawing = pages.ET.fromstring(figure(orbit, "tube-0-1").svg)
+    (sweep,) = (x for x in drawing.iter("path") if "sweep" in x.get("class", ""))
+    (plan,) = (x for x in drawing.iter("path") if "plan" in x.get("class", ""))
+    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
+    low, high = orbit["result"]["safe_set"]["x1"]
+    unit = float(safe.get("width")) / (high - low)  # viewport units per unit of x1
+    assert float(sweep.get("stroke-width")) / 2 == pytest.approx(
+        orbit["result"]["tube"]["rho"] * unit, rel=1e-2
+    )
+    points = [tuple(map(float, p.split())) for p in re.findall(r"[-\d.]+ [-\d.]+", plan.get("d"))]
+    x = [row[0] for row in orbit["result"]["plan"]["samples"]["x"]]
+    assert len(points) == len(x)
+    for place, value in zip(points, x, strict=True):
+        assert place[0] == pytest.approx(float(safe.get("x")) + (value - low) * unit, abs=0.02)
+
+
+def test_an_obstacle_lies_where_it_is_whatever_the_order_of_its_states(orbit):
+    drawing = pages.ET.fromstring(figure(orbit, "tube-0-1").svg)
+    (disc,) = (x for x in drawing.iter("ellipse") if x.get("class") == "obstacle")
+    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
+    low, high = orbit["result"]["safe_set"]["x1"]
+    unit = float(safe.get("width")) / (high - low)
+    assert float(disc.get("cx")) == pytest.approx(float(safe.get("x")) + (3 - low) * unit, abs=0.02)
+    assert float(disc.get("rx")) == pytest.approx(unit / 2, abs=0.02)
+    assert ("obstacle", "obstacle") in figure(orbit, "tube-0-1").legend
+
+
+def test_chosen_pairs_lie_on_their_curves(regulated):
+    drawing = pages.ET.fromstring(figure(regulated, "trade-off").svg)
+    curves = {
+        x.get("class").split()[1]: x.get("d") for x in drawing.iter("path") if "curve" in x.get("class", "")
+    }
+    dots = [x for x in drawing.iter("circle") if "dot" in x.get("class", "")]
+    assert sorted(x.get("class").split()[1] for x in dots) == ["a", "a", "b", "b"]
+    for dot in dots:
+        curve = [
+            tuple(map(float, p.split()))
+            for p in re.findall(r"[-\d.]+ [-\d.]+", curves[dot.get("class").split()[1]])
+        ]
+        here = float(dot.get("cx")), float(dot.get("cy"))
+        assert min(math.dist(p, here) for p in curve) < 25
+    assert sum("decides" in x.get("class") for x in dots) == 1
+
+
+def test_numbers_in_the_figures_of_suprema_are_explained(orbit):
+    (section,) = (s for s in page_of(orbit).sections if s.key == "constants")
+    (block,) = (b for b in section.blocks if b.block == "figures")
+    told = " ".join(block.places)
+    for name, item in orbit["result"]["constants"].items():
+        if item.get("at") and item["above"]:
+            assert item["symbol"] in told, name
+    shown = {
+        n
+        for x in pages.ET.fromstring(block.figures[0].svg).iter("text")
+        if "badge" in x.get("class", "")
+        for n in x.text.rstrip("+").split(",")
+    }
+    assert shown <= {str(i + 1) for i in range(len(block.places))}
+
+
+def test_one_state_is_drawn_against_time():
+    result = certificates.certified()
+    result["spec"]["effective"]["system"]["states"] = ["angle"]
+    result["tube"]["half_widths"] = {"angle": 0.03}
+    result["plan"]["samples"] = {"t": [0.0], "x": [[0.0]]}
+    result["constants"] = {}
+    assert figure(sealed(result), "tube-0").title == "angle over time"
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6), st.booleans())
+def test_ticks_are_round_and_inside(low, width, log):
+    low = abs(low) + 1e-9 if log else low
+    axis = Axis(label="", low=low, high=low + width + 1e-6 * abs(low), log=log)
+    ticks = axis.ticks()
+    assert 2 <= len(ticks) <= 12
+    assert ticks == sorted(set(ticks))
+    for value in ticks:
+        assert -1e-6 <= axis.share(value) <= 1 + 1e-6
+
+
+_coordinates = st.integers(-20, 20).map(float)
+_points = st.tuples(_coordinates, _coordinates)
+
+
+@given(_points, _points, st.tuples(st.integers(1, 5).map(float), st.integers(1, 5).map(float)))
+def test_the_hull_of_two_rectangles(one, other, sides):
+    hull = _hexagon(one, other, sides)
+    edges = list(zip(hull, hull[1:] + hull[:1], strict=True))
+    corners = [
+        (x + a * sides[0], y + b * sides[1]) for x, y in (one, other) for a in (-1, 1) for b in (-1, 1)
+    ]
+    assert set(hull) <= set(corners)
+    for (x0, y0), (x1, y1) in edges:
+        turns = [(x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) for x, y in corners]
+        assert min(turns) >= 0, (
+            "every corner lies to the left of every edge: convex, positively oriented, complete"
+        )
+
+
+@given(st.floats(-1e5, 1e5))
+def test_numbers_of_drawings(value):
+    text = number(value)
+    assert re.fullmatch(r"-?\d+(\.\d{1,2})?", text)
+    assert abs(float(text) - value) <= 0.005001
+    assert text != "-0"
+
+
+def test_texts_of_drawings_are_escaped():
+    chart = Chart("k", "<&>", Axis(label="</svg>", low=0, high=1), Axis(label="&amp;", low=0, high=1))
+    assert "".join(pages.ET.fromstring(chart.text()).itertext()).count("</svg>") == 1
+
+
+# -- what the certificate holds for the figures
+
+
+def test_samples_lie_on_the_plan(orbit):
+    samples = orbit["result"]["plan"]["samples"]
+    horizon = float(orbit["result"]["spec"]["effective"]["trajectory"]["horizon"])
+    assert samples["t"][0] == 0
+    assert samples["t"][-1] == pytest.approx(horizon)
+    spec = load_text(ORBIT)
+    for i, term in enumerate(spec.trajectory.x):
+        curve = sympy.lambdify("t", sympy.parse_expr(to_text(term.expression)), "math")
+        for t, row in zip(samples["t"][::20], samples["x"][::20], strict=True):
+            assert row[i] == pytest.approx(curve(t), abs=1e-5)
+
+
+def test_margins_around_are_those_of_each_bandwidth(regulated):
+    data = regulated["result"]["conditions_26"]
+    around = data["margins_around"]
+    here = around["bandwidth"].index(data["bandwidth"])
+    for claim in ("26a", "26b", "26c"):
+        assert around[claim][here] == pytest.approx(data["margins"][claim][0], abs=1e-9)
+    rising, falling = around["26a"], around["26c"]
+    assert rising == sorted(rising)
+    assert falling == sorted(falling, reverse=True)
+    assert around["bandwidth"] == sorted(around["bandwidth"])
+    distance = regulated["result"]["distance"]
+    pair, around = distance["least_adaptation"], distance["margins_around"]
+    here = around["bandwidth"].index(pair["bandwidth"])
+    assert around["margin"][here] == pytest.approx(pair["margin"][0], abs=1e-6)
+    assert max(v for v in around["margin"] if v is not None) < 0.01, (
+        "the least rate leaves next to nothing anywhere"
+    )
+
+
+def test_a_margin_around_is_the_margin_of_those_gains(regulated, problems):
+    data = regulated["result"]["conditions_26"]["margins_around"]
+    recipe = regulated["result"]["proof"]["conditions_26"]
+    for i in (0, 17, 40):
+        gain = recipe["predictor_gain"]
+        margins = margins_26(
+            problems[0],
+            RateRecipe(
+                bandwidth=Fraction(str(data["bandwidth"][i])),
+                adaptation_rate=Fraction(str(data["adaptation_rate"])),
+                predictor_gain=None if gain is None else Fraction(str(gain)),
+                projection_radius=Fraction(str(recipe["projection_radius"])),
+            ),
+        )
+        for claim, margin in margins.items():
+            assert data[claim][i] <= float(margin.lo)
+            assert data[claim][i] == pytest.approx(float(margin.lo), rel=1e-8, abs=1e-9)
+
+
+# -- Markdown
+
+
+def test_markdown_says_the_same(any_certificate):
+    text = markdown.render(any_certificate)
+    plain = text.replace("\\", "")
+    result = any_certificate["result"]
+    assert text.startswith(f"# {markdown.escape(result['spec']['effective']['name'])}: {result['verdict']}\n")
+    assert any_certificate["hash"] in plain
+    for item in result["assumptions"]:
+        assert item.replace("<=", "≤").replace(">=", "≥") in plain
+    assert "<svg" not in text
+
+
+@settings(deadline=None, max_examples=60)
+@given(HOSTILE)
+def test_markdown_tables_keep_their_columns(text):
+    lines = markdown.render(_planted(text)).splitlines()
+    width = None
+    for line in lines:
+        if line.startswith("| "):
+            cells = len(re.findall(r"(?<!\\)\|", re.sub(r"\\\\", "", line)))
+            assert width in (None, cells), line
+            width = cells
+        else:
+            width = None
+    assert sum(line.startswith("# ") for line in lines) == 1
+
+
+# -- the command line
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    Path("plant.yaml").write_text(
+        (CONFIGS / "three_state.yaml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    return work
+
+
+@pytest.fixture
+def proven(monkeypatch):
+    calls = []
+
+    def answer(spec, options, progress=None):
+        calls.append(spec)
+        return certificates.certified()
+
+    monkeypatch.setattr(pipeline, "certify", answer)
+    return calls
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, list(map(str, arguments)), prog_name="tubecert")
+
+
+def test_certify_writes_pages_beside_the_certificate(folder, proven):
+    done = run("certify", "plant.yaml", "--report", "a.html", "--report", "b.md")
+    assert done.exit_code == 0, done.output
+    assert "page a.html" in done.output
+    written = json.loads(Path("plant.certificate.json").read_text(encoding="utf-8"))
+    assert Path("a.html").read_text(encoding="utf-8") == html.render(written)
+    assert Path("b.md").read_text(encoding="utf-8") == markdown.render(written)
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "a.html",
+        "b.md",
+        "plant.certificate.json",
+        "plant.yaml",
+    ]
+
+
+def test_a_page_goes_well_with_the_certificate_on_stdout(folder, proven):
+    done = CliRunner().invoke(app, ["certify", "plant.yaml", "-o", "-", "--report", "a.htm"])
+    assert json.loads(done.stdout)["result"]["verdict"] == "certified"
+    assert Path("a.htm").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--report", "a.pdf"], "HTML or Markdown"),
+        (["--report", "-"], "HTML or Markdown"),
+        (["--report", "none/a.html"], "no folder none"),
+        (["--report", "sub.html"], "it is a folder"),
+        (["--report", "a.html", "-o", "a.html"], "the certificate itself"),
+        (["--report", "./sub.html/../a.html", "-o", "a.html"], "the certificate itself"),
+        (["--report", "link.md"], "the specification itself"),
+        (["--report", "a.html", "--report", "a.html"], "the page a.html itself"),
+    ],
+)
+def test_bad_targets_are_errors_before_any_work(folder, proven, arguments, words):
+    (folder / "sub.html").mkdir()
+    (folder / "link.md").symlink_to("plant.yaml")
+    before = Path("plant.yaml").read_text(encoding="utf-8")
+    done = run("certify", "plant.yaml", *arguments)
+    assert done.exit_code == 2
+    assert "error TC120" in done.output
+    assert words in " ".join(done.output.split())
+    assert done.output.count("error") >= 1
+    assert not proven, "nothing was certified"
+    assert Path("plant.yaml").read_text(encoding="utf-8") == before
+    assert not list(folder.glob("*.json"))
+
+
+def test_report_makes_the_page_that_certify_makes(folder, proven):
+    run("certify", "plant.yaml", "--report", "a.html")
+    proven.clear()
+    done = run("report", "plant.certificate.json", "-o", "b.html", "-o", "c.md")
+    assert done.exit_code == 0, done.output
+    assert done.output == "page b.html\npage c.md\n"
+    assert Path("a.html").read_bytes() == Path("b.html").read_bytes()
+    assert run("report", "plant.certificate.json").output == "page plant.html\n"
+    assert json.loads(run("report", "plant.certificate.json", "--json").output) == {"pages": ["plant.html"]}
+    assert run("report", "plant.certificate.json", "-q").output == ""
+    assert not proven
+
+
+def _tampered(change):
+    data = copy.deepcopy(sealed(certificates.certified()))
+    change(data)
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (_tampered(lambda d: d["result"]["tube"].update(rho=0.001)), "its hash is not that of its result"),
+        (
+            _tampered(lambda d: d.update(format="tubecert-certificate/2")),
+            "its format is 'tubecert-certificate/2'",
+        ),
+        (_tampered(lambda d: d.pop("result")), "it is JSON, but no certificate"),
+        ("[]", "it is JSON, but no certificate"),
+        ("{", "it is not JSON (line 1"),
+        ("", "it is not JSON"),
+        ('{"result": {"a": NaN}, "format": "tubecert-certificate/1"}', "it holds NaN"),
+        ("[" * 100_000, "it is nested too deeply"),
+        ("\x00", "it is not JSON"),
+    ],
+)
+def test_what_is_no_certificate_is_refused(folder, text, words):
+    Path("c.json").write_text(text, encoding="utf-8")
+    done = run("report", "c.json", "-o", "c.html")
+    assert done.exit_code == 2
+    assert done.output.startswith("error TC121: c.json")
+    assert words in " ".join(done.output.split())
+    assert not Path("c.html").exists()
+
+
+def test_a_certificate_that_is_not_there_or_no_text(folder):
+    assert run("report", "none.json").exit_code == 2
+    assert run("report", ".").exit_code == 2
+    Path("c.json").write_bytes(b"\xff\xfe")
+    assert "it is not UTF-8" in run("report", "c.json").output
+
+
+@pytest.mark.parametrize("key", ["verdict", "spec", "safe_set", "plan", "reasons", "assumptions", "formulas"])
+@pytest.mark.parametrize("value", [None, "absent", 7, [], {}, "text"])
+def test_a_sealed_result_that_lacks_something_is_an_error_and_no_traceback(folder, key, value):
+    result = certificates.certified()
+    if value == "absent":
+        del result[key]
+    else:
+        result[key] = value
+    Path("c.json").write_text(json.dumps(sealed(result)), encoding="utf-8")
+    done = run("report", "c.json", "-o", "c.html")
+    assert done.exit_code in (0, 2), done.output
+    assert "internal" not in done.output
+    assert done.exit_code == 2 or key in {"plan", "reasons", "assumptions", "formulas", "safe_set"}
+    assert Path("c.html").exists() == (done.exit_code == 0)
+
+
+def test_report_never_overwrites_the_certificate(folder):
+    Path("c.html").write_text(json.dumps(sealed(certificates.certified())), encoding="utf-8")
+    before = Path("c.html").read_bytes()
+    done = run("report", "c.html", "-o", "c.html")
+    assert done.exit_code == 2
+    assert "the certificate itself" in done.output
+    assert Path("c.html").read_bytes() == before
+
+
+# -- in a browser
+
+needs_browser = pytest.mark.skipif(
+    pages.browser() is None, reason=f"no browser on PATH (one of {', '.join(pages.BROWSERS)})"
+)
+
+
+@pytest.fixture
+def shown(tmp_path, orbit, regulated, outside):
+    """Pages as files."""
+    written = {}
+    for name, each in {"orbit": orbit, "regulated": regulated, "outside": outside}.items():
+        written[name] = tmp_path / f"{name}.html"
+        written[name].write_text(html.render(each), encoding="utf-8")
+    return written
+
+
+def _inside(inner, outer, slack=1.0):
+    return (
+        inner[0] >= outer[0] - slack
+        and inner[1] >= outer[1] - slack
+        and inner[2] <= outer[2] + slack
+        and inner[3] <= outer[3] + slack
+    )
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("name", "width", "dark"),
+    [("orbit", 360, False), ("orbit", 1280, True), ("regulated", 360, True), ("outside", 360, False)],
+)
+def test_layout_in_a_browser(shown, tmp_path, name, width, dark):
+    found = pages.measure(shown[name], tmp_path, width=width, dark=dark)
+    assert found["width"] == width
+    brightness = sum(map(int, re.findall(r"\d+", found["background"])[:3]))
+    assert brightness < 150 if dark else brightness > 600
+    assert found["scroll"] <= found["client"], "no horizontal scrolling"
+    assert len(found["figures"]) == len(re.findall("<figure ", shown[name].read_text(encoding="utf-8")))
+    for drawing in found["figures"]:
+        left, top, right, bottom = drawing["box"]
+        assert right - left > 0.75 * min(width, 400)
+        assert bottom - top > 120
+        for words, *box in drawing["texts"]:
+            assert _inside(box, drawing["box"]), f"{words!r} is cut"
+        assert all(box[2] > box[0] or box[3] > box[1] for box in drawing["marks"]), "a mark is not visible"
+    assert min(found["sizes"]) > 9, "ticks can be read"
+
+
+@needs_browser
+def test_layout_on_paper(shown, tmp_path):
+    sheet = 680  # A4 within its margins
+    found = pages.measure(pages.on_paper(shown["orbit"], tmp_path), tmp_path, width=sheet, dark=True)
+    assert sum(map(int, re.findall(r"\d+", found["background"])[:3])) == 3 * 255, (
+        "ink is not spent on a ground"
+    )
+    assert found["scroll"] <= found["client"], "nothing is cut at the right"
+    assert {position for _, position, _ in found["heads"]} == {"static"}, "tables keep their heads"
+    assert all(lines <= len(words.split()) for words, _, lines in found["heads"]), "no word is broken"
+    for drawing in found["figures"]:
+        assert drawing["box"][3] - drawing["box"][1] < 250, "a page holds more than one row"
+        assert all(_inside(box, drawing["box"]) for _, *box in drawing["texts"])
+    assert min(found["sizes"]) > 6, "ticks can be read"
+
+
+@needs_browser
+def test_the_browser_has_nothing_to_complain_about(shown, tmp_path):
+    assert pages.console_of(shown.values(), tmp_path) == []
+
+
+@needs_browser
+def test_the_console_test_would_notice(tmp_path):
+    broken = tmp_path / "broken.html"
+    broken.write_text(
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'"><script>1</script>'
+    )
+    assert pages.console_of([broken], tmp_path)
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "height", "dark"), [(1280, 4000, False), (390, 5000, True)])
+def test_screenshots(shown, tmp_path, width, height, dark):
+    image = pages.screenshot(shown["orbit"], tmp_path, width=width, height=height, dark=dark)
+    assert image.read_bytes().startswith(b"\x89PNG")
+    assert int.from_bytes(image.read_bytes()[16:20], "big") == width
+    assert image.stat().st_size > 100_000, "a blank page is smaller"
+
+
+def test_colours_have_contrast():
+    styles = parsed(sealed(certificates.certified())).styles
+    schemes = [
+        dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", part)) for part in styles.split("@media (prefers")[:2]
+    ]
+    schemes[1] = dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", styles.split("dark) {")[1].split("* {")[0]))
+    schemes[0] = dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", styles.split("@media")[0]))
+
+    def luminance(color):
+        parts = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+    def contrast(one, other):
+        a, b = sorted((luminance(one), luminance(other)))
+        return (b + 0.05) / (a + 0.05)
+
+    pairs = [("ink", "page"), ("ink", "panel"), ("soft", "page"), ("soft", "panel"), ("a", "page")]
+    pairs += [(word, ground) for word in ("good", "bad", "open") for ground in ("page", f"{word}-panel")]
+    for scheme in schemes:
+        for front, back in pairs:
+            assert contrast(scheme[front], scheme[back]) >= 4.5, (front, back)
+
+
+def test_a_tube_much_narrower_than_rho_can_be_seen():
+    plane = Plane(
+        names=("x", "y"),
+        units=("", ""),
+        index=(0, 1),
+        plan=((1.0, 2.0),),
+        rho=0.3,
+        sides=(1e-3, 0.3),
+        safe=((-10.0, -10.0), (10.0, 10.0)),
+    )
+    x, y = plane.axes([])
+    assert 0.99 < x.low < 0.999
+    assert 1.001 < x.high < 1.01
+    assert y.low < 1.7
+    assert y.high > 2.3

@@ -1,0 +1,471 @@
+"""The integrator against scipy's DOP853 on right-hand sides written here in numpy, and against its own orders."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tubecert.expression import constant, sin, symbol
+from tubecert.model import ControlAffineModel, build
+from tubecert.simulate.integrator import integrate, ladder, run
+from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.spec import load_text
+from tubecert.trajectory.plan import constant_plan
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+X, Y, T = symbol("x1"), symbol("x2"), symbol("t")
+W2 = np.array([[4.25828, -0.93423], [-0.93423, 3.76692]])
+RATE = 1.74
+
+
+def spec_model(name):
+    return build(load_text((CONFIGS / name).read_text(encoding="utf-8"), name))
+
+
+TWO = spec_model("two_state_orbit.yaml")
+PLAN = constant_plan([Fraction(0)] * 2, [Fraction(0)], None)
+
+
+def wavy_h():
+    return (2 * sin(2 * T) + Fraction(1, 10) * X,)
+
+
+def drift(x):
+    return np.array([-x[0] + 2 * x[1], -0.25 * x[1] ** 3 - 3 * x[0] + 4 * x[1]])
+
+
+B2 = np.array([[0.5], [-2.0]])
+
+
+def min_norm(x, M=None, B=B2, f=drift):
+    """The QP in closed form for the plan 0, written out independently (a constant metric, f(0) = 0)."""
+    M = np.linalg.inv(W2) if M is None else M
+    phi0 = 2 * x @ M @ f(x) + 2 * RATE * x @ M @ x
+    phi1 = 2 * B.T @ M @ x
+    return -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
+
+
+def h2(t, x):
+    return np.array([2 * np.sin(2 * t) + 0.1 * x[0]])
+
+
+def problem(controller, horizon=2.0, K=5, model=TWO, plan=PLAN, **options):
+    times = np.linspace(0, horizon, K)
+    return LoopProblem(model=model, plan=plan, controller=controller, horizon=horizon, times=times, **options)
+
+
+def projection(s, y, gains):
+    """Proj(s, y) of the theory, smooth or hard."""
+    if gains.smooth is not None:
+        nu, R = gains.smooth, gains.projection_radius
+        F = ((1 + nu) * s @ s - R**2) / (nu * R**2)
+        return y - F * s * (s @ y) / (s @ s) if F > 0 and y @ s > 0 else y
+    hit = s @ s >= gains.projection_radius**2 * (1 - 1e-12) and y @ s > 0
+    return y - s * (s @ y) / (s @ s) if hit else y
+
+
+def right_hand_side(controller, gains, h=h2):
+    """z' in numpy: z = (x, xtilde, sigma_hat, u_a) as far as the loop has them."""
+
+    def rate(t, z):
+        x = z[:2]
+        k, disturbance = min_norm(x), h(t, x)
+        if controller == "nominal":
+            return drift(x) + B2 @ k
+        if controller == "ccm":
+            return drift(x) + B2 @ (k + disturbance)
+        if controller == "reference":
+            u = z[2:]
+            return np.concatenate(
+                [drift(x) + B2 @ (k + u + disturbance), -gains.bandwidth * (u + disturbance)]
+            )
+        xt, s, u = z[2:4], z[4:5], z[5:6]
+        ds = gains.adaptation_rate * projection(s, -B2.T @ xt, gains)
+        return np.concatenate(
+            [
+                drift(x) + B2 @ (k + u + disturbance),
+                gains.A_m(2) @ xt + B2 @ (s - disturbance),
+                ds,
+                -gains.bandwidth * (u + s),
+            ]
+        )
+
+    return rate
+
+
+def dop853(rate, z0, t, tolerance=1e-11, **options):
+    done = solve_ivp(
+        rate, (t[0], t[-1]), z0, method="DOP853", t_eval=t, rtol=tolerance, atol=tolerance, **options
+    )
+    assert done.success
+    return done.y.T
+
+
+START = np.array([[0.4, -0.3]])
+SIZES = {"nominal": 0, "ccm": 0, "reference": 1, "l1": 4}
+
+
+@pytest.mark.parametrize("controller", SIZES)
+def test_loops_agree_with_dop853(controller):
+    gains = Gains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e4)
+    case = problem(controller, gains=gains)
+    z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
+    expected = dop853(right_hand_side(controller, gains), z0, case.times)
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
+    assert not found.failures
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert found.error[0] <= 1e-7
+    if controller == "l1":
+        assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-6
+        assert np.abs(found.sigma_hat[0] - expected[:, 4:5]).max() < 1e-4
+        assert np.abs(found.u_a[0] - expected[:, 5:6]).max() < 1e-5
+    size = [np.sqrt(x @ np.linalg.inv(W2) @ x) for x in found.x[0]]
+    assert np.allclose(found.distance[0], size, rtol=1e-12)
+
+
+def test_sharp_projection_agrees_with_dop853_between_its_switches():
+    """The radius is half of what h needs: the projection works for most of the time."""
+    gains = Gains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
+    case = problem("l1", gains=gains, K=41)
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
+    assert not found.failures
+    sizes = np.abs(found.sigma_hat)
+    assert sizes.max() <= 1.0 + 1e-12
+    assert (sizes > 1 - 1e-9).sum() > 5
+    expected = switching(gains, case.times)
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert np.abs(found.sigma_hat[0] - expected[:, 4:5]).max() < 1e-5
+
+
+def switching(gains, times):
+    """DOP853 with its own event location, one smooth mode after the other."""
+    R, free = gains.projection_radius, right_hand_side("l1", gains)
+
+    def stuck(t, z):
+        dz = free(t, z)
+        dz[4] = 0.0
+        return dz
+
+    def leaves(t, z):
+        return abs(z[4]) - R
+
+    def returns(t, z):
+        return z[4] * -(B2[:, 0] @ z[2:4])
+
+    leaves.terminal = returns.terminal = True
+    leaves.direction, returns.direction = 1, -1
+    t, z, mode = 0.0, np.concatenate([START[0], np.zeros(4)]), "free"
+    rows = {0.0: z}
+    while t < times[-1] - 1e-12:
+        rate, event = (free, leaves) if mode == "free" else (stuck, returns)
+        wanted = [s for s in times if s > t + 1e-12]
+        done = solve_ivp(
+            rate, (t, times[-1]), z, method="DOP853", t_eval=wanted, events=event, rtol=1e-11, atol=1e-11
+        )
+        if wanted and len(done.y):
+            rows.update(zip(done.t, done.y.T, strict=True))
+        if done.status == 0:
+            break
+        t, z = done.t_events[0][0], done.y_events[0][0].copy()
+        z[4] = np.clip(z[4], -R, R)
+        mode = "stuck" if mode == "free" else "free"
+        if mode == "free":
+            z[4] *= 1 - 1e-13
+    return np.array([rows[s] for s in times])
+
+
+def test_smooth_projection_agrees_with_dop853():
+    gains = Gains(
+        bandwidth=10.0, projection_radius=1.5, predictor_gain=2.0, adaptation_rate=400.0, smooth=0.2
+    )
+    case = problem("l1", gains=gains)
+    expected = dop853(
+        right_hand_side("l1", gains), np.concatenate([START[0], np.zeros(4)]), case.times, max_step=1e-3
+    )
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert np.abs(found.sigma_hat).max() <= 1.5 * (1 + 1e-9)
+    assert np.abs(found.sigma_hat).max() > 1.5 / np.sqrt(1.2)
+
+
+def sampled_reference(gains, times, h=h2):
+    """The loop of certificate C, sample by sample."""
+    Ts, g = gains.sample_time, gains.predictor_gain
+    pinv = np.linalg.pinv(B2)
+    z = np.concatenate([START[0], np.zeros(3)])  # x, xtilde, u_a
+    rows, held, sigma = [], None, None
+    marks = sorted({*times, *(np.arange(int(times[-1] / Ts) + 1) * Ts)})
+    for a, b in zip(marks, [*marks[1:], None], strict=True):
+        if abs(a / Ts - round(a / Ts)) < 1e-9:
+            held = -g / np.expm1(g * Ts) * z[2:4]
+            sigma = np.exp(g * Ts) * pinv @ held
+            sigma *= min(1.0, gains.projection_radius / max(np.linalg.norm(sigma), 1e-300))
+        if a in times:
+            rows.append(np.concatenate([z, sigma]))
+        if b is None:
+            break
+
+        def rate(t, z, held=held, sigma=sigma):
+            x, u = z[:2], z[4:]
+            return np.concatenate(
+                [
+                    drift(x) + B2 @ (min_norm(x) + u + h(t, x)),
+                    -g * z[2:4] + held - B2 @ h(t, x),
+                    -gains.bandwidth * (u + sigma),
+                ]
+            )
+
+        z = dop853(rate, z, np.array([a, b]))[-1]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("radius", [50.0, 1.0])
+def test_sampled_loop_agrees_with_its_formulas(radius):
+    gains = Gains(bandwidth=20.0, projection_radius=radius, predictor_gain=3.0, sample_time=0.037)
+    case = problem("sampled", gains=gains)
+    expected = sampled_reference(gains, case.times)
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-6
+    assert np.abs(found.sigma_hat[0] - expected[:, 5:]).max() < 1e-4
+    assert np.all(found.sigma_hat[0, 0] == 0)
+    assert np.abs(found.sigma_hat).max() <= radius * (1 + 1e-12)
+
+
+def scalar(f, B):
+    """One state; W = B^2 satisfies C3 for every B(x)."""
+    return ControlAffineModel(
+        states=("x1",), inputs=("u",), f=(f,), B=((B,),), W=((B * B,),), rate=Fraction(1), h=None
+    )
+
+
+def levels(case, x0, h, count):
+    """x at the output times (K, n) for one level of steps after the other."""
+    steps = ladder(case, h)
+    disturbance = Disturbance.from_expressions(h, case.model, 1)
+    return [
+        run(steps.level(j, disturbance), steps.point, x0, len(case.times)).values[0, :, : x0.shape[1]]
+        for j in range(count)
+    ]
+
+
+ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
+STEADY = X + Fraction(1, 2) * sin(X)
+SMOOTH_H = (sin(2 * T) + Fraction(3, 10) * sin(X),)
+
+
+@pytest.mark.parametrize(
+    ("controller", "B", "rate", "least"),
+    [
+        ("ccm", constant(1), 1.0, 3.8),
+        ("reference", constant(1), 1.0, 3.8),
+        ("sampled", constant(1), 1.0, 3.8),
+        ("l1", constant(1), 100.0, 3.8),
+        ("l1", 2 + sin(X), 100.0, 3.8),
+    ],
+)
+def test_steps_have_order_four(controller, B, rate, least):
+    """A system whose feedback has no kinks; Gamma such that the steps resolve the oscillation."""
+    gains = Gains(
+        bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=rate, sample_time=0.5
+    )
+    case = LoopProblem(
+        model=scalar(STEADY, B),
+        plan=ORIGIN,
+        controller=controller,
+        horizon=4.0,
+        times=np.linspace(0, 4, 5),
+        gains=gains,
+    )
+    found = levels(case, np.array([[0.5]]), SMOOTH_H, 6)
+    errors = [np.abs(x - found[-1]).max() for x in found[1:4]]
+    order = np.log2(errors[0] / errors[2]) / 2
+    assert order > least, (order, errors)
+
+
+def test_steps_far_longer_than_the_oscillation_are_accurate():
+    """Gamma 1e10 turns 6000 rad in the longest step; the error is that of the slow part."""
+    gains = Gains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=1e10)
+    case = LoopProblem(
+        model=scalar(STEADY, constant(1)),
+        plan=ORIGIN,
+        controller="l1",
+        horizon=4.0,
+        times=np.linspace(0, 4, 5),
+        gains=gains,
+    )
+    found = levels(case, np.array([[0.5]]), SMOOTH_H, 6)
+    errors = [np.abs(x - found[-1]).max() for x in found[:4]]
+    assert errors[0] < 1e-4
+    assert errors[3] < errors[0] / 100, errors
+
+
+SLANTED = spec_model("state_dependent_input.yaml")
+
+
+def flat(x2):
+    """int_0^x2 ds/(2 + sin s)."""
+
+    def primitive(s):
+        return 2 / np.sqrt(3) * np.arctan((2 * np.tan(s / 2) + 1) / np.sqrt(3))
+
+    return primitive(x2) - primitive(0.0)
+
+
+def slanted_rate(controller, gains):
+    """The loops of the system with B = (0, 2 + sin x2): its metric is constant in (x1, flat(x2))."""
+    Mz = np.linalg.inv(np.array([[1.0, -0.5], [-0.5, 1.0]]))
+
+    def rate(t, z):
+        x = z[:2]
+        b = 2 + np.sin(x[1])
+        B = np.array([[0.0], [b]])
+        f = np.array([-x[0] + x[1], 0.5 * x[0] - x[1] + 0.1 * x[0] * x[1]])
+        dz = np.array([x[0], flat(x[1])])
+        m = np.array([1.0, 1 / b]) * (Mz @ dz)
+        phi0, phi1 = 2 * m @ f + 2 * 1.5 * dz @ Mz @ dz, 2 * B.T @ m
+        k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
+        h = np.array([0.2 * np.cos(t) + 0.1 * x[0]])
+        if controller == "reference":
+            return np.concatenate([f + B @ (k + h + z[2:]), -gains.bandwidth * (z[2:] + h)])
+        xt, s, u = z[2:4], z[4:5], z[5:6]
+        ds = gains.adaptation_rate * projection(s, -B.T @ xt, gains)
+        return np.concatenate(
+            [f + B @ (k + u + h), gains.A_m(2) @ xt + B @ (s - h), ds, -gains.bandwidth * (u + s)]
+        )
+
+    return rate
+
+
+@pytest.mark.parametrize("controller", ["reference", "l1"])
+def test_state_dependent_inputs_agree_with_dop853(controller):
+    gains = Gains(bandwidth=10.0, projection_radius=5.0, predictor_gain=4.0, adaptation_rate=2000.0)
+    case = problem(controller, model=SLANTED, gains=gains)
+    start = np.array([[0.2, -0.25]])
+    z0 = np.concatenate([start[0], np.zeros(SIZES[controller])])
+    expected = dop853(slanted_rate(controller, gains), z0, case.times)
+    found = integrate(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-7)
+    assert not found.failures
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert found.distance[0, 0] == pytest.approx(
+        np.sqrt(np.array([0.2, flat(-0.25)]) @ np.linalg.solve([[1, -0.5], [-0.5, 1]], [0.2, flat(-0.25)])),
+        rel=1e-9,
+    )
+
+
+@pytest.mark.parametrize("controller", ["ccm", "reference", "l1", "sampled"])
+def test_held_controllers_converge_to_the_continuous_ones(controller):
+    gains = Gains(
+        bandwidth=10.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=900.0, sample_time=0.05
+    )
+    h = Disturbance.from_expressions(wavy_h(), TWO, 1)
+    exact = integrate(problem(controller, gains=gains), START, h, tolerance=1e-8).x
+    errors = []
+    for rate in (200.0, 800.0):
+        held = integrate(problem(controller, gains=gains, control_rate=rate), START, h, tolerance=1e-7)
+        assert not held.failures
+        errors.append(np.abs(held.x - exact).max())
+    assert errors[1] < errors[0] / 3, errors
+    assert errors[1] < 0.02
+
+
+def test_the_projection_holds_under_a_control_rate():
+    gains = Gains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
+    case = problem("l1", gains=gains, control_rate=200.0, K=41)
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-6)
+    assert 0.99 < np.abs(found.sigma_hat).max() <= 1 + 1e-12
+
+
+def test_lanes_do_not_know_each_other():
+    """Many lanes give what each gives alone, whatever the others do; a diverging one is stopped and named."""
+    rng = np.random.default_rng(1)
+    N, n, m = 40, 2, 1
+    starts = rng.uniform(-0.3, 0.3, (N, n))
+    starts[7] = [1e5, 1e5]
+    d = Disturbance(
+        base=None,
+        amplitude=rng.normal(size=(N, 2, m)),
+        frequency=rng.uniform(0, 5, (N, 2)),
+        wave=rng.normal(size=(N, 2, n)),
+        phase=rng.uniform(0, 6, (N, 2)),
+        push=rng.uniform(0, 0.5, N),
+        radius=np.full(N, 1.5),
+        centre=np.array([0.1, 0.2]),
+    )
+    d.push[7] = 0.0
+    gains = Gains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
+    case = problem("l1", model=UNSTABLE, gains=gains, horizon=1.0)
+    together = integrate(case, starts, d, tolerance=1e-5)
+    assert [item.lane for item in together.failures] == [7]
+    assert together.error[7] == np.inf
+    assert np.isnan(together.x[7, -1]).all()
+    assert together.worst.h.value.max() <= 1.5 * (1 + 1e-12)
+    for lane in (0, 39):
+        alone = integrate(case, starts[[lane]], d.of(np.array([lane])), tolerance=1e-5)
+        assert np.array_equal(alone.x[0], together.x[lane])
+        assert alone.worst.distance.value[0] == together.worst.distance.value[lane]
+
+
+# x1' = x2 + 0.1 x1^3 escapes in finite time from far away
+UNSTABLE = ControlAffineModel(
+    states=("x1", "x2"),
+    inputs=("u",),
+    f=(-X + Y + X**3, -Y),
+    B=((constant(0),), (constant(1),)),
+    W=((constant(1), constant(0)), (constant(0), constant(1))),
+    rate=Fraction(1, 10),
+    h=None,
+)
+
+
+def test_disturbances_are_what_they_say():
+    """h at the output times, recomputed from its parts."""
+    d = Disturbance(
+        base=(X * Fraction(1, 2),),
+        amplitude=np.array([[[0.3], [0.2]]]),
+        frequency=np.array([[1.0, 3.0]]),
+        wave=np.array([[[0.5, 0.0], [0.0, -1.0]]]),
+        phase=np.array([[0.1, 0.7]]),
+        push=np.array([0.4]),
+        radius=np.array([0.6]),
+        centre=np.array([0.1, -0.2]),
+        layer=0.05,
+    )
+    case = problem("ccm", K=9)
+    found = integrate(case, START, d, tolerance=1e-6)
+    M = np.linalg.inv(W2)
+    clipped = 0
+    for t, x, h in zip(found.t, found.x[0], found.h[0], strict=True):
+        c = B2[:, 0] @ M @ x
+        shifted = x - d.centre
+        value = 0.5 * x[0] + 0.3 * np.sin(t + 0.5 * shifted[0] + 0.1)
+        value += 0.2 * np.sin(3 * t - shifted[1] + 0.7) + 0.4 * c / np.sqrt(c * c + 0.05**2)
+        clipped += abs(value) > 0.6
+        assert h[0] == pytest.approx(np.clip(value, -0.6, 0.6), abs=1e-12)
+    assert 0 < clipped < 9
+
+
+def test_bad_arguments_are_refused():
+    gains = Gains(bandwidth=10.0, projection_radius=1.0)
+    for options in (
+        {"controller": "l1", "gains": gains},
+        {"controller": "sampled", "gains": gains},
+        {"controller": "reference"},
+        {"controller": "ccm", "horizon": -1.0},
+        {"controller": "ccm", "control_rate": 0.0},
+        {"controller": "mpc"},
+    ):
+        with pytest.raises(ValueError, match=r"needs|must"):
+            problem(**options)
+    with pytest.raises(ValueError, match="bandwidth"):
+        Gains(bandwidth=0.0, projection_radius=1.0)
+    held = Gains(bandwidth=10.0, projection_radius=1.0, sample_time=0.03)
+    case = problem("sampled", gains=held, control_rate=50.0)
+    with pytest.raises(ValueError, match="multiple"):
+        integrate(case, START, Disturbance.from_expressions(None, TWO, 1), tolerance=1e-3)
+    with pytest.raises(ValueError, match="lanes"):
+        integrate(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)

@@ -1,0 +1,176 @@
+"""Chebyshev geodesics against closed forms, a boundary value problem, and their own order."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tubecert.expression import as_expression, constant, exp, sin, symbol
+from tubecert.model import ControlAffineModel, build
+from tubecert.simulate.geodesic import REASONS, UNRESOLVED, _polynomials, geodesic, metric
+from tubecert.spec import load_text
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+X, Y = symbol("x"), symbol("y")
+THREE = build(load_text((CONFIGS / "three_state.yaml").read_text(encoding="utf-8"), "three_state.yaml"))
+
+
+def model(W):
+    n = len(W)
+    return ControlAffineModel(
+        states=("x", "y", "z")[:n],
+        inputs=("u",),
+        f=(constant(0),) * n,
+        B=tuple((constant(int(i == n - 1)),) for i in range(n)),
+        W=tuple(tuple(as_expression(e) for e in row) for row in W),
+        rate=Fraction(1),
+        h=None,
+    )
+
+
+def solved(system, p, q, degree=5):
+    return geodesic(*metric(system, degree), np.asarray(p, dtype=float), np.asarray(q, dtype=float))
+
+
+HALF_PLANE = model([[Y**2, 0], [0, Y**2]])  # M = I / y^2
+
+
+def hyperbolic(p, q):
+    return float(np.arccosh(1 + ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) / (2 * p[1] * q[1])))
+
+
+def test_constant_metrics_have_straight_geodesics():
+    W = [[Fraction(2), Fraction(1, 2)], [Fraction(1, 2), Fraction(3)]]
+    p, q = np.array([0.3, -1.0]), np.array([1.0, 2.0])
+    found = solved(model(W), p, q)
+    M = np.linalg.inv(np.array(W, dtype=float))
+    assert found.found
+    assert found.energy == pytest.approx((q - p) @ M @ (q - p), rel=1e-14)
+    assert np.allclose(found.covectors, [M @ (q - p)] * 2, rtol=1e-13)
+
+
+def test_flat_metrics_in_curved_coordinates_keep_their_distances():
+    """z = (x, y + x^2/2) with |dz|^2: W = J^-1 J^-T; the solver has to find the straight line in z."""
+    W = [[1, -X], [-X, 1 + X**2]]
+    p, q = np.array([-0.5, 0.2]), np.array([0.8, -0.4])
+    z = [np.array([a, b + a * a / 2]) for a, b in (p, q)]
+    found = solved(model(W), p, q)
+    assert found.found
+    assert found.energy == pytest.approx((z[1] - z[0]) @ (z[1] - z[0]), rel=1e-13)
+    J = np.array([[1.0, 0.0], [q[0], 1.0]])
+    assert np.allclose(found.covectors[1], J.T @ (z[1] - z[0]), atol=1e-12)
+
+
+def test_distances_of_the_hyperbolic_plane_converge_with_the_degree():
+    p, q = [0.0, 1.0], [0.5, 1.2]
+    exact = hyperbolic(p, q)
+    errors = [abs(np.sqrt(solved(HALF_PLANE, p, q, degree).energy) - exact) for degree in (3, 5, 7, 9)]
+    assert errors[1] < 1e-6
+    assert all(fine < coarse / 20 for coarse, fine in pairwise(errors[:3])), errors
+    assert errors[3] < 1e-11
+
+
+def test_short_geodesics_are_found_with_the_order_of_their_degree():
+    """Halving the distance gains 2^order: with degree 5 at least 2^6 relative to the energy."""
+    direction = np.array([0.6, 0.5])
+    errors = []
+    for scale in (1.0, 0.5):
+        q = np.array([0.0, 1.0]) + scale * direction
+        exact = hyperbolic([0.0, 1.0], q) ** 2
+        errors.append(abs(solved(HALF_PLANE, [0.0, 1.0], q, 3).energy - exact) / exact)
+    assert np.log2(errors[0] / errors[1]) > 4, errors
+
+
+def test_the_first_variation_is_the_covector():
+    """dE/dq = 2 M gamma_s(1), dE/dp = -2 M gamma_s(0)."""
+    p, q = np.array([0.02, -0.05, 0.03]), np.array([-0.06, 0.08, 0.05])
+    found = solved(THREE, p, q)
+    step = 1e-5
+    for i, e in enumerate(np.eye(3) * step):
+        by_q = (solved(THREE, p, q + e).energy - solved(THREE, p, q - e).energy) / (2 * step)
+        by_p = (solved(THREE, p + e, q).energy - solved(THREE, p - e, q).energy) / (2 * step)
+        assert by_q == pytest.approx(2 * found.covectors[1][i], rel=1e-6, abs=1e-8)
+        assert by_p == pytest.approx(-2 * found.covectors[0][i], rel=1e-6, abs=1e-8)
+
+
+def test_three_state_geodesics_satisfy_their_differential_equation():
+    """Shooting along Hamilton's equations x' = W m, m' = -1/2 d(m'W m)/dx from the covector found hits the end."""
+    spec = [np.array(part, dtype=float) for part in _coefficients()]
+
+    def W(x):
+        return spec[0] + x * spec[1] + x * x * spec[2]
+
+    def hamilton(s, z):
+        x, m = z[:3], z[3:]
+        slope = m @ (spec[1] + 2 * x[0] * spec[2]) @ m
+        return np.concatenate([W(x[0]) @ m, [-0.5 * slope, 0, 0]])
+
+    p, q = np.array([0.05, 0.08, -0.03]), np.array([-0.09, -0.07, 0.1])
+    found = solved(THREE, p, q)
+    done = solve_ivp(hamilton, (0, 1), np.concatenate([p, found.covectors[0]]), rtol=1e-12, atol=1e-12)
+    assert np.allclose(done.y[:3, -1], q, atol=1e-9)
+    assert np.allclose(done.y[3:, -1], found.covectors[1], atol=1e-8)
+
+
+def _coefficients():
+    constant_part = [
+        [0.20365, 0.00015, -0.00566],
+        [0.00015, 0.21671, -0.00566],
+        [-0.00566, -0.00566, 0.21607],
+    ]
+    linear = [[0, -0.4073, -0.00133], [-0.4073, -0.00061, 0.00998], [-0.00133, 0.00998, 0.06785]]
+    square = [[0, 0, 0.00053], [0, 0.81459, 0.00308], [0.00053, 0.00308, 0.00343]]
+    return constant_part, linear, square
+
+
+def test_warm_starts_are_guarded():
+    """Nonsense left in the memory changes nothing: nan, infinite, or a much longer curve."""
+    space, memory = metric(HALF_PLANE)
+    p, q = np.array([0.0, 1.0]), np.array([0.6, 1.3])
+    clean = geodesic(space, memory, p, q)
+    for nonsense in (np.nan, np.inf, 3.0, -40.0):
+        memory.bend.a[:] = nonsense
+        again = geodesic(space, memory, p, q)
+        assert again.found
+        assert again.energy == pytest.approx(clean.energy, rel=1e-14)
+
+
+def test_geodesics_that_cannot_be_found_are_refused():
+    broken = model([[1 - X, 0], [0, 1]])  # not positive definite beyond x = 1
+    refused = solved(broken, [0, 0], [1.5, 0])
+    assert not refused.found
+    assert "positive definite" in refused.reason
+    assert solved(broken, [0, 0], [0.5, 0]).found
+    steep = model([[exp(-8 * sin(3 * X)), 0], [0, exp(8 * sin(5 * X))]])
+    rough = solved(steep, [-1.5, -1.0], [1.5, 1.0], 3)
+    assert not rough.found
+    assert rough.reason in REASONS.values()
+    assert REASONS[UNRESOLVED]
+
+
+def test_no_geodesic_is_longer_than_the_segment():
+    rng = np.random.default_rng(5)
+    space, memory = metric(THREE)
+    coefficients = [np.array(part) for part in _coefficients()]
+    s, weight = np.polynomial.legendre.leggauss(20)
+    for _ in range(100):
+        p, q = rng.uniform(-0.1, 0.1, (2, 3))
+        found = geodesic(space, memory, p, q)
+        x = p[0] + (s + 1) / 2 * (q[0] - p[0])
+        W = coefficients[0] + x[:, None, None] * coefficients[1] + (x**2)[:, None, None] * coefficients[2]
+        segment = weight / 2 @ np.einsum("i,nij,j->n", q - p, np.linalg.inv(W), q - p)
+        assert found.found
+        assert 0 < found.energy <= segment * (1 + 1e-9)
+
+
+def test_the_quadrature_is_exact_for_its_degree():
+    table = _polynomials(5)
+    s, weight = table[:2]
+    for k in range(len(s)):
+        assert weight @ s**k == pytest.approx(1 / (k + 1), rel=1e-13)
+    assert np.allclose(table[2:6, [0, -1]], 0, atol=1e-14)

@@ -1,0 +1,543 @@
+"""The specification: what loads, what is refused (with code, line and column), and nothing else."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
+from tubecert.expression import free_symbols, symbol, to_text
+from tubecert.findings import Finding
+from tubecert.spec import CODES, Spec, canonical, load, load_text
+
+ROOT = Path(__file__).parents[2]
+OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))
+MINIMAL = (ROOT / "tests/specs/ok/minimal.yaml").read_text()
+EXPECT = re.compile(r'# expect: (TC\d+) (\d+:\d+) "(.*)"')
+
+
+def findings(text: str) -> list[Finding]:
+    with pytest.raises(TubecertError) as caught:
+        load_text(text, "file.yaml")
+    return list(caught.value.findings)
+
+
+def place(finding: Finding) -> str:
+    assert finding.location is not None
+    return f"{finding.location.line}:{finding.location.column}"
+
+
+def minimal(old: str, new: str) -> str:
+    assert old in MINIMAL
+    return MINIMAL.replace(old, new)
+
+
+# files: dropping one into specs/ok or specs/bad adds a test
+
+
+@pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
+def test_good_files_load(path: Path) -> None:
+    spec = load(str(path))
+    assert spec.path == str(path)
+    assert all(location.file == str(path) for location in spec.locations.values())
+
+
+@pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
+def test_the_canonical_form_is_a_specification_of_the_same_system(path: Path) -> None:
+    data = canonical(load(str(path)))
+    again = load_text(json.dumps(data), "canonical.json")
+    assert canonical(again) == data
+    assert canonical(load_text(yaml.safe_dump(data), "canonical.yaml")) == data
+
+
+@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
+def test_bad_files_are_refused_where_they_say(path: Path) -> None:
+    text = path.read_text()
+    header = [line for line in text.splitlines() if line.startswith("# expect:")]
+    expected = [match.groups() for match in map(EXPECT.fullmatch, header) if match]
+    assert expected, 'a bad file begins with lines like: # expect: TC103 7:3 "did you mean"'
+    with pytest.raises(SpecError) as caught:
+        load(str(path))
+    found = caught.value.findings
+    assert caught.value.exit_code == ExitCode.INVALID
+    for code, where, fragment in expected:
+        matching = [f for f in found if f.code == code and place(f) == where]
+        assert matching, f"no {code} at {where} in\n" + "\n".join(map(str, found))
+        assert any(fragment in f"{f.message} / {f.help}" for f in matching)
+    if "# expect: more" not in header:
+        assert len(found) == len(expected), "\n".join(map(str, found))
+
+
+@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
+def test_the_parser_without_c_agrees(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyYAML may come without its C part; only the wording about malformed YAML may then differ."""
+
+    def said() -> list[tuple[str, str]]:
+        with pytest.raises(SpecError) as caught:
+            load(str(path))
+        return [(f.code, "" if f.code == "TC101" else f.message) for f in caught.value.findings]
+
+    before = said()
+    monkeypatch.delattr(yaml, "CSafeLoader", raising=False)
+    assert said() == before
+
+
+def test_every_code_is_met_and_explained() -> None:
+    met = {match[0] for path in BAD for match in EXPECT.findall(path.read_text())}
+    assert met <= set(CODES)
+    assert not set(CODES) - met
+
+
+# values
+
+
+def test_three_state() -> None:
+    spec = load(str(ROOT / "configs/three_state.yaml"))
+    assert spec.states == ("x1", "x2", "x3")
+    assert spec.f[1].expression is not None
+    assert to_text(spec.f[1].expression) == "x1**2 - 2*x1*x3 - x2 + x3"
+    assert spec.safe_set == ((Fraction(-1, 10), Fraction(1, 10)),) * 3
+    assert spec.x0 == (Fraction(1, 100), Fraction(-1, 100), Fraction(1, 100))
+    assert spec.metric is not None
+    assert spec.metric.rate == Fraction(9999, 10000)
+    assert spec.metric.lower is None
+    assert spec.tube.epsilon == spec.tube.rho_a == Fraction(1, 100)
+    assert spec.adaptation.A_m == ((-1, 0, 0), (0, -1, 0), (0, 0, -1))
+    assert spec.trajectory.kind == "equilibrium"
+    assert spec.trajectory.horizon is None
+    assert spec.uncertainty.h is not None
+    assert free_symbols([spec.uncertainty.h[0].expression]) == {"t"}
+    assert "# A three-state system" in spec.source
+
+
+def test_defaults() -> None:
+    spec = load_text(MINIMAL)
+    assert (spec.metric, spec.kernel, spec.expect) == (None, None, None)
+    assert (spec.tube.epsilon, spec.tube.rho_a) == (None, None)
+    assert (spec.adaptation.A_m, spec.adaptation.smooth) == ("auto", None)
+    assert spec.x0 == (0,)
+    assert [term.expression.fraction for term in spec.trajectory.u] == [0]
+
+
+def test_parameters_are_exact_and_may_use_earlier_ones() -> None:
+    spec = load(str(ROOT / "tests/specs/ok/declared_bounds.yaml"))
+    assert dict(spec.parameters) == {
+        "m": Fraction(1, 2),
+        "g": Fraction(981, 100),
+        "weight": Fraction(981, 200),
+        "third": Fraction(1, 3),
+    }
+    assert spec.B[1][0].expression.fraction == 2
+    assert spec.safe_set[0] == (Fraction(-1, 3), Fraction(1, 3))
+    assert spec.uncertainty.h is None
+    assert spec.uncertainty.bounds is not None
+    assert spec.uncertainty.bounds.h_t == Fraction(1, 5)
+    assert dict(spec.units) == {"x1": "m", "x2": "m/s", "u": "N"}
+
+
+def test_a_plan_starts_where_it_starts() -> None:
+    spec = load(str(ROOT / "tests/specs/ok/plan.yaml"))
+    assert spec.x0 == (1, 0)
+    assert spec.trajectory.horizon == 14
+    assert spec.adaptation.smooth == Fraction(1, 10)
+    assert spec.metric is not None
+    assert (spec.metric.lower, spec.metric.upper) == (Fraction(1, 10), 10)
+
+
+def test_expectations_are_kept() -> None:
+    spec = load(str(ROOT / "tests/specs/ok/both_bounds.yaml"))
+    assert spec.expect is not None
+    assert spec.expect.verdict == "certified"
+    assert dict(spec.expect.ranges) == {"rho": (Fraction(1, 10), Fraction(1, 5)), "bandwidth": (1, 1000)}
+    assert spec.kernel == "tight"
+
+
+def test_obligations_know_their_places() -> None:
+    path = ROOT / "tests/specs/ok/domain.yaml"
+    lines = path.read_text().splitlines()
+    spec = load(str(path))
+    terms = [*spec.f, *(term for row in spec.B for term in row)]
+    owed = [pair for term in terms for pair in term.owed()]
+    assert [(o.kind, to_text(o.argument), o.text) for o, _ in owed] == [
+        ("nonzero", "cos(x)", "tan(x)"),
+        ("nonzero", "x", "x/x"),
+        ("positive", "y + 1", "sqrt(1 + y)"),
+        ("nonzero", "x", "x**-2"),
+        ("nonzero", "2 - y", "1/(2 - y)"),
+    ]
+    for obligation, location in owed:
+        assert lines[location.line - 1][location.column - 1 :].startswith(obligation.text)
+
+
+def test_locations_answer_for_any_path() -> None:
+    spec = load(str(ROOT / "configs/three_state.yaml"))
+    lines = spec.source.splitlines()
+    for path, begins in {
+        "metric.rate": "0.9999",
+        "system.f[1]": "x1**2 - 2",
+        "safe_set.x2": "[-0.1, 0.1]",
+        "metric.dual_metric[1][2]": '"-0.00566 + 0.00998',
+        "metric.bounds.lower": "rate:",
+    }.items():
+        location = spec.location(path)
+        assert location is not None
+        assert lines[location.line - 1][location.column - 1 :].startswith(begins)
+    assert spec.location("nothing.of.this") is None
+
+
+STYLES = {
+    "plain": "-x + zz",
+    "single": "'-x + zz'",
+    "double": '"-x + zz"',
+    "spaces": "'-x    +    zz'",
+    "folded": ">\n    -x +\n    zz",
+    "folded, stripped": ">-   # a comment\n\n    -x\n    +\n\n    zz",
+    "literal": "|\n    -x\n      + zz",
+    "several plain lines": "-x\n    +\n    zz",
+    "several quoted lines": '"-x\n    + zz"',
+    "carriage returns": "|\r\n    -x +\r\n    zz\r\n",
+}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_finding_points_into_any_kind_of_text(style: str) -> None:
+    head = "tubecert: 1\nname: minimal\nsystem:\n  f:\n  - "
+    text = (
+        f"{head}{STYLES[style]}\n  states: [x]\n  inputs: [u]\n  B: [[1]]\n"
+        + MINIMAL[MINIMAL.index("safe_set") :]
+    )
+    (finding,) = findings(text)
+    index = text.index("zz")
+    line = text.count("\n", 0, index) + 1
+    column = index - (text.rfind("\n", 0, index) + 1) + 1
+    assert place(finding) == f"{line}:{column}"
+
+
+def test_an_escaped_text_is_located_at_its_start() -> None:
+    text = minimal("f: [-x]", r'f: ["\x2dx + zz"]')
+    (finding,) = findings(text)
+    assert finding.location is not None
+    assert finding.location.source[finding.location.column - 1] == '"'
+
+
+def test_equal_systems_have_equal_canonical_forms() -> None:
+    """Spacing, quotes, order of operands and spelling of numbers do not count."""
+    other = (
+        minimal("f: [-x]", 'f: [" x * -1.0 "]')
+        .replace("[-1, 1]", "['-1.00', 10/10]")
+        .replace("h: [0]", 'h: ["0*t"]')
+    )
+    assert canonical(load_text(other)) == canonical(load_text(MINIMAL))
+    changed = minimal("f: [-x]", "f: [-1.0000001*x]")
+    assert canonical(load_text(changed)) != canonical(load_text(MINIMAL))
+
+
+def test_long_constants_survive_the_canonical_form() -> None:
+    text = minimal("inputs: [u],", "inputs: [u], parameters: {a: 0.1234567890123456789, b: a**12/7},")
+    data = canonical(load_text(text.replace("f: [-x]", "f: [-b*x]")))
+    assert canonical(load_text(json.dumps(data))) == data
+
+
+def test_specs_are_values() -> None:
+    spec = load_text(MINIMAL)
+    assert spec == load_text(MINIMAL)
+    with pytest.raises(AttributeError):
+        spec.name = "other"  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        spec.locations["name"] = None  # type: ignore[index]
+
+
+def test_names_of_states_are_symbols_of_the_expressions() -> None:
+    spec = load_text(MINIMAL)
+    assert spec.f[0].expression is -symbol("x")
+
+
+# refusals
+
+
+def test_every_problem_is_reported_at_once_in_the_order_of_the_file() -> None:
+    text = """tubecert: 1
+name: a b
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x^2", "2y"]
+  B: [[0], [q]]
+safe_set: {x: [1, -1], y: [-1, 1]}
+uncertainty: {h: ["abs(z)"]}
+trajectory: {kind: equilibrium, at: [0]}
+tube: {epsilon: -1, rhoa: 2}
+metric: {rate: fast, dual_metric: [[1, x], [y, 1]]}
+adaptation: {A_m: 2}
+"""
+    found = findings(text)
+    assert [f.code for f in found] == [
+        *("TC111", "TC109", "TC109", "TC110", "TC112", "TC110"),
+        *("TC107", "TC112", "TC103", "TC110", "TC116", "TC117"),
+    ]
+    positions = [(f.location.line, f.location.column) for f in found if f.location]
+    assert positions == sorted(positions)
+
+
+def test_a_finding_reads_well() -> None:
+    (finding,) = findings(minimal("f: [-x]", 'f: ["-x^2"]'))
+    assert str(finding) == (
+        "file.yaml:3:43: error TC109: ^ is not allowed in an expression\n"
+        '    system: {states: [x], inputs: [u], f: ["-x^2"], B: [[1]]}\n'
+        "                                              ^\n"
+        "  help: write ** for a power"
+    )
+
+
+def test_control_characters_of_a_file_are_not_printed() -> None:
+    for found in (findings(minimal("minimal", "mini\x1b[2Jmal")), findings(minimal("[-x]", '["x\tq"]'))):
+        assert all(character.isprintable() or character == "\n" for character in str(found[0]))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda tmp: tmp / "missing.yaml",
+        lambda tmp: tmp,
+        lambda tmp: tmp / "missing" / "file.yaml",
+        lambda tmp: "",
+        lambda tmp: "nul\x00name.yaml",
+        lambda tmp: tmp / ("long" * 200),
+    ],
+    ids=["missing", "directory", "parent", "empty", "nul", "long"],
+)
+def test_targets_that_cannot_be_read(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(TargetError) as caught:
+        load(str(make(tmp_path)))
+    assert [f.code for f in caught.value.findings] == ["TC100"]
+    assert caught.value.exit_code == ExitCode.INVALID
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads everything")
+def test_a_file_without_permission(tmp_path: Path) -> None:
+    path = tmp_path / "secret.yaml"
+    path.write_text(MINIMAL)
+    path.chmod(0)
+    with pytest.raises(TargetError):
+        load(str(path))
+
+
+def test_files_that_are_not_text(tmp_path: Path) -> None:
+    for name, data in {
+        "latin": MINIMAL.encode() + "# \u00e4".encode("latin-1"),
+        "utf16": MINIMAL.encode("utf-16"),
+        "binary": bytes(range(256)),
+        "nul": b"tubecert: 1\x00",
+    }.items():
+        path = tmp_path / name
+        path.write_bytes(data)
+        with pytest.raises(SpecError) as caught:
+            load(str(path))
+        assert len(caught.value.findings) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs an endless file")
+@pytest.mark.timeout(30)
+def test_an_endless_file_is_refused() -> None:
+    with pytest.raises(SpecError) as caught:
+        load("/dev/zero")
+    assert caught.value.findings[0].code == "TC102"
+
+
+def _bomb() -> str:
+    names = "abcdefghi"
+    lines = [f"{a}: &{a} [{', '.join([f'*{b}'] * 9)}]" for b, a in itertools.pairwise(names)]
+    return "a: &a [lol]\n" + "\n".join(lines) + "\n"
+
+
+def _with_f(entry: str) -> str:
+    return minimal("f: [-x]", f'f: ["{entry}"]')
+
+
+HOSTILE = {
+    "flow brackets": "[" * 200_000,
+    "closed flow brackets": "a: " + "[" * 200_000 + "]" * 200_000,
+    "braces": "{a: " * 100_000,
+    "masked brackets": "a: " + "[ #]\n" * 150_000,
+    "quoted closers": "a: " + '["]", ' * 100_000,
+    "dashes": "- " * 200_000,
+    "question marks": "? " * 200_000,
+    "staircase": "\n".join(" " * i + f"k{i}:" for i in range(1_300)),
+    "mixed staircase": "".join(f"{' ' * i}- - ? x{i}:\n" for i in range(600)),
+    "alias bomb": _bomb(),
+    "many aliases": "x: &x 1\ny: [" + "*x, " * 100_000 + "]",
+    "many unknown keys": "\n".join(f"k{i}: 1" for i in range(50_000)),
+    "many duplicate keys": "name: a\n" * 50_000,
+    "many states": minimal("[x], inputs", f"[{', '.join(f's{i}' for i in range(50_000))}], inputs"),
+    "many entries": minimal("f: [-x]", f"f: [{'-x, ' * 50_000}]"),
+    "wide matrix": minimal("B: [[1]]", f"B: [[{'1, ' * 100_000}]]"),
+    "many numbers": minimal("at: [0]", f"at: [{'0, ' * 100_000}]"),
+    "big file": "# " + "x" * 1_100_000,
+    "long plain text": "a: " + "word " * 150_000,
+    "long quoted text": 'name: "' + "\\n" * 300_000 + '"',
+    "long key": "k" * 500_000 + ": 1",
+    "unclosed quote": 'a: "' + "x\n" * 300_000,
+    "percent": "%" * 300_000,
+    "colons": ":" * 300_000,
+    "colon spaces": ": " * 200_000,
+    "ampersands": "&" * 300_000,
+    "tags": "!" * 300_000,
+    "tabs": "\t" * 300_000,
+    "documents": "---\n" * 200_000,
+    "minus signs": _with_f("-" * 50_000 + "x"),
+    "parentheses": _with_f("(" * 10_000 + "x" + ")" * 10_000),
+    "power tower": _with_f("9**9**9"),
+    "import": _with_f("__import__('os').system('true')"),
+    "attributes": _with_f("x.__class__.__mro__"),
+    "exponent": minimal("[-1, 1]", "[-1, 1e10000000]"),
+    "digits": minimal("[-1, 1]", f"[-1, {'9' * 100_000}]"),
+    "parameters that grow": minimal(
+        "inputs: [u],",
+        "inputs: [u], parameters: {p0: 1e300, " + ", ".join(f"p{i + 1}: p{i}*p{i}" for i in range(60)) + "},",
+    ),
+}
+
+
+@pytest.mark.timeout(30)
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_files_are_refused(name: str) -> None:
+    found = findings(HOSTILE[name])
+    assert found
+    assert len(found) <= 201
+    assert all(f.location is not None and len(str(f)) < 2_000 for f in found)
+
+
+def test_large_but_honest_files_load() -> None:
+    n = 32
+    names = [f"s{i}" for i in range(n)]
+    rows = "\n".join(f"    - [{', '.join('1' if i == j else '0' for j in range(n))}]" for i in range(n))
+    text = f"""tubecert: 1
+name: large
+system:
+  states: [{", ".join(names)}]
+  inputs: [u]
+  f: [{", ".join(f"-{name} + sin({name})/2" for name in names)}]
+  B: [{", ".join(f"[{int(i == 0)}]" for i in range(n))}]
+safe_set: {{{", ".join(f"{name}: [-1, 1]" for name in names)}}}
+uncertainty: {{h: [0]}}
+trajectory: {{kind: equilibrium, at: [{", ".join(["0"] * n)}]}}
+metric:
+  rate: 1
+  dual_metric:
+{rows}
+adaptation: {{A_m: -3}}
+"""
+    assert len(load_text(text).states) == n
+
+
+# mutations
+
+SEEDS = [path.read_text(encoding="utf-8-sig") for path in OK + CONFIGS]
+SNIPPETS = [
+    *(
+        "[",
+        "]",
+        "{",
+        "}",
+        ":",
+        ": ",
+        "- ",
+        "\n",
+        "  ",
+        "\t",
+        "#",
+        "&a ",
+        "*a",
+        "!!str ",
+        "|",
+        ">",
+        "'",
+        '"',
+        "%",
+        "@",
+    ),
+    *(
+        "x",
+        "t",
+        "u",
+        "0",
+        "-1",
+        "1e999",
+        ".nan",
+        "null",
+        "**",
+        "^",
+        "/0",
+        "sqrt(",
+        "(",
+        ")",
+        ",",
+        "\u03bb",
+        "\x00",
+    ),
+    *(
+        "<<: ",
+        "? ",
+        "---\n",
+        "...",
+        "auto",
+        "name",
+        "f: ",
+        "kind: csv",
+        "~",
+        "\ufeff",
+        "\u2028",
+        "\r",
+        "\U0001f600",
+    ),
+]
+
+
+@st.composite
+def mutants(draw: st.DrawFn) -> str:
+    text = draw(st.sampled_from(SEEDS))
+    for _ in range(draw(st.integers(1, 4))):
+        at = draw(st.integers(0, len(text)))
+        length = draw(st.integers(0, 12))
+        insert = draw(st.one_of(st.sampled_from(SNIPPETS), st.text(max_size=4), st.just("")))
+        other = draw(st.sampled_from(["replace", "duplicate", "delete line"]))
+        if other == "replace":
+            text = text[:at] + insert + text[at + length :]
+        elif other == "duplicate":
+            text = text[:at] + text[at : at + 40] + text[at:]
+        else:
+            lines = text.split("\n")
+            del lines[at % len(lines)]
+            text = "\n".join(lines)
+    return text
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(text=mutants())
+def test_a_mutated_file_loads_or_is_refused(text: str) -> None:
+    try:
+        outcome: Spec | TubecertError = load_text(text, "mutant.yaml")
+    except TubecertError as error:
+        outcome = error
+    if isinstance(outcome, Spec):
+        data = canonical(outcome)
+        assert canonical(load_text(json.dumps(data))) == data
+        return
+    lines = re.split(r"\r\n|\r|\n", text)
+    for finding in outcome.findings:
+        assert finding.code in CODES
+        assert finding.location is not None
+        assert 1 <= finding.location.line <= len(lines)
+        assert 1 <= finding.location.column <= len(lines[finding.location.line - 1]) + 1
+        assert str(finding)

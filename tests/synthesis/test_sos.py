@@ -1,0 +1,528 @@
+"""Synthesis by sums of squares: its parts against definitions, its proposals against the verifier and against cvxpy."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO, matrix_of
+
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import ONE, ZERO, cos, sin, symbol
+from tubecert.metric.verify import verify_metric
+from tubecert.model import ControlAffineModel
+from tubecert.synthesis.chart import (
+    Chart,
+    NotPolynomialError,
+    Variable,
+    control_matrix,
+    control_points,
+    degrees_of,
+    monomial_matrix,
+)
+from tubecert.synthesis.conic import (
+    Affine,
+    ConicProgram,
+    SemidefiniteBlocks,
+    semidefinite,
+    solve,
+    triangle,
+)
+from tubecert.synthesis.family import metric_family
+from tubecert.synthesis.frame import commuting_frame
+from tubecert.synthesis.gram import gram_form
+from tubecert.synthesis.polynomial import polynomial_conditions
+from tubecert.synthesis.problem import SynthesisProblem
+from tubecert.synthesis.sos import propose_sos
+
+SOLVERS = ("clarabel", "scs")
+Q = Fraction
+
+
+def model(states, f, B):
+    return ControlAffineModel(
+        states=tuple(states),
+        inputs=tuple(f"u{j}" for j in range(len(B[0]))),
+        f=matrix_of([f], states)[0],
+        B=matrix_of(B, states),
+        W=(),
+        rate=Q(0),
+        h=None,
+    )
+
+
+def problem(system, box, *, degree, rate, **options):
+    box = tuple((Q(lo), Q(hi)) for lo, hi in box)
+    family = metric_family(system, degree=degree, variables=options.pop("variables", None))
+    return SynthesisProblem(model=system, safe_set=box, family=family, rate=rate, **options)
+
+
+TWO_STATE = model(TWO, F_TWO, [["0.5"], ["-2"]])
+BOX_FIVE = ((-5, 5),) * 2
+THREE_STATE = model(THREE, F_THREE, [["0"], ["0"], ["1"]])
+PENDULUM = model(("q", "w", "i"), ("w", "sin(q) + i", "-i"), [["0"], ["0"], ["1"]])
+BOX_PENDULUM = ((-1, 1), (-1, 1), (-1, 1))
+MOVING = model(("x", "y"), ("-x + y", "x**2 - y"), [["0"], ["1 + x**2"]])
+
+
+def verified(asked, proposal, rate, digits=6):
+    """The verifier's word on the proposal, rounded."""
+    rounded = [[[Q(f"{x:.{digits}f}") for x in row] for row in v] for v in proposal.coefficients]
+    exact = replace(asked.model, W=asked.family.dual_metric(rounded), rate=Q(rate))
+    return verify_metric(exact, asked.safe_set, Effort(gap=0.1, budget=100_000))
+
+
+# -- the conic programs ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_largest_eigenvalue_is_a_conic_program(solver):
+    a = np.random.default_rng(1).normal(size=(6, 6))
+    a = a + a.T
+    found = solve(ConicProgram(cost=np.ones(1), semidefinite=[semidefinite(-a, [np.eye(6)])]), solver)
+    assert found.finished
+    assert found.feasible
+    assert found.objective == pytest.approx(np.linalg.eigvalsh(a)[-1], abs=1e-6)
+    assert found.bound == pytest.approx(found.objective, abs=1e-6)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_equalities_and_inequalities_hold(solver):
+    """The nearest correlation to a given number, [[1, y0], [y0, y1]] >= 0, y1 = 1, y0 >= 0.25, least y0."""
+    block = semidefinite([[1, 0], [0, 0]], [[[0, 1], [1, 0]], [[0, 0], [0, 1]]])
+    program = ConicProgram(
+        cost=np.array([1.0, 0.0]),
+        semidefinite=[block],
+        inequalities=Affine(constant=np.array([-0.25]), slopes=np.array([[1.0, 0.0]])),
+        equalities=Affine(constant=np.array([-1.0]), slopes=np.array([[0.0, 1.0]])),
+    )
+    found = solve(program, solver)
+    assert found.values == pytest.approx([0.25, 1.0], abs=1e-6)
+    assert np.linalg.eigvalsh(block.at(found.values))[0] > 0.7
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_infeasible_is_an_opinion_and_has_no_value(solver):
+    both = [semidefinite([[-1.0]], [[[1.0]]]), semidefinite([[-1.0]], [[[-1.0]]])]
+    found = solve(ConicProgram(cost=np.ones(1), semidefinite=both), solver)
+    assert found.feasible is False
+    assert "infeasible" in found.status
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_data_that_are_not_finite_reach_no_solver(bad):
+    found = solve(ConicProgram(cost=np.ones(1), semidefinite=[semidefinite([[bad]], [[[1.0]]])]))
+    assert found.values is None
+    assert found.feasible is None
+    assert "not finite" in found.status
+
+
+def test_too_few_iterations_are_said():
+    a = np.diag(np.arange(8.0))
+    program = ConicProgram(cost=np.ones(1), semidefinite=[semidefinite(-a, [np.eye(8)])])
+    found = solve(program, iterations=1)
+    assert not found.finished
+    assert found.feasible is None
+    assert "max iterations" in found.status
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10**6), st.integers(2, 5), st.integers(1, 3))
+def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
+    """Random programs that are feasible and bounded by construction: y = 0 is interior, the cost a sum of traces."""
+    import cvxpy
+
+    rng = np.random.default_rng(seed)
+    N = 4
+    slopes = [(s := rng.normal(size=(N, n, n))) + s.transpose(0, 2, 1) for _ in range(blocks)]
+    roots = [rng.normal(size=(n, n)) for _ in range(blocks)]
+    cost = sum(np.einsum("kij,ij->k", s, r @ r.T + np.eye(n)) for s, r in zip(slopes, roots, strict=True))
+    found = [
+        solve(
+            ConicProgram(cost=cost, semidefinite=[semidefinite(np.eye(n), s) for s in slopes]),
+            solver,
+            tolerance=1e-7,
+        )
+        for solver in SOLVERS
+    ]
+    y = cvxpy.Variable(N)
+    parts = [np.eye(n) + sum(y[k] * s[k] for k in range(N)) >> 0 for s in slopes]
+    oracle = cvxpy.Problem(cvxpy.Minimize(cost @ y), parts).solve(solver="CLARABEL")
+    for answer in found:
+        assert answer.objective == pytest.approx(oracle, rel=1e-4, abs=1e-4)
+
+
+# -- charts: from values to coefficients -------------------------------------------------------------------------------
+
+
+def test_coefficients_of_a_polynomial_in_an_angle_and_a_state():
+    """What is read off the nodes is the function, everywhere: 2 sin q cos q x^2 + x - 3 cos^2 q on an uneven box."""
+    chart = Chart(
+        variables=(
+            Variable(name="q", lo=-0.5, hi=1.2, angle=True),
+            Variable(name="x", lo=-1.0, hi=3.0, angle=False),
+        ),
+        degrees=(2, 2),
+    )
+
+    def function(q, x):
+        return 2 * np.sin(q) * np.cos(q) * x**2 + x - 3 * np.cos(q) ** 2
+
+    nodes, weight = chart.nodes()
+    places, table = chart.coefficients(weight * function(*nodes.T), (0, 0))
+    assert places.shape == (1, 0)
+    assert table.shape == (1, 5, 3)
+    u = np.random.default_rng(2).uniform(-1, 1, (40, 2))
+    q, x = (v.value(u[:, i]) for i, v in enumerate(chart.variables))
+    value = np.polynomial.polynomial.polyval2d(*u.T, table[0])
+    assert value == pytest.approx(chart.variables[0].weight(u[:, 0], 2) * function(q, x), abs=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-3, 3), min_size=2, max_size=6), st.integers(1, 4))
+def test_control_points_bound_the_polynomial_and_meet_it_at_the_ends(coefficients, pieces):
+    order = len(coefficients) - 1
+    values = np.polynomial.polynomial.polyval(np.linspace(-1, 1, 201), np.array(coefficients))
+    controls = control_matrix(order, pieces) @ np.linalg.solve(monomial_matrix(order), np.array(coefficients))
+    assert controls.min() <= values.min() + 1e-9
+    assert controls.max() >= values.max() - 1e-9
+    assert controls[[0, -1]] == pytest.approx(values[[0, -1]], abs=1e-9)
+    assert len(controls) == len(control_points(order, pieces)) == pieces * order + 1
+
+
+def test_control_points_converge_quadratically_to_the_polynomial():
+    coefficients = np.array([0.3, -1.0, 2.0, 0.5, -1.5])
+    fine = np.polynomial.polynomial.polyval(np.linspace(-1, 1, 4001), coefficients).min()
+    gaps = []
+    for pieces in (2, 4, 8, 16):
+        controls = control_matrix(4, pieces) @ np.linalg.solve(monomial_matrix(4), coefficients)
+        gaps.append(fine - controls.min())
+    assert gaps[-1] < gaps[0] / 30 + 1e-12
+
+
+def test_degrees_count_angles_once_and_refuse_what_is_no_polynomial():
+    x, q = symbol("x"), symbol("q")
+    degrees, angles = degrees_of([sin(q) * cos(2 * q) * x**3 + x, ONE + cos(q), ZERO])
+    assert [dict(d) for d in degrees] == [{"q": 3, "x": 3}, {"q": 1}, {}]
+    assert angles == {"q"}
+    with pytest.raises(NotPolynomialError, match="quotient"):
+        degrees_of([x / (1 + x**2)])
+    with pytest.raises(NotPolynomialError, match="q enters both"):
+        degrees_of([q * sin(q)])
+    with pytest.raises(NotPolynomialError, match="reaches pi"):
+        Variable(name="q", lo=-1.0, hi=3.2, angle=True)
+
+
+# -- Gram forms -------------------------------------------------------------------------------------------------------
+
+
+def gram_value(form, entries, half, u):
+    """Sum of Z'GZ and multipliers at u, from the definition, without symmetries."""
+    from itertools import product
+
+    size = form.orders[0] // int(np.prod([h + 1 for h in half]))
+    total, row = np.zeros((size, size)), 0
+    limits = [(half, 1.0)] + [
+        (tuple(h - (i == k) for k, h in enumerate(half)), 1 - u[i] ** 2) for i, h in enumerate(half) if h
+    ]
+    for order, (most, factor) in zip(form.orders, limits, strict=True):
+        G = np.zeros((order, order))
+        upper = [(p, q) for q in range(order) for p in range(q + 1)]
+        for place, (p, q) in enumerate(upper):
+            G[p, q] = G[q, p] = entries[row + place]
+        row += len(upper)
+        z = np.array(
+            [np.prod([u[k] ** e for k, e in enumerate(es)]) for es in product(*(range(m + 1) for m in most))]
+        )
+        Z = np.kron(z[:, None], np.eye(size))
+        total += factor * Z.T @ G @ Z
+    return total
+
+
+@pytest.mark.parametrize(
+    ("orders", "size", "raised"), [((), 3, 0), ((2,), 2, 0), ((3,), 2, 1), ((2, 4), 2, 0), ((1, 2), 1, 1)]
+)
+def test_every_choice_of_the_free_entries_gives_the_same_polynomial(orders, size, raised):
+    rng = np.random.default_rng(3)
+    form = gram_form(orders, size, raised)
+    t = size * (size + 1) // 2
+    shape = tuple(order + 1 for order in orders)
+    table = rng.normal(size=(*shape, t))
+    half = tuple((order + 1) // 2 + raised for order in orders)
+    for _ in range(3):
+        u = rng.uniform(-1, 1, len(orders))
+        free = rng.normal(size=form.free.shape[1])
+        value = gram_value(form, form.pivots @ table.ravel() + form.free @ free, half, u)
+        powers = np.ones(1)
+        for k, order in enumerate(orders):
+            powers = np.outer(powers, u[k] ** np.arange(order + 1)).ravel()
+        upper = powers @ table.reshape(-1, t)
+        expected = np.zeros((size, size))
+        for place, (p, q) in enumerate(zip(*triangle(size), strict=True)):
+            expected[p, q] = expected[q, p] = upper[place]
+        assert value == pytest.approx(expected, abs=1e-10)
+
+
+def test_symmetries_split_the_blocks():
+    """[[even, odd], [odd, even]]: blocks of half the order, and 3 + 2 + 3 equations for 6 + 6 + 3 + 3 entries."""
+    whole, split = gram_form((4,), 2), gram_form((4,), 2, 0, ((-1, 1, -1),))
+    assert whole.orders == (6, 4)
+    assert split.orders == (3, 3, 2, 2)
+    assert split.free.shape == (18, 10)
+
+
+def least(coefficients, raised=0):
+    """The least value on [-1, 1] of a polynomial, by sums of squares: max r with p - r >= 0."""
+    order = len(coefficients) - 1
+    form = gram_form((order,), 1, raised)
+    one = np.zeros((order + 1, 1))
+    one[0] = -1
+    from scipy import sparse
+
+    entries = Affine(
+        constant=form.pivots @ np.array(coefficients),
+        slopes=(slopes := sparse.hstack([form.pivots @ one, form.free])),
+    )
+    cost = np.zeros(slopes.shape[1])
+    cost[0] = -1.0
+    return -solve(
+        ConicProgram(cost=cost, semidefinite=[SemidefiniteBlocks(orders=form.orders, entries=entries)])
+    ).objective
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-2, 2).map(lambda x: round(x, 3)), min_size=3, max_size=7))
+def test_in_one_variable_sums_of_squares_are_exact(coefficients):
+    sampled = np.polynomial.polynomial.polyval(np.linspace(-1, 1, 4001), np.array(coefficients)).min()
+    assert least(coefficients) == pytest.approx(sampled, abs=1e-4)
+
+
+# -- the conditions ---------------------------------------------------------------------------------------------------
+
+
+def rational(V):
+    return [[[Q(float(x)) for x in row] for row in v] for v in V]
+
+
+def contraction_values(asked, V, states):
+    """-N'(F_0 + 2 rate W)N at a state, from the model's own matrices."""
+    from tubecert.expression.matrix import multiply, transpose
+
+    system = replace(asked.model, W=asked.family.dual_metric(rational(V)), rate=Q(asked.rate))
+    form = multiply(transpose(system.annihilator), multiply(system.F, system.annihilator))
+    tape = Tape([-e for row in form for e in row], system.states)
+    values = tape.run_floats(list(np.array(states).T), (len(states),))
+    return values.T.reshape(len(states), len(form), len(form))
+
+
+@pytest.mark.parametrize(
+    ("system", "box", "degree", "states", "weight"),
+    [
+        (
+            THREE_STATE,
+            BOX_THREE,
+            2,
+            lambda u: [(0.1 * u, 0.03, end) for end in (-0.1, 0.1)],
+            lambda u: 1.0,
+        ),
+        (
+            PENDULUM,
+            BOX_PENDULUM,
+            2,
+            lambda u: [(2 * np.arctan(np.tan(0.5) * u), end, 0.2) for end in (-1, 1)],
+            lambda u: ((1 + (np.tan(0.5) * u) ** 2) / (1 + np.tan(0.5) ** 2)) ** 3,
+        ),
+    ],
+    ids=["three_state", "pendulum"],
+)
+def test_conditions_are_the_matrices_they_stand_for(system, box, degree, states, weight):
+    """Each polynomial, at any u, is C2's matrix at a vertex, times the angle's factor."""
+    asked = problem(system, box, degree=degree, rate=0.375)
+    found = polynomial_conditions(asked)
+    y = np.random.default_rng(4).normal(size=found.unknowns.count)
+    contraction = [c for c in found.conditions if c.name == "contraction"]
+    assert contraction
+    for u in (-1.0, -0.37, 0.2, 1.0):
+        expected = weight(u) * contraction_values(asked, found.unknowns.matrices(y), states(u))
+        i, j = triangle(contraction[0].size)
+        for condition in contraction:
+            powers = u ** np.arange(condition.orders[0] + 1)
+            upper = np.tensordot(powers, condition.coefficients, 1)[:, :-2] @ y
+            assert min(np.abs(upper - matrix[i, j]).max() for matrix in expected) < 1e-9
+
+
+def test_affine_variables_become_vertices():
+    """x3 enters the three-state condition affinely: two vertices, polynomials in x1 alone."""
+    found = polynomial_conditions(problem(THREE_STATE, BOX_THREE, degree=2, rate=0.9))
+    contraction = [c for c in found.conditions if c.name == "contraction"]
+    assert [c.orders for c in contraction] == [(3,), (3,)]
+
+
+@pytest.mark.parametrize(
+    ("system", "box", "degree"),
+    [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 2), (PENDULUM, BOX_PENDULUM, 2)],
+    ids=["two_state", "three_state", "pendulum"],
+)
+def test_eliminated_split_and_direct_is_what_cvxpy_finds_plainly(system, box, degree):
+    """The plain formulation of benchmarks/synthesis.py: a variable for every Gram entry, no symmetries."""
+    asked = problem(system, box, degree=degree, rate=0.5)
+    conditions = polynomial_conditions(asked)
+    everything = polynomial_conditions(asked, pieces=0, symmetric=False)
+    assert conditions.unknowns.count <= everything.unknowns.count
+    plain = benchmark().plain(everything)
+    plain.solve(solver="CLARABEL")
+    assert propose_sos(asked).kappa == pytest.approx(plain.value, rel=1e-5)
+
+
+def benchmark():
+    path = Path(__file__).parents[2] / "benchmarks" / "synthesis.py"
+    spec = importlib.util.spec_from_file_location("synthesis_benchmark", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# -- proposals --------------------------------------------------------------------------------------------------------
+
+
+def test_two_state_meets_the_best_published_condition_number():
+    asked = problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.742857 * (1 + 1e-5))
+    proposal = propose_sos(asked)
+    assert proposal.feasible
+    proof = verified(asked, proposal, "1.742857")
+    assert proof.verdict == "certified"
+    assert proof.upper_on_set.above / proof.lower_on_set.below <= 1.6344
+    assert proposal.kappa == pytest.approx(proof.upper_on_set.above / proof.lower_on_set.below, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("system", "box", "degree"),
+    [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 1)],
+    ids=["two_state", "three_state"],
+)
+def test_the_second_solver_proposes_the_same(system, box, degree):
+    asked = problem(system, box, degree=degree, rate=0.7)
+    first, second = propose_sos(asked), propose_sos(replace(asked, solver="scs"))
+    assert first.kappa == pytest.approx(second.kappa, rel=1e-4)
+    assert "SCS" in second.status
+
+
+def test_with_as_many_inputs_as_states_the_identity_is_best():
+    system = model(TWO, F_TWO, [["1", "0"], ["0", "1"]])
+    proposal = propose_sos(problem(system, BOX_FIVE, degree=0, rate=5.0))
+    assert proposal.kappa == pytest.approx(1.0, abs=1e-6)
+    assert proposal.coefficients[0] == pytest.approx(np.eye(2), abs=1e-6)
+
+
+@pytest.mark.parametrize("status", ["Solved", "PrimalInfeasible"])
+def test_a_solver_that_returns_nothing_finite_proposes_nothing(monkeypatch, status):
+    import clarabel
+
+    class Liar:
+        def __init__(self, P, q, *rest):
+            self.size = len(q)
+
+        def solve(self):
+            return SimpleNamespace(
+                x=[np.nan] * self.size,
+                obj_val=1.0,
+                obj_val_dual=1.0,
+                status=status,
+                iterations=1,
+                solve_time=0.0,
+            )
+
+    monkeypatch.setattr(clarabel, "DefaultSolver", Liar)
+    proposal = propose_sos(problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.0))
+    assert proposal.coefficients is None
+    assert proposal.kappa == np.inf
+    assert proposal.feasible is not True
+
+
+def test_three_state_at_rate_0_999_within_the_published_bounds():
+    asked = problem(THREE_STATE, BOX_THREE, degree=2, rate=0.999 * (1 + 1e-5))
+    proposal = propose_sos(asked)
+    proof = verified(asked, proposal, "0.999", digits=8)
+    assert proof.verdict == "certified"
+    assert proof.upper_on_set.above / proof.lower_on_set.below <= 0.26 / 0.17
+
+
+def test_above_the_uncontrollable_mode_there_is_nothing():
+    proposal = propose_sos(problem(THREE_STATE, BOX_THREE, degree=2, rate=1.01))
+    assert proposal.feasible is not True
+    assert "infeasible" in proposal.status or "almost" in proposal.status or "insufficient" in proposal.status
+
+
+def test_an_angle_is_treated_exactly():
+    """A pendulum behind an actuator: verified with the true sine."""
+    asked = problem(PENDULUM, BOX_PENDULUM, degree=2, rate=0.501)
+    proposal = propose_sos(asked)
+    assert proposal.feasible
+    assert verified(asked, proposal, "0.5").verdict == "certified"
+
+
+def test_state_dependent_input():
+    """The frame must be polynomial: the one in closed form is a quotient, to which sums of squares do not apply."""
+    asked = problem(MOVING, ((-1, 1),) * 2, degree=1, rate=0.301)
+    assert "a quotient is no polynomial" in propose_sos(asked).status
+    asked = replace(asked, family=replace(asked.family, frame=commuting_frame(MOVING)))
+    proposal = propose_sos(asked)
+    assert proposal.feasible
+    assert not asked.family.flat
+    assert verified(asked, proposal, "0.3").verdict == "certified"
+
+
+def test_planar_quadrotor_with_true_sine_and_cosine():
+    """The published rate .8 and condition number (126.1 with W of degree 4, 160 with 3) nearly at degree 2, at points.
+
+    Proofs of such metrics take longer than a test may; benchmarks/synthesis.py has the larger families.
+    """
+    asked = benchmark().pvtol(degree=2, rate=0.8)
+    proposal = propose_sos(asked)
+    assert proposal.feasible
+    assert proposal.kappa < 128
+    rng = np.random.default_rng(9)
+    half = np.array([float(hi) for _, hi in asked.safe_set])
+    points = half * np.clip(rng.uniform(-1.3, 1.3, (4000, 6)), -1, 1)
+    C = contraction_values(asked, proposal.coefficients, points)
+    assert np.linalg.eigvalsh(C).min() > -1e-6
+    W = [e for row in asked.family.dual_metric(rational(proposal.coefficients)) for e in row]
+    values = Tape(W, asked.model.states).run_floats(list(points.T), (4000,)).T.reshape(-1, 6, 6)
+    spectrum = np.linalg.eigvalsh(values)
+    assert spectrum.min() > 1 - 1e-6
+    assert spectrum.max() < proposal.kappa + 1e-6
+    assert spectrum.max() > 0.97 * proposal.kappa
+
+
+def test_the_input_floor_bounds_the_input_gain():
+    asked = problem(THREE_STATE, BOX_THREE, degree=2, rate=0.91, floor="input")
+    proposal = propose_sos(asked)
+    proof = verified(asked, proposal, "0.9")
+    assert proof.verdict == "certified"
+    assert 1 / proof.lower_on_set.below <= proposal.kappa * (1 + 1e-3)  # W <= kappa I
+    W = proposal.coefficients[0]
+    assert np.linalg.inv(W)[2, 2] <= 1 + 1e-6  # B'MB <= 1
+    assert proposal.kappa < propose_sos(replace(asked, floor="identity")).kappa
+
+
+def test_a_limit_makes_more_an_opinion_of_infeasible():
+    asked = problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.74, limit=1.5)
+    proposal = propose_sos(asked)
+    assert proposal.feasible is False
+    assert "above the limit" in proposal.status
+
+
+def test_what_is_no_polynomial_is_not_applicable():
+    system = model(TWO, ("-x1 + exp(x2)", "x1"), [["0"], ["1"]])
+    proposal = propose_sos(problem(system, ((-1, 1),) * 2, degree=0, rate=0.1))
+    assert proposal.coefficients is None
+    assert proposal.feasible is None
+    assert "do not apply" in proposal.status

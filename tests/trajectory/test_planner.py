@@ -1,0 +1,398 @@
+"""The planner and what becomes of its plans: the goal, the sub-knots, the cache, and the published cases."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tubecert.conditions.kernels import Kernel
+from tubecert.conditions.problem import Drift
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import Constant
+from tubecert.errors import ExitCode, SpecError
+from tubecert.files import kept_folder
+from tubecert.model import build
+from tubecert.pipeline import Options, certify, gains
+from tubecert.planner import cache, ilqr
+from tubecert.planner.rollout import Dynamics
+from tubecert.search.distance import search_distance
+from tubecert.search.rates import search_26
+from tubecert.search.sampled import search_sampled
+from tubecert.spec import load, load_text
+from tubecert.trajectory.make import Room, grid, plan_of, rounded
+
+CONFIG = Path(__file__).parents[2] / "configs" / "two_state.yaml"
+TEXT = CONFIG.read_text(encoding="utf-8")
+SPEC = load_text(TEXT, "spec.yaml")
+MODEL = build(SPEC)
+ROOM = Room(rho=Fraction(7, 10), lower=0.2008, effort=Effort())
+
+
+@pytest.fixture(scope="module")
+def shared_cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(shared_cache, monkeypatch):
+    """Plans are kept for the tests of this file only."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared_cache))
+
+
+def edited(*changes):
+    text = TEXT
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return load_text(text, "spec.yaml")
+
+
+def problem(**changes):
+    given = {
+        "t": np.linspace(0, 5, 101),
+        "start": np.array([3.4, -2.4]),
+        "target": np.zeros(2),
+        "input": np.zeros(1),
+        "Q": 0.5 * np.eye(2),
+        "R": np.eye(1),
+        "goal": True,
+        "held": True,
+    }
+    return ilqr.Problem(**(given | changes))
+
+
+# -- the planner -----------------------------------------------------------------------------------------------
+
+
+def test_derivatives_of_a_step_are_those_of_the_step():
+    dynamics = Dynamics(MODEL)
+    rng = np.random.default_rng(0)
+    x, left, right = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), rng.normal(size=(1, 5))
+    slopes = dynamics.step_slopes(x, left, right, 0.1, 3)
+    small = 1e-6
+    for column, (dx, dl, dr) in enumerate(
+        [((small, 0), 0, 0), ((0, small), 0, 0), ((0, 0), small, 0), ((0, 0), 0, small)]
+    ):
+        change = np.array(dx)[:, None]
+        ahead = dynamics.step(x + change, left + dl, right + dr, 0.1, 3)
+        behind = dynamics.step(x - change, left - dl, right - dr, 0.1, 3)
+        assert (ahead - behind).T / (2 * small) == pytest.approx(slopes[:, :, column], abs=1e-7)
+
+
+def test_the_cost_decreases_with_every_step():
+    found = ilqr.plan(Dynamics(MODEL), problem(goal=False))
+    assert found.outcome is ilqr.Outcome.FOUND
+    assert len(found.costs) > 3
+    assert (np.diff(found.costs) <= 0).all()
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_the_goal_is_met_with_the_published_effort(held):
+    seen = []
+    found = ilqr.plan(Dynamics(MODEL), problem(held=held), lambda step, cost: seen.append((step, cost)))
+    assert found.outcome is ilqr.Outcome.FOUND
+    assert found.miss < 1e-6
+    assert np.abs(found.u).max() == pytest.approx(3.03, abs=0.02)
+    assert np.linalg.norm(found.x, axis=1).max() == pytest.approx(4.41, abs=0.01)
+    assert np.isfinite(seen).all()
+
+
+def test_a_linear_problem_is_solved_as_riccati_solves_it():
+    """A double integrator without a goal, against the discrete Riccati recursion of its own sum."""
+    text = """tubecert: 1
+name: line
+system: {states: [p, q], inputs: [u], f: ["q", "0"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], q: [-2, 2]}
+uncertainty: {h: ["0"]}
+metric: {rate: 0.5, dual_metric: [[1, 0], [0, 1]]}
+trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 4}
+"""
+    t = np.linspace(0, 4, 41)
+    given = problem(t=t, start=np.array([1.0, 0]), goal=False, Q=np.diag([2.0, 1]), R=np.array([[0.3]]))
+    found = ilqr.plan(Dynamics(build(load_text(text))), given)
+    A, B, Q, R = np.array([[1, 0.1], [0, 1]]), np.array([[0.005], [0.1]]), 0.1 * given.Q, 0.1 * given.R
+    V, gains = np.zeros((2, 2)), []
+    for _ in range(40):
+        K = np.linalg.solve(R + B.T @ V @ B, B.T @ V @ A)
+        V = Q + A.T @ V @ (A - B @ K)
+        gains.append(K)
+    x = given.start
+    for k, K in enumerate(reversed(gains)):
+        assert found.x[k] == pytest.approx(x, abs=1e-9)
+        assert found.u[k] == pytest.approx(-K @ x, abs=1e-8)
+        x = (A - B @ K) @ x
+
+
+def test_planning_is_deterministic():
+    one, two = (ilqr.plan(Dynamics(MODEL), problem(t=np.linspace(0, 5, 41))) for _ in range(2))
+    assert one.u.tobytes() == two.u.tobytes()
+    assert one.costs == two.costs
+
+
+# -- from a plan to a curve ------------------------------------------------------------------------------------
+
+
+def test_times_are_decimals_and_end_at_the_horizon():
+    t = grid(Fraction(1, 3), 8)
+    assert t[0] == 0
+    assert t[-1] == Fraction(1, 3)
+    assert all(Fraction(f"{float(v):.12g}") == v for v in t[1:-1])
+    assert rounded(-0.1) == Fraction(-1, 10)
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
+    spec = edited(("  goal: true", f"  interpolation: {interpolation}\n  goal: true"))
+    plan = plan_of(spec, MODEL, ROOM)
+    assert plan.knots.interpolation == interpolation
+    assert len(plan.pieces) > 100
+    from tubecert.trajectory.defect import Defect
+
+    delta = Defect.of(plan, MODEL, 0.7, Effort()).in_metric()
+    assert delta.above < ROOM.allowed(MODEL)
+    assert plan.horizon == 5
+    last = [float(value) for value in plan.knots.x[-1]]
+    assert last == pytest.approx([0, 0], abs=1e-4)
+
+
+def test_a_smaller_tube_asks_for_more_sub_knots():
+    small = replace(ROOM, rho=Fraction(7, 1000))
+    assert len(plan_of(SPEC, MODEL, small).pieces) > len(plan_of(SPEC, MODEL, ROOM).pieces)
+
+
+def test_the_planner_may_start_elsewhere_than_the_state():
+    spec = edited(("  target: [0, 0]", "  target: [0, 0]\n  start: [3.3, -2.4]"))
+    plan = plan_of(spec, MODEL, ROOM)
+    assert plan.knots.x[0] == (Fraction(33, 10), Fraction(-12, 5))
+    assert spec.x0 == (Fraction(17, 5), Fraction(-12, 5))
+
+
+def test_the_input_that_holds_the_target_is_the_reference():
+    """At p = 1 of p' = -p + u the input 1 costs nothing: the plan that starts there stays there."""
+    text = """tubecert: 1
+name: line
+system: {states: [p], inputs: [u], f: ["-p"], B: [[1]]}
+safe_set: {p: [-2, 2]}
+uncertainty: {h: ["0.05*sin(t)"]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.5, rho_a: 0.1}
+trajectory: {kind: ilqr, start: [1], target: [1], horizon: 2, knots: 11}
+"""
+    plan = plan_of(load_text(text), build(load_text(text)), ROOM)
+    assert [float(u) for (u,) in plan.knots.u] == pytest.approx([1.0] * 11)
+    held = load_text(text.replace("target: [1],", "target: [1], goal: false, input: [0],"))
+    assert float(plan_of(held, build(held), ROOM).knots.u[0][0]) < 0.9
+
+
+@pytest.mark.parametrize(
+    ("f", "options", "code", "help"),
+    [
+        ("p**3", "start: [5], horizon: 20, knots: 3", "TC401", "horizon"),
+        ("p", "start: [1], horizon: 1, knots: 2, R: 1e9, goal: true", None, ""),
+    ],
+)
+def test_a_planner_that_fails_says_what_to_change(f, options, code, help):
+    text = f"""tubecert: 1
+name: line
+system: {{states: [p], inputs: [u], f: ["{f}"], B: [[1]]}}
+safe_set: {{p: [-20, 20]}}
+uncertainty: {{h: ["0.05*sin(t)"]}}
+metric: {{rate: 0.5, dual_metric: [[1]]}}
+tube: {{epsilon: 0.5, rho_a: 0.1}}
+trajectory: {{kind: ilqr, target: [0], {options}}}
+"""
+    spec = load_text(text, "spec.yaml")
+    if code is None:
+        assert plan_of(spec, build(spec), ROOM).horizon == 1
+        return
+    with pytest.raises(SpecError) as caught:
+        plan_of(spec, build(spec), ROOM)
+    (finding,) = caught.value.findings
+    assert caught.value.exit_code is ExitCode.INVALID
+    assert finding.code == code
+    assert help in finding.help
+    assert finding.location.line == 8
+
+
+def test_a_goal_that_cannot_be_met_is_an_error():
+    text = """tubecert: 1
+name: line
+system: {states: [p, q], inputs: [u], f: ["-p", "-q"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], q: [-2, 2]}
+uncertainty: {h: ["0.05*sin(t)"]}
+metric: {rate: 0.5, dual_metric: [[1, 0], [0, 1]]}
+trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 1, knots: 11}
+"""
+    spec = load_text(text, "spec.yaml")
+    with pytest.raises(SpecError, match="misses the target by") as caught:
+        plan_of(spec, build(spec), ROOM)
+    assert caught.value.findings[0].code == "TC402"
+    assert "goal: false" in caught.value.findings[0].help
+
+
+# -- the cache -------------------------------------------------------------------------------------------------
+
+SMALL = ("  knots: 101", "  knots: 21")
+
+
+def counted(monkeypatch):
+    """How often the planner is asked."""
+    calls = []
+    original = ilqr.plan
+
+    def plan(*given):
+        calls.append(given)
+        return original(*given)
+
+    monkeypatch.setattr(ilqr, "plan", plan)
+    return calls
+
+
+def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    calls = counted(monkeypatch)
+    spec = edited(SMALL)
+    one, two = (plan_of(spec, MODEL, ROOM) for _ in range(2))
+    assert len(calls) == 1
+    assert one.knots == two.knots
+    plan_of(edited(SMALL, ("  R: 1\n", "  R: 2\n")), MODEL, ROOM)
+    assert len(calls) == 2
+    assert len(list(kept_folder(cache.KIND).iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: "",
+        lambda text: text[:-20],
+        lambda text: "[1, 2]",
+        lambda text: json.dumps(json.loads(text) | {"data": [["0"]] * 21}),
+        lambda text: json.dumps(json.loads(text) | {"seal": 1}),
+    ],
+)
+def test_a_broken_cache_is_not_believed(tmp_path, monkeypatch, damage):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    spec = edited(SMALL)
+    before = plan_of(spec, MODEL, ROOM).knots
+    (path,) = kept_folder(cache.KIND).iterdir()
+    path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
+    calls = counted(monkeypatch)
+    assert plan_of(spec, MODEL, ROOM).knots == before
+    assert len(calls) == 1
+
+
+def test_an_unwritable_cache_is_noted_and_does_no_harm(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("", encoding="utf-8")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    seen = []
+    plan_of(edited(SMALL), MODEL, ROOM, lambda name, count, unit: seen.append(name))
+    assert any("not kept" in name for name in seen)
+
+
+# -- the published cases ---------------------------------------------------------------------------------------
+
+CASES = {  # (eps, rho_a): A corrected, B split bandwidth, B least, C bandwidth and sample time, and its limit
+    ("0.6", "0.1"): ((65.3, 1.24e8), 15.1, (26.4, 6.1e4), (27.0, 0.0370), 0.0514),
+    ("0.6", "0.01"): ((56.8, 9.5e9), 15.0, (29.9, 1.02e5), (30.6, 0.0327), 0.0453),
+    ("0.4", "0.1"): ((102.0, 2.7e8), 22.1, (35.8, 2.1e5), (36.8, 0.0272), 0.0377),
+}
+
+
+def first_problem(spec, options, monkeypatch):
+    """The result, and the problem that the pipeline built for it."""
+    seen = []
+
+    def keep(given, **asked):
+        seen.append(given)
+        return search_26(given, **asked)
+
+    monkeypatch.setattr(gains, "search_26", keep)
+    return certify(spec, options), seen[0]
+
+
+@pytest.mark.parametrize("case", list(CASES), ids=" ".join)
+def test_the_published_cases_are_certified_and_the_reference_rows_met(case, monkeypatch):
+    radii = {"epsilon": Fraction(case[0]), "rho_a": Fraction(case[1])}
+    result, given = first_problem(SPEC, Options(**radii, conditions="all"), monkeypatch)
+    assert result["verdict"] == "certified"
+    assert all(result[name]["verdict"] == "certified" for name in ("conditions_26", "distance", "sampled"))
+    constants = result["constants"]
+    assert constants["u_star"]["above"] == pytest.approx(3.03, abs=0.01)
+    dbar = constants["plan_defect_metric"]["above"] / 1.74 / 1e-3
+    assert dbar < (0.20086**0.5) * float(given.rho)
+    # the rows take sup |h| over all times and states at once, the start as the worst one, and the paper's kernel
+    rough = Constant.exactly(2 + 0.1 * (4.4117267 + float(given.rho)))
+    row = replace(
+        given,
+        constants=replace(given.constants, h=rough, h_initial=rough),
+        kernel=Kernel.PAPER,
+        drift=Drift.SUM,
+    )
+    a, split, least, sampled, limit = CASES[case]
+    found = search_26(row).pair.recipe
+    assert (float(found.bandwidth), float(found.adaptation_rate)) == pytest.approx(a, rel=0.03)
+    best = search_distance(replace(row, A_m=None, drift=Drift.PLAN))
+    assert float(best.split.recipe.bandwidth) == pytest.approx(split, rel=0.03)
+    pair = best.least_adaptation.recipe
+    assert float(pair.bandwidth) == pytest.approx(least[0], rel=0.03)
+    assert float(pair.adaptation_rate) == pytest.approx(least[1], rel=0.1)
+    c = search_sampled(replace(row, drift=Drift.PLAN))
+    assert (float(c.pair.recipe.bandwidth), float(c.pair.recipe.sample_time)) == pytest.approx(
+        sampled, rel=0.03
+    )
+    assert c.sample_time_limit == pytest.approx(limit, rel=0.03)
+    # the defaults are tighter
+    assert result["conditions_26"]["bandwidth"] < 0.6 * a[0]
+
+
+@pytest.fixture(scope="module")
+def planned(shared_cache):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(shared_cache))
+        return certify(SPEC, Options(conditions="distance"))
+
+
+def as_file(folder: Path, result, step: int, more: str):
+    """The certified knots, every `step`-th of them, as a plan file."""
+    knots = result["plan"]["knots"]
+    rows = list(zip(knots["t"], knots["x"], knots["u"], strict=True))[::step]
+    lines = ["t,x1,x2,u", *(",".join([t, *x, *u]) for t, x, u in rows)]
+    (folder / "plan.csv").write_text("\n".join(lines), encoding="utf-8")
+    start, end = TEXT.index("trajectory:"), TEXT.index("metric:")
+    text = f"{TEXT[:start]}trajectory: {{kind: csv, file: plan.csv{more}}}\n\n{TEXT[end:]}"
+    (folder / "spec.yaml").write_text(text, encoding="utf-8")
+    return load(str(folder / "spec.yaml"))
+
+
+def test_the_recorded_knots_are_the_plan(tmp_path, planned):
+    again = certify(as_file(tmp_path, planned, 1, ", interpolation: hold"), Options(conditions="distance"))
+    assert again["constants"] == planned["constants"]
+    assert again["distance"] == planned["distance"]
+
+
+def test_a_coarse_plan_is_certified_with_larger_gains(tmp_path, planned):
+    coarse = certify(as_file(tmp_path, planned, 4, ", interpolation: hold"), Options(conditions="distance"))
+    assert coarse["constants"]["plan_defect_metric"]["above"] == pytest.approx(0.0066, rel=0.05)
+    assert coarse["verdict"] == "certified"
+    for pair in ("split", "least_adaptation"):
+        assert (
+            coarse["distance"][pair]["adaptation_rate"] > 1.02 * planned["distance"][pair]["adaptation_rate"]
+        )
+
+
+def test_the_wrong_interpolation_costs_most_of_the_tube_and_is_named(tmp_path, planned):
+    wrong = certify(as_file(tmp_path, planned, 4, ""), Options())
+    assert wrong["constants"]["plan_defect"]["above"] == pytest.approx(0.91, abs=0.01)
+    assert wrong["verdict"] == "refuted"
+    assert "by up to 0.909" in wrong["reasons"][-1]["relax"]
+    assert "83 % of the tube: with interpolation: hold it would be 0.0127" in wrong["reasons"][-1]["relax"]
+
+
+def test_certificates_of_plans_are_deterministic(planned):
+    assert certify(SPEC, Options(conditions="distance")) == planned

@@ -1,0 +1,10 @@
+"""The planner: proposes knots of a plan. Untrusted: whatever it hands over is checked by `trajectory` before use.
+
+In: a planning task and the dynamics. Out: knots.
+
+| module | what it does |
+|---|---|
+| `rollout` | the dynamics in floats |
+| `ilqr` | inputs that lead to the target |
+| `cache` | inputs kept between runs |
+"""

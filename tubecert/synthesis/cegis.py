@@ -1,0 +1,239 @@
+"""Synthesis by counterexamples: conditions at points, then attacks, whose worst points are the next conditions.
+
+Works for every expression that a specification allows. Each round solves the conditions at points (`program`): the
+least kappa there bounds the family's from below; a metric from the middle of what is feasible slightly above it is
+attacked by sampling (`attack`) and, once that finds nothing, by branch and bound (`counterexample`).
+Untrusted: what it proposes is rounded and proven by its caller.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.synthesis.attack import Attack, Attacker
+from tubecert.synthesis.conic import ConicSolution
+from tubecert.synthesis.counterexample import Judgement, counterexample
+from tubecert.synthesis.forms import FormsTape, Unknowns
+from tubecert.synthesis.parity import canonical, invariant_entries
+from tubecert.synthesis.problem import Proposal, SynthesisProblem
+from tubecert.synthesis.program import (
+    PointProgram,
+    Points,
+    contraction_points,
+    finite,
+    metric_points,
+)
+from tubecert.synthesis.sampling import floats
+
+ROUTE = "cegis"
+_ROUNDS = 60
+_GAP = 3e-3  # between kappa and its bound
+_FINE, _CHEAP = 1e-3, 40  # the same, for so few unknowns
+_WIDER, _WIDEST = 3.0, 0.1  # where the solver's accuracy leaves no room
+_HOPELESS = 1e7  # a larger kappa is no metric
+_LOOSE = 0.2  # conditions that hold by so much, relatively, are dropped
+
+
+def propose(problem: SynthesisProblem) -> Proposal:
+    """The member of the family with nearly the least kappa at the rate asked for, or why there is none."""
+    with np.errstate(all="ignore"):
+        synthesis = _Synthesis(problem)
+        try:
+            return synthesis.run()
+        except _EndedError as end:
+            return synthesis.answer(end.feasible, end.status)
+
+
+class _EndedError(Exception):
+    """There is nothing more to be done: the solver's opinion, and why."""
+
+    def __init__(self, feasible: bool | None, status: str) -> None:
+        super().__init__(status)
+        self.feasible, self.status = feasible, status
+
+
+class _Synthesis:
+    """The state of one run: the conditions, the bound, the best metric so far, and the clock."""
+
+    def __init__(self, problem: SynthesisProblem) -> None:
+        self.began = time.perf_counter()
+        self.problem = problem
+        self.forms = FormsTape(problem.model, problem.family)
+        lo, hi = floats(problem.safe_set)
+        self.symmetries, free = invariant_entries(
+            problem.model, problem.family, np.stack([lo, hi], axis=1), self.forms
+        )
+        self.unknowns = Unknowns(free)
+        self.generator = np.random.default_rng(11)
+        some = self.generator.uniform(lo, hi, (20 * len(problem.family.functions) + 20, len(lo)))
+        self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in self.symmetries)]))
+        self.attacker = Attacker.of(problem, self.forms, self.symmetries, self.generator)
+        self.gap = _FINE if self.unknowns.count <= _CHEAP else _GAP
+        self.limit = min(problem.limit or _HOPELESS, _HOPELESS)
+        self.bound, self.solver_seconds, self.rounds = 0.0, 0.0, 0
+        self.extreme: Array | None = None  # the unknowns of least kappa
+        self.best: tuple[float, Array] | None = None  # kappa and V_k
+        self.program = self._start()
+
+    def run(self) -> Proposal:
+        """Rounds of solving and attacking until the metric holds within the gap."""
+        for self.rounds in range(1, _ROUNDS + 1):
+            y = self._candidate()
+            inner = self.unknowns.matrices(y)
+            attack = self.attacker.attack(inner, self.bound * (1 + self.gap))
+            self._tell(attack)
+            if not attack.failed:
+                found = attack.kappa, self.forms.coefficients(inner) * attack.scale
+                self.best = min(self.best or found, found, key=lambda pair: pair[0])
+                if attack.kappa <= self.bound * (1 + 1.1 * self.gap):
+                    order = self.attacker.contracting.order
+                    judged = counterexample(self.problem, found[1], self.symmetries, order)
+                    if judged.verdict != "refuted":
+                        self.best = found
+                        return self.answer(True, _words(judged))
+                    attack, self.best = self._with_witness(attack, judged), None
+            self._add(attack, y)
+        return self.answer(None, f"gave up after {_ROUNDS} rounds")
+
+    def answer(self, feasible: bool | None, status: str) -> Proposal:
+        """What there is now."""
+        return Proposal(
+            route=ROUTE,
+            coefficients=self.best[1] if self.best else None,
+            kappa=self.best[0] if self.best else np.inf,
+            bound=self.bound,
+            feasible=feasible,
+            status=status,
+            rounds=self.rounds,
+            seconds=time.perf_counter() - self.began,
+            solver_seconds=self.solver_seconds,
+        )
+
+    # -- solving -----------------------------------------------------------------------------------------------
+
+    def _candidate(self) -> Array:
+        """The unknowns of a central metric; the least kappa is asked for only when its last value became too small."""
+        central = None if self.extreme is None else self._central(self.extreme)
+        if self.extreme is None or central is None:
+            self.extreme = self._least()
+            central = self._central(self.extreme)
+        return self.extreme if central is None else central
+
+    def _least(self) -> Array:
+        """The unknowns of least kappa; raises the bound, or `_EndedError` if there is none."""
+        least = self._count(self.program.least_kappa())
+        if least.values is None or not least.feasible:
+            raise _EndedError(least.feasible, least.status)
+        kappa = float(least.values[-1])
+        if not 0 < kappa < np.inf:
+            raise _EndedError(None, "the solver's kappa is no positive number")
+        self.bound = max(self.bound, min(kappa, least.bound))
+        if self.bound > self.limit:
+            raise _EndedError(False, f"kappa is at least {self.bound:.4g}, above the limit")
+        return least.values[:-1]
+
+    def _central(self, reference: Array) -> Array | None:
+        """The unknowns in the middle of what is feasible slightly above the bound; None if nothing is."""
+        found = self._count(self.program.central(self.bound * (1 + self.gap), self.gap / 4, reference))
+        if found.values is None or not found.feasible or not found.values[-1] > 0:
+            return None
+        return found.values[:-1]
+
+    def _count(self, solution: ConicSolution) -> ConicSolution:
+        self.solver_seconds += solution.seconds
+        return solution
+
+    # -- conditions --------------------------------------------------------------------------------------------
+
+    def _start(self) -> PointProgram:
+        """A few points to begin with: corners and random ones."""
+        bounded, contracting = self.attacker.bounded, self.attacker.contracting
+        c1, c2 = (
+            np.concatenate([region.corners(64, self.generator), region.random(count, self.generator)])
+            for region, count in (
+                (bounded, 10 * len(bounded.variables) + 1),
+                (contracting, 20 * len(contracting.inner) + 10),
+            )
+        )
+        metric, contraction = self._points(c1, c2)
+        return PointProgram(
+            unknowns=self.unknowns,
+            low=metric,
+            high=metric,
+            contraction=contraction,
+            floor=self.problem.floor,
+            solver=self.problem.solver,
+        )
+
+    def _points(self, c1: Array, c2: Array) -> tuple[Points, Points]:
+        c1, c2 = (np.unique(canonical(at, self.symmetries), axis=0) for at in (c1, c2))
+        return (
+            finite(metric_points(self.forms, self.unknowns, c1, self.problem.floor)),
+            finite(contraction_points(self.forms, self.unknowns, c2, self.problem.rate)),
+        )
+
+    def _add(self, attack: Attack, y: Array) -> None:
+        """Take new points into the program; if there are none, a wider gap leaves more room inside."""
+        program = self._without_loose(y)
+        low, contraction = self._points(attack.low, attack.contraction)
+        high, _ = self._points(attack.high, attack.contraction[:0])
+        fresh = [
+            _new(points, old)
+            for points, old in (
+                (low, program.low),
+                (high, program.high),
+                (contraction, program.contraction),
+            )
+        ]
+        if not any(len(points.at) for points in fresh):
+            self.gap *= _WIDER
+            if self.gap > _WIDEST:
+                raise _EndedError(None, "attacks find no further points")
+        self.program = replace(
+            program,
+            low=program.low.joined(fresh[0]),
+            high=program.high.joined(fresh[1]),
+            contraction=program.contraction.joined(fresh[2]),
+        )
+
+    def _without_loose(self, y: Array) -> PointProgram:
+        """The program without conditions that hold by far at the unknowns y: they come back if they are needed."""
+        program, attacker, V = self.program, self.attacker, self.unknowns.matrices(y)
+        most = (1 + _LOOSE) * self.problem.rate
+        return replace(
+            program,
+            low=program.low.kept(attacker.floors(V, program.low.at) < 1 + _LOOSE),
+            high=program.high.kept(attacker.tops(V, program.high.at) > (1 - _LOOSE) * self.bound),
+            contraction=program.contraction.kept(attacker.rates(V, program.contraction.at) < most),
+        )
+
+    def _with_witness(self, attack: Attack, found: Judgement) -> Attack:
+        if found.at is None:
+            return attack
+        at = found.at[None]
+        if found.condition == "C1":
+            return replace(attack, low=np.concatenate([attack.low, at]))
+        return replace(attack, contraction=np.concatenate([attack.contraction, at]))
+
+    def _tell(self, attack: Attack) -> None:
+        if self.problem.progress:
+            self.problem.progress(
+                f"round {self.rounds}: kappa >= {self.bound:.5g}; this metric {attack.kappa:.5g}, short of the rate "
+                f"by {attack.shortfall:.2g}; {self.program.size} conditions"
+            )
+
+
+def _new(points: Points, old: Points) -> Points:
+    """The points that are not there yet."""
+    known = [bool((np.abs(old.at - x).max(axis=1) > 1e-7).all()) for x in points.at]
+    return points.kept(np.array(known, dtype=bool))
+
+
+def _words(judged: Judgement) -> str:
+    if judged.verdict == "proven":
+        return "no counterexample, by branch and bound"
+    return "no counterexample found within the budget"

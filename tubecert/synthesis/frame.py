@@ -1,0 +1,220 @@
+"""Vector fields that commute with the columns of a state-dependent B.
+
+Their components are sought as combinations of products of the functions that occur in B, its divisors'
+reciprocals and the states that B moves; [b_j, e] = 0 is linear in the coefficients. It is sampled at random
+*rational* points (sines and cosines at rational points of the circle), solved exactly, and proven as an identity.
+Untrusted: `verify` proves C3 for the metric that comes of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import combinations_with_replacement
+from random import Random
+
+from tubecert.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    cos,
+    free_symbols,
+    is_zero,
+    sin,
+    symbol,
+    topological,
+)
+from tubecert.expression.matrix import Matrix, identity, jacobian, null_space, transpose
+from tubecert.model import ControlAffineModel
+from tubecert.synthesis.lifting import Lifted, at_point, lift
+
+_DEGREE = 5
+_UNKNOWNS = 900
+
+Field = tuple[Expression, ...]
+Unknown = tuple[int, int]  # (k, i): the coefficient of function k in component i
+
+
+def commuting_frame(model: ControlAffineModel) -> Matrix | None:
+    """E (n, n): columns that commute with every column of B and are independent; None if none is found.
+
+    First e_i = d/dx_i + fields in the directions that B moves, which is independent everywhere if these directions
+    commute by themselves; then any components, which may be dependent at some points (C1 fails there).
+    """
+    return _search(model, narrow=True) or _search(model, narrow=False)
+
+
+def _search(model: ControlAffineModel, *, narrow: bool) -> Matrix | None:
+    n = len(model.states)
+    moved = [i for i, row in enumerate(model.B) if any(e is not ZERO for e in row)]
+    generator = Random(1)  # noqa: S311 - any points will do, the same each time
+    found: list[Field] = []
+    previous = 0
+    for degree in range(_DEGREE + 1):
+        functions = _dictionary(model, degree)
+        unknowns = [
+            (k, i) for k in range(len(functions)) for i in range(n) if k == 0 or i in moved or not narrow
+        ]
+        if len(functions) == previous or len(unknowns) > _UNKNOWNS:
+            continue
+        previous = len(functions)
+        for field in _solutions(model, functions, unknowns, generator):
+            if all(_commutes(model, field, j) for j in range(len(model.inputs))):
+                found = _extended(found, field, generator)
+            if len(found) == n:
+                return transpose(_ordered(found, n))
+    return None
+
+
+def _dictionary(model: ControlAffineModel, degree: int) -> list[Expression]:
+    """Products of at most `degree` atoms, the simplest first; states that B moves enter at most linearly."""
+    entries = [e for row in model.B for e in row]
+    nodes = topological(entries)
+    angles = {name for node in nodes if node.op in ("sin", "cos", "tan") for name in free_symbols(node.args)}
+    atoms: list[Expression] = []
+    for name in sorted(free_symbols(entries)):
+        atoms += [cos(symbol(name)), sin(symbol(name))] if name in angles else [symbol(name)]
+    divisors = dict.fromkeys(node.args[1] for node in nodes if node.op == "div")
+    atoms += [ONE / e for e in divisors]
+    atoms += [node for node in nodes if node.op in ("exp", "sqrt")]
+    moved = [
+        symbol(name)
+        for name, row in zip(model.states, model.B, strict=True)
+        if any(e is not ZERO for e in row) and symbol(name) not in atoms
+    ]
+    result: list[Expression] = []
+    for d in range(degree + 1):
+        for choice in combinations_with_replacement([*atoms, *moved], d):
+            twice = any(choice.count(a) > 1 for a in choice if a.op == "sin")
+            if twice or sum(a in moved for a in choice) > 1:
+                continue
+            product = ONE
+            for a in choice:
+                product = product * a
+            result.append(product)
+    return list(dict.fromkeys(result))
+
+
+def _solutions(
+    model: ControlAffineModel,
+    functions: Sequence[Expression],
+    unknowns: Sequence[Unknown],
+    generator: Random,
+) -> list[Field]:
+    """Fields sum_k c_ki phi_k with b_j(e_i) = sum_l e_l d(b_ji)/dx_l at sampled points, the simplest first."""
+    import flint
+
+    n, m = len(model.states), len(model.inputs)
+    slopes = jacobian(functions, model.states)  # d phi_k/dx_l
+    along = [
+        [_dot(slopes[k], model.columns[j]) for j in range(m)] for k in range(len(functions))
+    ]  # b_j(phi_k)
+    flat = [
+        *(e for row in along for e in row),
+        *functions,
+        *(e for j in range(m) for row in model.b_x[j] for e in row),
+    ]
+    lifted = lift(flat, opaque=True)
+    place = {unknown: position for position, unknown in enumerate(unknowns)}
+    K = len(functions)
+    rows: list[list[Fraction]] = []
+    for _ in range(len(unknowns) + 8 * n):
+        if len(rows) > len(unknowns) + 8 * n:
+            break
+        try:
+            values = at_point(lifted.expressions, _random_point(lifted, generator))
+        except ZeroDivisionError:
+            continue
+        moved, phi, b_x = values[: K * m], values[K * m : K * m + K], values[K * m + K :]
+        for j in range(m):
+            for i in range(n):
+                row = [Fraction(0)] * len(unknowns)
+                for (k, component), position in place.items():
+                    row[position] = -phi[k] * b_x[(j * n + i) * n + component]
+                    if component == i:
+                        row[position] += moved[k * m + j]
+                if any(row):
+                    rows.append(row)
+    if not rows:
+        rows.append([Fraction(0)] * len(unknowns))
+    matrix = flint.fmpq_mat([[flint.fmpq(q.numerator, q.denominator) for q in row] for row in rows])
+    fields = []
+    for vector in _null_space(matrix):
+        entries = [ZERO] * n
+        for position, q in vector.items():
+            k, i = unknowns[position]
+            entries[i] = entries[i] + q * functions[k]
+        fields.append(tuple(entries))
+    return fields
+
+
+def _null_space(matrix: object) -> list[dict[int, Fraction]]:
+    """Null vectors by reduced row echelon form, one per free column, in the order of these columns."""
+    reduced, rank = matrix.rref()  # type: ignore[attr-defined]
+    table = reduced.tolist()[:rank]
+    pivots = [next(j for j, q in enumerate(row) if q != 0) for row in table]
+    width = reduced.ncols()
+    vectors = []
+    for j in sorted(set(range(width)) - set(pivots)):
+        vector = {j: Fraction(1)}
+        for row, pivot in zip(table, pivots, strict=True):
+            if row[j] != 0:
+                vector[pivot] = -Fraction(int(row[j].p), int(row[j].q))
+        vectors.append(vector)
+    return vectors
+
+
+def _random_point(lifted: Lifted, generator: Random) -> dict[str, Fraction]:
+    """Small rationals; sines and cosines on the circle by its rational parametrisation."""
+    point = {}
+    for s, c in lifted.circles.values():
+        t = Fraction(generator.randint(-9, 9), generator.randint(2, 9))
+        point[s], point[c] = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
+    for name in sorted(free_symbols(lifted.expressions)):
+        point.setdefault(name, Fraction(generator.randint(-19, 19), generator.randint(1, 9)))
+    return point
+
+
+def _commutes(model: ControlAffineModel, field: Field, j: int) -> bool:
+    """Whether [b_j, e] = 0 is proven as an identity."""
+    column = model.columns[j]
+    slopes = jacobian(field, model.states)
+    return all(
+        is_zero(_dot(slopes[i], column) - _dot(model.b_x[j][i], field)) is True for i in range(len(field))
+    )
+
+
+def _extended(found: list[Field], field: Field, generator: Random) -> list[Field]:
+    """The fields with one more, if it is independent of them at a random point."""
+    n = len(field)
+    lifted = lift([e for f in (*found, field) for e in f], opaque=True)
+    for _ in range(10):
+        try:
+            values = at_point(lifted.expressions, _random_point(lifted, generator))
+        except ZeroDivisionError:
+            continue
+        rows = [values[i : i + n] for i in range(0, len(values), n)]
+        return [*found, field] if n - len(null_space(rows)) == len(rows) else found
+    return found
+
+
+def _ordered(fields: list[Field], n: int) -> list[Field]:
+    """Fields in the order of the states that they belong to, as far as that can be seen."""
+    rest = list(fields)
+    eye = identity(n)
+    result: list[Field | None] = [None] * n
+    for i in range(n):
+        if eye[i] in rest:
+            result[i] = eye[i]
+            rest.remove(eye[i])
+    for i in range(n):
+        if result[i] is None:
+            chosen = next((f for f in rest if f[i].is_constant and f[i] is not ZERO), rest[0])
+            rest.remove(chosen)
+            lead = chosen[i]
+            result[i] = tuple(e / lead for e in chosen) if lead.is_constant else chosen
+    return [f for f in result if f is not None]
+
+
+def _dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
+    return sum((x * y for x, y in zip(a, b, strict=True) if x is not ZERO and y is not ZERO), start=ZERO)

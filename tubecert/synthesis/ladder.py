@@ -1,0 +1,309 @@
+"""From a wish to a proven metric: degrees, routes and back-offs are tried until one proposal survives its proof.
+
+A route proposes, `rounding` shortens, `tubecert.metric.verify` decides; no solver's status is believed. Every attempt
+is kept, so that a failure can say what was tried.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import floor, inf, isfinite, log10, sqrt
+
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.model import ControlAffineModel
+from tubecert.synthesis.family import MetricFamily, metric_family
+from tubecert.synthesis.problem import Floor, Proposal, Solver, SynthesisProblem
+from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
+
+_DEGREES = (0, 1, 2, 3, 4)
+_BACK_OFF = (1e-3, 1e-4, 1e-5)  # relative to the rate: what the proof may need
+_ROOM = 6.0  # so much more where W moves: it is proven box by box, and the more to spare the fewer there are
+_RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again with so much more
+_LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
+_PAYS = 0.9  # a higher degree must lower the condition number to this share
+_SHARP = 1.01  # a searched rate is settled to this factor
+_LOOKS = 4  # for advice on what would work instead
+
+Route = Callable[[SynthesisProblem], Proposal]
+Box = tuple[tuple[Fraction, Fraction], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is wanted: a metric of `model` on `safe_set`.
+
+    `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
+    for constant W, backwards where W moves; `limit` of the condition number. Unless
+    `thorough`, only the first route and back-off are tried.
+    """
+
+    model: ControlAffineModel = field(repr=False)
+    safe_set: Box
+    routes: tuple[tuple[str, Route], ...]
+    degree: int | None = None
+    variables: tuple[str, ...] | None = None
+    limit: float | None = None
+    solver: Solver = "clarabel"
+    thorough: bool = True
+    effort: Effort = field(default_factory=Effort)
+    progress: Callable[[str], None] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One proposal and what became of it; `condition_number` is proven, None if nothing was.
+
+    `undecided`: its proof ran out of boxes.
+    """
+
+    rate: float
+    degree: int
+    floor: Floor
+    route: str
+    outcome: str
+    condition_number: float | None = None
+    undecided: bool = False
+    seconds: float
+    solver_seconds: float
+
+
+class Ladder:
+    """Metrics at rates; what was found, and what was tried (`attempts`), is kept."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.attempts: list[Attempt] = []
+        self._families: dict[int, MetricFamily] = {}
+        self._found: dict[tuple[Fraction, Floor, float], VerifiedMetric | None] = {}
+        self._least_degree = 0  # below it nothing worked at a rate that was asked for before
+        self._hardest: float = 0.0
+
+    def metric(self, rate: Fraction, floor: Floor = "identity", enough: float = 0.0) -> VerifiedMetric | None:
+        """A proven metric at a rate, of nearly the least condition number (or input gain); None if none was found.
+
+        The degree is raised as long as that pays, or until the condition number is `enough`.
+        """
+        key = rate, floor, enough
+        if key not in self._found:
+            self._found[key] = self._searched(rate, floor, enough)
+        return self._found[key]
+
+    def largest_rate(
+        self, limit: float | None, least: Fraction | None = None, sharp: float = _SHARP
+    ) -> VerifiedMetric | None:
+        """A metric of the largest rate with one of condition number up to `limit`, to a factor `sharp`."""
+        best = self._first(limit, least)
+        if best is None:
+            return None
+        failed = None
+        while failed is None and best.rate < _MOST:
+            found = self._within(two_digits(best.rate * 2), limit)
+            failed = two_digits(best.rate * 2) if found is None else None
+            best = found or best
+        if failed is None:
+            return best
+        while failed > best.rate * Fraction(sharp):
+            middle = digits_below(sqrt(best.rate * failed), 4)
+            if not best.rate < middle < failed:
+                break
+            found = self._within(middle, limit)
+            best, failed = (found, failed) if found else (best, middle)
+        return best
+
+    def lower_rate(self, rate: Fraction) -> Fraction | None:
+        """A rate below one that does not work, found with few quick attempts; None if none of them works."""
+        quick = Ladder(replace(self.request, thorough=False))
+        factor = _largest(lambda f: quick._within(two_digits(rate * f), self.request.limit) is not None)
+        return factor and two_digits(rate * factor)
+
+    def smaller_box(self, rate: Fraction) -> Fraction | None:
+        """A factor by which the box, shrunk about its centre, has a metric at `rate`; likewise."""
+
+        def works(factor: Fraction) -> bool:
+            box = shrunk(self.request.safe_set, factor)
+            quick = Ladder(replace(self.request, thorough=False, safe_set=box))
+            return quick.metric(rate, enough=inf) is not None
+
+        return _largest(works)
+
+    # -- one rate -----------------------------------------------------------------------------------------------
+
+    def _first(self, limit: float | None, least: Fraction | None) -> VerifiedMetric | None:
+        """A metric at `least`, or at the largest power of two that has one."""
+        if least is not None:
+            return self._within(least, limit)
+        rate = Fraction(1)
+        while rate >= _LEAST:
+            if found := self._within(rate, limit):
+                return found
+            rate /= 4
+        return None
+
+    def _within(self, rate: Fraction, limit: float | None) -> VerifiedMetric | None:
+        found = self.metric(rate, enough=inf if limit is None else limit)
+        if found is None or (limit is not None and found.condition_number.above > limit):
+            return None
+        return found
+
+    def _searched(self, rate: Fraction, floor: Floor, enough: float) -> VerifiedMetric | None:
+        best: VerifiedMetric | None = None
+        for degree in self._degrees(rate):
+            found = self._at_degree(rate, floor, degree)
+            if best is None and found is not None and rate >= self._hardest:
+                self._least_degree, self._hardest = degree, float(rate)
+            if found is None:
+                continue
+            pays = best is None or _kappa(found) <= _PAYS * _kappa(best)
+            best = found if best is None else min(best, found, key=_kappa)
+            if not pays or _kappa(best) <= enough:
+                break
+        return best
+
+    def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
+        known = self.request.routes
+        order = known[::-1] if self._family(degree).degree else known
+        for name, route in order if self.request.thorough else order[:1]:
+            found = self._route(rate, floor, degree, name, route)
+            if found is not None:
+                return found
+        return None
+
+    def _degrees(self, rate: Fraction) -> Iterator[int]:
+        """The degree that was asked for, or from the least that may work on: a higher rate needs no lower degree."""
+        if self.request.degree is not None:
+            yield self.request.degree
+            return
+        last = -1
+        for degree in _DEGREES:
+            if rate >= self._hardest and degree < self._least_degree:
+                continue
+            family = self._family(degree)
+            if family.degree > last:
+                yield degree
+            last = family.degree
+
+    def _route(
+        self, rate: Fraction, floor: Floor, degree: int, name: str, route: Route
+    ) -> VerifiedMetric | None:
+        """One route at one degree: a smaller back-off if it finds nothing, a larger one if the proof fails."""
+        retreated = False
+        room = _ROOM if self._family(degree).degree else 1.0
+        back_offs = [room * part for part in (_BACK_OFF if self.request.thorough else _BACK_OFF[:1])]
+        while back_offs:
+            back_off = back_offs.pop(0)
+            problem = self._problem(rate, floor, degree, back_off)
+            started = time.perf_counter()
+            proposal = _guarded(name, route, problem)
+            outcome = shortest_proven(problem, proposal, rate, self.request.effort)
+            self._note(
+                Attempt(
+                    rate=float(rate),
+                    degree=degree,
+                    floor=floor,
+                    route=proposal.route,
+                    outcome="proven" if isinstance(outcome, VerifiedMetric) else outcome.reason,
+                    condition_number=outcome.condition_number.above
+                    if isinstance(outcome, VerifiedMetric)
+                    else None,
+                    undecided=isinstance(outcome, Rejected) and outcome.undecided,
+                    seconds=time.perf_counter() - started,
+                    solver_seconds=proposal.solver_seconds,
+                )
+            )
+            if isinstance(outcome, VerifiedMetric):
+                return outcome
+            if proposal.coefficients is not None and not retreated and self.request.thorough:
+                back_offs, retreated = [back_off * _RETREAT], True
+            elif retreated:
+                return None
+        return None
+
+    def _problem(self, rate: Fraction, floor: Floor, degree: int, back_off: float) -> SynthesisProblem:
+        request = self.request
+        return SynthesisProblem(
+            model=request.model,
+            safe_set=request.safe_set,
+            family=self._family(degree),
+            rate=float(rate) * (1 + back_off),
+            floor=floor,
+            limit=None if request.limit is None or floor != "identity" else 1.05 * request.limit,
+            solver=request.solver,
+            progress=request.progress,
+        )
+
+    def _family(self, degree: int) -> MetricFamily:
+        if degree not in self._families:
+            self._families[degree] = metric_family(
+                self.request.model,
+                degree=degree,
+                variables=self.request.variables,
+                safe_set=self.request.safe_set,
+            )
+        return self._families[degree]
+
+    def _note(self, attempt: Attempt) -> None:
+        self.attempts.append(attempt)
+        if self.request.progress:
+            number = attempt.condition_number
+            words = attempt.outcome if number is None else f"proven, condition number {number:.4g}"
+            self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+
+
+def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:
+    """The largest factor seen to work: bisected in (0, 1), a few times only."""
+    low, high = Fraction(0), Fraction(1)
+    for _ in range(_LOOKS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if works(middle) else (low, middle)
+    return low or None
+
+
+def _kappa(metric: VerifiedMetric) -> float:
+    """What a problem minimises, as it came out."""
+    return metric.condition_number.above if metric.floor == "identity" else metric.proposal.kappa
+
+
+def _guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
+    """What a route proposes; a solver that breaks down has proposed nothing."""
+    started = time.perf_counter()
+    try:
+        return route(problem)
+    except (ArithmeticError, ValueError, RuntimeError) as error:
+        what = " ".join(str(error).split())[:120] or type(error).__name__
+        return Proposal(
+            route=name,
+            coefficients=None,
+            kappa=float("inf"),
+            feasible=None,
+            status=f"broke down ({what})",
+            seconds=time.perf_counter() - started,
+            solver_seconds=0.0,
+        )
+
+
+def shrunk(box: Sequence[tuple[Fraction, Fraction]], factor: Fraction) -> Box:
+    """The box scaled about its centre."""
+    result = []
+    for low, high in box:
+        centre, half = (low + high) / 2, (high - low) / 2 * factor
+        result.append((centre - half, centre + half))
+    return tuple(result)
+
+
+def digits_below(value: float | Fraction, digits: int) -> Fraction:
+    """The largest decimal of so many digits that does not exceed a positive value."""
+    assert isfinite(value)
+    assert value > 0
+    exponent = floor(log10(value))
+    if Fraction(10) ** exponent > value:  # the logarithm was rounded up
+        exponent -= 1
+    unit = Fraction(10) ** (exponent - digits + 1)
+    return (Fraction(value) // unit) * unit
+
+
+def two_digits(value: Fraction) -> Fraction:
+    """Two digits, rounded down."""
+    return digits_below(value, 2)

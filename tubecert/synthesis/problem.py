@@ -1,0 +1,56 @@
+"""What a route of synthesis is asked, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from tubecert.enclosure.interval import Array
+from tubecert.model import ControlAffineModel
+from tubecert.synthesis.family import MetricFamily
+
+Floor = Literal["identity", "input"]
+Solver = Literal["clarabel", "scs"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisProblem:
+    """Find the member of `family` with the least kappa such that on the safe set (n pairs, in the order of the states)
+
+    - floor <= W(x) <= kappa I, where the floor is I (kappa bounds the condition number sup lmax(W)/inf lmin(W)), or
+      `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well);
+    - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
+
+    W and the rate of `model` are not used. Above `limit` the answer is of no use. `progress` is told a route's steps.
+    """
+
+    model: ControlAffineModel = field(repr=False)
+    safe_set: tuple[tuple[Fraction, Fraction], ...]
+    family: MetricFamily = field(repr=False)
+    rate: float
+    floor: Floor = "identity"
+    limit: float | None = None
+    solver: Solver = "clarabel"
+    progress: Callable[[str], None] | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What a route found: nothing in it is believed.
+
+    `coefficients`: V_k as floats, (K, n, n), None if there are none; `kappa`: what the route claims; `bound`: a bound
+    of kappa from below for this family as far as the solver may be trusted; `feasible`: the solver's opinion, None if
+    it has none; `status`: its words; `seconds` of all, `solver_seconds` of the solver's own.
+    """
+
+    route: str
+    coefficients: Array | None
+    kappa: float
+    bound: float = 0.0
+    feasible: bool | None
+    status: str
+    rounds: int = 1
+    seconds: float
+    solver_seconds: float

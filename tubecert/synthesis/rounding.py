@@ -1,0 +1,145 @@
+"""Float coefficients -> the shortest decimals that are still a proven metric.
+
+What is returned has passed C1-C3 on the whole safe set with its own, rounded coefficients; nothing that fails is
+returned. The proof is `tubecert.metric.verify`'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import floor, isfinite, log10
+
+import numpy as np
+
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import Constant
+from tubecert.enclosure.interval import Array, Interval
+from tubecert.expression.matrix import Matrix
+from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.model import ControlAffineModel
+from tubecert.synthesis.attack import Attack, Attacker
+from tubecert.synthesis.family import MetricFamily
+from tubecert.synthesis.forms import FormsTape
+from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
+
+_DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
+_WORTH = 1.005  # a shorter metric may have a condition number larger by this factor
+
+Coefficients = tuple[tuple[tuple[Fraction, ...], ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifiedMetric:
+    """A metric that was proven: W at `rate` on the safe set, its proof, and how it was found.
+
+    `condition_number` encloses sup lmax(W)/inf lmin(W) on the safe set, `digits` are those of the coefficients.
+    """
+
+    rate: Fraction
+    floor: Floor
+    dual_metric: Matrix = field(repr=False)
+    proof: MetricProof = field(repr=False)
+    condition_number: Constant
+    digits: int
+    family: MetricFamily = field(repr=False)
+    proposal: Proposal = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rejected:
+    """Why no rounding of a proposal is a metric: what failed with the most digits.
+
+    `undecided`: it may be one, but the proof ran out of boxes.
+    """
+
+    reason: str
+    undecided: bool = False
+
+
+def shortest_proven(
+    problem: SynthesisProblem, proposal: Proposal, rate: Fraction, effort: Effort
+) -> VerifiedMetric | Rejected:
+    """The proposal with few digits, proven at `rate`, of nearly the same condition number; or why it is not proven."""
+    values = proposal.coefficients
+    if values is None or not np.all(np.isfinite(values)) or not np.any(values):
+        return Rejected(reason=f"{proposal.route}: {proposal.status}")
+    n = len(problem.model.states)
+    if values.shape != (len(problem.family.functions), n, n):
+        return Rejected(reason=f"{proposal.route} gave coefficients of a wrong shape")
+    outcome: VerifiedMetric | Rejected = Rejected(reason=f"{proposal.route}: nothing to prove")
+    for digits in _worth_proving(problem, values, rate):
+        outcome = _proven(problem, proposal, digits, rate, effort)
+        if isinstance(outcome, VerifiedMetric):
+            break
+    return outcome
+
+
+def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction) -> list[int]:
+    """Numbers of digits in the order in which a proof is tried: the fewest that look as good as all, then all.
+
+    As good: by sampling in floats, rounding costs next to nothing of kappa, and at most half of what C2 has to spare.
+    """
+    forms = FormsTape(problem.model, problem.family)
+    nothing = np.ones((1, len(problem.model.states)))
+    attacker = Attacker.of(replace(problem, rate=float(rate)), forms, nothing, np.random.default_rng(5))
+
+    def sampled(digits: int) -> Attack:
+        return attacker.attack(np.array(rounded(values, digits), dtype=float), np.inf)
+
+    most = _DIGITS[-1]
+    with np.errstate(all="ignore"):
+        full = sampled(most)
+        for digits in _DIGITS[:-1]:
+            found = sampled(digits)
+            if found.kappa <= _WORTH * full.kappa and found.shortfall <= 0.5 * min(full.shortfall, 0.0):
+                return [digits, most]
+    return [most]
+
+
+def rounded(values: Array, digits: int) -> Coefficients:
+    """Symmetric rational matrices: every entry a multiple of one power of ten, `digits` digits for the largest."""
+    symmetric = 0.5 * (values + np.swapaxes(values, -1, -2))
+    exponent = digits - 1 - floor(log10(float(np.abs(symmetric).max())))
+    unit = Fraction(10) ** -exponent
+    return tuple(
+        tuple(tuple(round(Fraction(float(v)) / unit) * unit for v in row) for row in block)
+        for block in symmetric
+    )
+
+
+def _proven(
+    problem: SynthesisProblem, proposal: Proposal, digits: int, rate: Fraction, effort: Effort
+) -> VerifiedMetric | Rejected:
+    assert proposal.coefficients is not None
+    dual = problem.family.dual_metric(rounded(proposal.coefficients, digits))
+    proof = verify_metric(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+    if proof.verdict != "certified":
+        return Rejected(reason=f"{proposal.route}: {proof.reason}", undecided=proof.verdict == "undecided")
+    condition = condition_number(proof)
+    if not isfinite(condition.above):
+        return Rejected(reason=f"{proposal.route}: the condition number could not be bounded")
+    return VerifiedMetric(
+        rate=rate,
+        floor=problem.floor,
+        dual_metric=dual,
+        proof=proof,
+        condition_number=condition,
+        digits=digits,
+        family=problem.family,
+        proposal=proposal,
+    )
+
+
+def with_metric(model: ControlAffineModel, dual: Matrix, rate: Fraction) -> ControlAffineModel:
+    """The model with another metric."""
+    return replace(model, W=dual, rate=rate)
+
+
+def condition_number(proof: MetricProof) -> Constant:
+    """sup lmax(M)/inf lmin(M) = sup lmax(W)/inf lmin(W) on the safe set, enclosed."""
+    assert proof.lower_on_set is not None
+    assert proof.upper_on_set is not None
+    low, high = proof.lower_on_set, proof.upper_on_set
+    ratio = Interval(high.below, high.above) / Interval(low.below, low.above)
+    return Constant(below=float(ratio.lo), above=float(ratio.hi))
