@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracle import optimum
 from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO, matrix_of
 
 from tubecert.enclosure.branch_and_bound import Effort
@@ -155,9 +156,10 @@ def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
     ]
     y = cvxpy.Variable(N)
     parts = [np.eye(n) + sum(y[k] * s[k] for k in range(N)) >> 0 for s in slopes]
-    oracle = cvxpy.Problem(cvxpy.Minimize(cost @ y), parts).solve(solver="CLARABEL")
+    oracle = optimum(cvxpy.Problem(cvxpy.Minimize(cost @ y), parts))
+    assert oracle is not None
     for answer in found:
-        assert answer.objective == pytest.approx(oracle, rel=1e-4, abs=1e-4)
+        assert answer.objective == pytest.approx(oracle.value, rel=1e-4, abs=1e-4)
 
 
 # -- charts: from values to coefficients -------------------------------------------------------------------------------
@@ -377,9 +379,9 @@ def test_eliminated_split_and_direct_is_what_cvxpy_finds_plainly(system, box, de
     conditions = polynomial_conditions(asked)
     everything = polynomial_conditions(asked, pieces=0, symmetric=False)
     assert conditions.unknowns.count <= everything.unknowns.count
-    plain = benchmark().plain(everything)
-    plain.solve(solver="CLARABEL")
-    assert propose_sos(asked).kappa == pytest.approx(plain.value, rel=1e-5)
+    plain = optimum(benchmark().plain(everything))
+    assert plain is not None
+    assert propose_sos(asked).kappa == pytest.approx(plain.value, rel=max(1e-5, 10 * plain.tolerance))
 
 
 def benchmark():
