@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.expression import free_symbols, symbol, to_text
 from tubecert.findings import Finding
+from tubecert.recheck.document import Node
+from tubecert.recheck.system import read_system
 from tubecert.spec import CODES, Spec, canonical, load, load_text
 
 ROOT = Path(__file__).parents[2]
@@ -241,6 +243,32 @@ def test_equal_systems_have_equal_canonical_forms() -> None:
     assert canonical(load_text(other)) == canonical(load_text(MINIMAL))
     changed = minimal("f: [-x]", "f: [-1.0000001*x]")
     assert canonical(load_text(changed)) != canonical(load_text(MINIMAL))
+
+
+HIDDEN = [
+    "0*sqrt(x - 5)",
+    "0/x",
+    "x*x**-1 - 1",
+    "0*tan(x)",
+    "(1/x)**0 - 1",
+    "sin(0/(x + 3))",
+]
+
+
+@pytest.mark.parametrize("dropped", HIDDEN)
+@pytest.mark.parametrize(("key", "text"), [("f", "-x"), ("B", "1"), ("h", "0"), ("dual_metric", "2")])
+def test_what_must_hold_is_part_of_the_canonical_form(key: str, text: str, dropped: str) -> None:
+    """Folding to the same graph makes no equal systems: whoever reads the canonical form meets every obligation."""
+    plain = minimal("f: [-x]", 'f: ["-x"]').replace("B: [[1]]", 'B: [["1"]]').replace("h: [0]", 'h: ["0"]')
+    plain += 'metric: {rate: 1, dual_metric: [["2"]]}\ntube: {epsilon: 0.1, rho_a: 0.1}\n'
+    assert f'{key}: ["{text}"]' in plain or f'{key}: [["{text}"]]' in plain
+    spec = load_text(plain.replace(f'["{text}"]', f'["{text} + {dropped}"]'))
+    data = canonical(spec)
+    assert data != canonical(load_text(plain))
+    again = load_text(json.dumps(data))
+    assert canonical(again) == data
+    owed = [len(read_system(Node(form, "spec")).duties) for form in (canonical(load_text(plain)), data)]
+    assert owed == [0, 1]
 
 
 def test_long_constants_survive_the_canonical_form() -> None:

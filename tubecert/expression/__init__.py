@@ -8,6 +8,7 @@ yes.
 | `graph` | the hash-consed graph, exact folding, derivatives |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
+| `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |
 """
 
@@ -34,6 +35,7 @@ from tubecert.expression.graph import (
     tan,
     topological,
 )
+from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
 from tubecert.expression.scan import FUNCTIONS, ExpressionError, near, suggestion
 from tubecert.expression.text import number_text, to_text
@@ -56,6 +58,7 @@ __all__ = [
     "derivatives",
     "exp",
     "free_symbols",
+    "full_text",
     "is_zero",
     "near",
     "norm",

@@ -22,6 +22,8 @@ MAX_EXPONENT: Final = 12
 MAX_NESTED_EXPONENT: Final = 144
 MAX_BITS: Final = 5_000
 
+Duty = Literal["nonzero", "positive"]
+
 _UNARY = {"sin": graph.sin, "cos": graph.cos, "tan": graph.tan, "exp": graph.exp, "sqrt": graph.sqrt}
 _NOT_FINITE = frozenset({"nan", "inf", "infinity"})
 _FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
@@ -37,7 +39,7 @@ class Obligation:
     which `text` is that part.
     """
 
-    kind: Literal["nonzero", "positive"]
+    kind: Duty
     argument: Expression
     offset: int
     width: int
@@ -91,8 +93,9 @@ def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fr
         raise ExpressionError(
             f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
         )
-    value = _constant(text, symbols or {})
-    if not value.is_constant:
+    found = _constant(text, symbols or {})
+    value = found.expression
+    if not value.is_constant or found.obligations:
         raise ExpressionError(
             f"{word[:60]} is not a rational number",
             offset=start,
@@ -103,10 +106,10 @@ def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fr
     return value.fraction
 
 
-def _constant(text: str, symbols: Mapping[str, Fraction]) -> Expression:
+def _constant(text: str, symbols: Mapping[str, Fraction]) -> Parsed:
     known = {name: graph.constant(value) for name, value in symbols.items()}
     try:
-        return parse(text, symbols=known).expression
+        return parse(text, symbols=known)
     except ExpressionError as error:
         if error.kind == "symbol":
             names = f"known: {', '.join(sorted(known)[:20])}" if known else "there are none"
@@ -237,7 +240,7 @@ class _Lowering:
             )
         return value.fraction.numerator
 
-    def _owe(self, kind: Literal["nonzero", "positive"], argument: Expression, node: ast.expr) -> None:
+    def _owe(self, kind: Duty, argument: Expression, node: ast.expr) -> None:
         if argument.is_constant and argument.fraction != 0:
             return  # holds: a nonzero divisor, or an argument of sqrt that was seen to be positive
         offset, width = self._place(node)

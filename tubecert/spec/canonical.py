@@ -1,7 +1,8 @@
 """`Spec` -> plain data: the effective specification, defaults written out, decimals exact, texts canonical.
 
-The same system written differently (spacing, order of commutative operands, 0.5 or 1/2) gives the same data,
-and the data is itself a specification: written as YAML or JSON it loads to the same system.
+The same system written differently (spacing, order of commutative operands, 0.5 or 1/2) gives the same data; a system
+that owes something else (x + 0/y in place of x) does not. The data is itself a specification: written as YAML or JSON
+it loads to the same system.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from tubecert.expression import number_text, to_text
+from tubecert.expression import full_text, number_text
 from tubecert.spec.load import VERSION
 from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term
 
@@ -137,7 +138,7 @@ def _simulation(wanted: Simulation) -> dict[str, Any]:
 
 
 def _texts(terms: Iterable[Term]) -> list[str]:
-    return [to_text(term.expression) for term in terms]
+    return [full_text(term.expression, term.obligations) for term in terms]
 
 
 def _numbers(values: Iterable[Fraction]) -> list[str]:
