@@ -220,7 +220,8 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
     common = Fraction(
         reduce(gcd, (q.numerator for q in frequencies)), reduce(lcm, (q.denominator for q in frequencies))
     )
-    return Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
+    period = Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
+    return period if np.isfinite(period.hi) else None
 
 
 def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:

@@ -576,6 +576,7 @@ def test_periods():
     assert period(sin(t * t)) is None
     assert period(graph.exp(-t)) is None
     assert period(sin((t + 1) - t)) == (1, 1)  # any period will do
+    assert period(sin(Fraction(1, 10**400) * t)) is None  # it has one, but none that a float could hold
 
 
 def test_waves_that_cancel_where_they_agree_are_no_period():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import string
 from fractions import Fraction
 
@@ -333,3 +334,22 @@ def test_symbols_may_hide_nothing() -> None:
     names = {name: symbol(name) for name in ("si", "sin_x", "x1", "e1", "E")}
     parsed = parse("si + sin_x + x1 + 2*e1 + 1e1*E", symbols=names)
     assert free_symbols([parsed.expression]) == set(names)
+
+
+RESERVED_WORDS = ["pi", "sin", "cos", "tan", "exp", "sqrt", "abs", "norm", *keyword.kwlist]
+
+
+@pytest.mark.parametrize("name", [*RESERVED_WORDS, "", "2x", "x y", "tau#", "_x", "x" * 41, "ω"])
+def test_no_variable_can_have_a_name_that_reads_as_something_else(name: str) -> None:
+    """sin(pi) with a state named pi would be a constant: no expression is read among such names."""
+    for text in ("1", "x", f"2*{name}", f"sin({name})"):
+        with pytest.raises(ExpressionError, match="cannot be the name of a variable"):
+            parse(text, symbols={"x": x, name: symbol(name)})
+    with pytest.raises(ExpressionError):
+        parse_number("1", {name: Fraction(1)})
+
+
+@pytest.mark.parametrize("text", ["0*tan(pi/2)", "0/(1 - sin(pi/2))", "0*sqrt(cos(pi/2))"])
+def test_a_number_is_not_what_is_left_of_something_undefined(text: str) -> None:
+    with pytest.raises(ExpressionError, match="not a rational number"):
+        parse_number(text)

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
-from tubecert.expression import free_symbols, symbol, to_text
+from tubecert.expression import RESERVED, free_symbols, symbol, to_text
 from tubecert.findings import Finding
 from tubecert.recheck.document import Node
 from tubecert.recheck.system import read_system
@@ -569,3 +569,31 @@ def test_a_mutated_file_loads_or_is_refused(text: str) -> None:
         assert 1 <= finding.location.line <= len(lines)
         assert 1 <= finding.location.column <= len(lines[finding.location.line - 1]) + 1
         assert str(finding)
+
+
+@pytest.mark.parametrize("word", sorted({"t", *RESERVED, *(word.lower() for word in RESERVED)}))
+@pytest.mark.parametrize("old", ["states: [x]", "inputs: [u]", "inputs: [u],"])
+def test_a_name_hides_no_other_meaning(old: str, word: str) -> None:
+    """States, inputs, parameters: pi would be the constant, True a number, sin a function, t the time."""
+    new = (
+        f"inputs: [u], parameters: {{'{word}': 2}},"
+        if old.endswith(",")
+        else f"{old.split('[', maxsplit=1)[0]}['{word}']"
+    )
+    found = findings(minimal(old, new))
+    assert [f for f in found if f.code == "TC111" and place(f)[:2] == "3:"], found
+
+
+@pytest.mark.parametrize(
+    "number", ["1e308", "1e-999999999", "9" * 4000, "1e300*1e9", "-1e-300/1e9", "9" * 40 + "e300"]
+)
+@pytest.mark.parametrize(
+    "key", ["at: [{}]", "x: [-1, '{}']", "h: ['{}*x']", "f: ['-x + {}']", "parameters: {{a: {}}}, f: [-x]"]
+)
+def test_numbers_are_bounded_before_anything_is_computed(key: str, number: str) -> None:
+    old = next(
+        old for old in ("at: [0]", "x: [-1, 1]", "h: [0]", "f: [-x]") if old.split(":")[0] + ":" in key
+    )
+    found = findings(minimal(old, key.format(number)))
+    assert {f.code for f in found} <= {"TC102", "TC108"}, found
+    assert all(f.location is not None for f in found)

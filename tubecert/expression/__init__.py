@@ -37,14 +37,26 @@ from tubecert.expression.graph import (
 )
 from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
-from tubecert.expression.scan import FUNCTIONS, ExpressionError, near, suggestion
+from tubecert.expression.scan import (
+    FUNCTIONS,
+    MAX_NAME_LENGTH,
+    MAX_NUMBER_EXPONENT,
+    RESERVED,
+    ExpressionError,
+    is_name,
+    near,
+    suggestion,
+)
 from tubecert.expression.text import number_text, to_text
 from tubecert.expression.zero import is_zero
 
 __all__ = [
     "FUNCTIONS",
+    "MAX_NAME_LENGTH",
+    "MAX_NUMBER_EXPONENT",
     "ONE",
     "PI",
+    "RESERVED",
     "ZERO",
     "Expression",
     "ExpressionError",
@@ -59,6 +71,7 @@ __all__ = [
     "exp",
     "free_symbols",
     "full_text",
+    "is_name",
     "is_zero",
     "near",
     "norm",

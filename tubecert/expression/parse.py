@@ -16,7 +16,15 @@ from typing import Final, Literal
 
 from tubecert.expression import graph
 from tubecert.expression.graph import Expression
-from tubecert.expression.scan import ARITIES, ExpressionError, Kind, Vocabulary, normalise_spaces, scan
+from tubecert.expression.scan import (
+    ARITIES,
+    ExpressionError,
+    Kind,
+    Vocabulary,
+    is_name,
+    normalise_spaces,
+    scan,
+)
 
 MAX_EXPONENT: Final = 12
 MAX_NESTED_EXPONENT: Final = 144
@@ -64,8 +72,12 @@ def parse(
     """The expression that `text` stands for; raises `ExpressionError`.
 
     `symbols` are the names it may use (with what they stand for), `kinks` allows abs and norm, and `refused`
-    gives the reason why a name that exists elsewhere is not allowed here.
+    gives the reason why a name that exists elsewhere is not allowed here. A variable with the name of a constant, a
+    function or a keyword (`pi`, `True`) would be read as that: no text is parsed with one.
     """
+    for name in symbols:
+        if not is_name(name):
+            raise ExpressionError(f"{name[:60]!r} cannot be the name of a variable", kind="symbol")
     line = normalise_spaces(text)
     scan(line, Vocabulary(symbols=symbols.keys(), kinks=kinks, refused=refused or {}))
     return _Lowering(line, symbols).run(_tree(line))
@@ -163,7 +175,9 @@ class _Lowering:
                 return [operand]
             case ast.Call(ast.Name(name), args, []) if name in ARITIES:
                 return list(args)
-            case ast.Name() | ast.Constant(int() | float()):
+            case ast.Name():
+                return []
+            case ast.Constant(value) if type(value) in (int, float):  # True is an int, too
                 return []
         raise self._error(node, "this is not part of the grammar of expressions")
 

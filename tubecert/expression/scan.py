@@ -7,6 +7,7 @@ text.
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -30,6 +31,10 @@ ARITIES: Final[Mapping[str, int | None]] = {
 }
 FUNCTIONS: Final = tuple(ARITIES)
 KINKED: Final = frozenset({"abs", "norm"})
+MAX_NAME_LENGTH: Final = 40
+# What a name would hide: the grammar's own words, and Python's, whose parser sees the text.
+RESERVED: Final = frozenset({"pi", *FUNCTIONS, *keyword.kwlist})
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 Kind = Literal["syntax", "symbol", "limit", "value"]
 
@@ -107,6 +112,11 @@ _LOOKALIKES = {
     "\u221a": "sqrt(...)", "\u03c0": "pi", "\u2018": "no quotes", "\u2019": "no quotes", "\u00a0": "a space",
     "\u202f": "a space", "\u2009": "a space", "\uff08": "(", "\uff09": ")", "\uff0c": ",",
 }  # fmt: skip
+
+
+def is_name(word: str) -> bool:
+    """Whether a variable may have this name: it could not be told from the grammar's own words otherwise."""
+    return len(word) <= MAX_NAME_LENGTH and bool(_NAME.fullmatch(word)) and word not in RESERVED
 
 
 def normalise_spaces(text: str) -> str:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import keyword
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import FUNCTIONS, Expression, constant, symbol
+from tubecert.expression import MAX_NAME_LENGTH, RESERVED, Expression, constant, is_name, symbol
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.reader import Field, Scope
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
-MAX_NAME_LENGTH: Final = 40
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-# Words of YAML and Python, and functions that the grammar may learn later.
+# Words of YAML and other spellings of Python's, and functions that the grammar may learn later.
 _RESERVED: Final = frozenset(
-    {TIME, "pi", *FUNCTIONS, *keyword.kwlist, *(word.lower() for word in keyword.kwlist)}
+    RESERVED
+    | {TIME, *(word.lower() for word in RESERVED)}
     | {"nan", "inf", "null", "yes", "no", "on", "off"}
     | {
         "log",
@@ -138,13 +134,13 @@ def _name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> s
 def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
     if not name.isascii():
         return f"the name {name[:60]} contains letters outside ASCII", "spell Greek letters out, e.g. theta"
-    if not _NAME.fullmatch(name) or len(name) > MAX_NAME_LENGTH:
-        rule = f"a name is a letter followed by letters, digits and _ (at most {MAX_NAME_LENGTH})"
-        return f"{name[:60]!r} is not a name", rule
     if name == TIME:
         return "t is the time; it cannot be a name", "choose another name"
     if name in _RESERVED:
         return f"{name} is a reserved word", f"choose another name, e.g. {name}_"
+    if not is_name(name):
+        rule = f"a name is a letter followed by letters, digits and _ (at most {MAX_NAME_LENGTH})"
+        return f"{name[:60]!r} is not a name", rule
     if name in taken:
         return f"{name} is already the name of {_with_article(taken[name])}", "names are unique"
     return None

@@ -9,9 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TypeVar
+from typing import Final, TypeVar
 
-from tubecert.expression import Expression, ExpressionError, near, parse, parse_number, suggestion
+from tubecert.expression import (
+    MAX_NUMBER_EXPONENT,
+    Expression,
+    ExpressionError,
+    near,
+    parse,
+    parse_number,
+    suggestion,
+    topological,
+)
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
@@ -21,6 +30,7 @@ from tubecert.spec.types import Matrix, Term, TermMatrix
 Parameters = Mapping[str, Fraction]
 T = TypeVar("T")
 
+_GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
 MAX_FINDINGS = 200  # that are shown; what comes after them is only counted
 
 _CODE_OF_KIND = {
@@ -38,6 +48,18 @@ class Scope:
     symbols: Mapping[str, Expression]
     refused: Mapping[str, str] = field(default_factory=dict)
     kinks: bool = False
+
+
+MODERATE: Final = "choose units in which the numbers are moderate"
+
+
+def out_of_range(value: Fraction) -> str | None:
+    """What is wrong with the size of a number: it must be a float, give or take a rounding, and not a subnormal one."""
+    if abs(value) > _GREATEST:
+        return f"beyond 1e{MAX_NUMBER_EXPONENT}"
+    if 0 < abs(value) < 1 / _GREATEST:
+        return f"nearer to 0 than 1e-{MAX_NUMBER_EXPONENT}"
+    return None
 
 
 class Reader:
@@ -189,6 +211,9 @@ class Field:
         except ExpressionError as error:
             self._expression_error(error, codes.NUMBER)
             return None
+        if extreme := out_of_range(value):
+            self.fail(codes.LIMIT, f"{self.path} is {extreme}", MODERATE)
+            return None
         bounds = [
             f"{sign} {bound}"
             for sign, bound in ((">", above), (">=", least), ("<=", most))
@@ -227,6 +252,10 @@ class Field:
         except ExpressionError as error:
             self._expression_error(error, codes.EXPRESSION)
             return None
+        for node in topological([parsed.expression, *(owed.argument for owed in parsed.obligations)]):
+            if node.is_constant and (extreme := out_of_range(node.fraction)):
+                self.fail(codes.LIMIT, f"a constant of {self.path} is {extreme}", MODERATE)
+                return None
         return Term(
             expression=parsed.expression,
             obligations=parsed.obligations,

@@ -20,7 +20,7 @@ from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
 from tubecert.findings import Finding
 from tubecert.spec import codes
 from tubecert.spec.names import TIME, Names
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import MODERATE, Field, out_of_range
 from tubecert.spec.source import Mark, Source, decoded, read_bytes
 from tubecert.spec.types import Interpolation, Knots, Table
 
@@ -186,7 +186,11 @@ def _numbers(sheet: _Sheet, row: list[_Cell], width: int) -> list[Fraction] | No
 def _number(sheet: _Sheet, cell: _Cell) -> Fraction | None:
     match = _DECIMAL.fullmatch(cell.text)
     if match and len(cell.text) <= MAX_NUMBER_LENGTH and abs(int(match[1] or 0)) <= MAX_NUMBER_EXPONENT:
-        return Fraction(cell.text)
+        value = Fraction(cell.text)
+        if extreme := out_of_range(value):
+            sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} is {extreme}", MODERATE)
+            return None
+        return value
     code, message, help = codes.NUMBER, f"{cell.text[:40]!r} is not a decimal number", ""
     try:
         parse_number(cell.text)
