@@ -220,7 +220,8 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
     common = Fraction(
         reduce(gcd, (q.numerator for q in frequencies)), reduce(lcm, (q.denominator for q in frequencies))
     )
-    period = Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
+    with np.errstate(over="ignore"):
+        period = Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
     return period if np.isfinite(period.hi) else None
 
 
