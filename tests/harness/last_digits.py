@@ -5,21 +5,34 @@ A pytest plugin, loaded by hand. Nothing that must hold may depend on it:
     PYTHONPATH=tests/harness LAST_DIGITS=7 python -m pytest -p last_digits tests/synthesis
 
 `LAST_DIGITS` is a seed. Every float that goes into a decomposition, a linear solve or a conic program is multiplied
-with 1 + k 2^-52, |k| <= 2, and the vectors of decompositions come out with other signs, as from another kernel of BLAS.
+with 1 + k 2^-52, |k| <= 2, and the vectors of decompositions come out with other signs: always in the same way for the
+same shape, as from one library on one processor.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-_RNG = np.random.default_rng(int(os.environ.get("LAST_DIGITS", "1")))
+_SEED = int(os.environ.get("LAST_DIGITS", "1"))
 _ULPS = 2
 _FUNCTIONS = ("eigvals", "eigvalsh", "solve", "inv", "pinv", "lstsq", "cholesky", "norm", "det", "cond")
+
+
+@cache
+def _factors(*shape: int) -> np.ndarray:
+    moves = np.random.default_rng((_SEED, *shape)).integers(-_ULPS, _ULPS + 1, shape)
+    return 1 + np.finfo(float).eps * moves
+
+
+@cache
+def _signs(count: int) -> np.ndarray:
+    return np.random.default_rng((_SEED, count)).choice([-1.0, 1.0], count)
 
 
 def moved(value: Any) -> Any:
@@ -28,14 +41,10 @@ def moved(value: Any) -> Any:
         value = value.copy()
         value.data = moved(value.data)
         return value
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and not value.dtype.hasobject:
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
         with np.errstate(all="ignore"):
-            return value * (1 + np.finfo(float).eps * _RNG.integers(-_ULPS, _ULPS + 1, value.shape))
+            return value * _factors(*value.shape[-2:])
     return value
-
-
-def _signs(count: int) -> np.ndarray:
-    return _RNG.choice([-1.0, 1.0], count)
 
 
 def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -45,8 +54,7 @@ def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
 def _eigh(function: Callable[..., Any]) -> Callable[..., Any]:
     def eigh(a: Any, *rest: Any, **options: Any) -> Any:
         found = function(moved(a), *rest, **options)
-        vectors = found.eigenvectors * _signs(found.eigenvectors.shape[-1])
-        return type(found)(found.eigenvalues, vectors)
+        return type(found)(found.eigenvalues, found.eigenvectors * _signs(found.eigenvalues.shape[-1]))
 
     return eigh
 

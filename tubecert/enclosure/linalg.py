@@ -156,7 +156,7 @@ def whitening(mid: Array) -> Array:
     n = mid.shape[-1]
     bad = ~finite(mid)
     d, v = np.linalg.eigh(np.where(bad[..., None, None], np.eye(n), mid))
-    ok = d[..., 0] > 1e-14 * np.abs(d[..., -1])
+    ok = ~bad & (d[..., 0] > 1e-14 * np.abs(d[..., -1]))  # the eigenvectors of I may come with either sign
     scale = np.where(ok[..., None], 1 / np.sqrt(np.where(d > 0, d, 1.0)), 1.0)
     t = scale[..., :, None] * np.swapaxes(v, -1, -2)
     return np.where(ok[..., None, None], t, np.eye(n))
