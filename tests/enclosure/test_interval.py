@@ -92,6 +92,29 @@ def test_arithmetic_contains_the_exact_result(name, data):
     check_arithmetic(data, name)
 
 
+SMALL = [Fraction(n, 2) for n in (-7, -4, -1, 0, 2, 3, 6)]
+SPANS = [(a, b) for a in SMALL for b in SMALL if a <= b]
+
+
+@pytest.mark.parametrize("name", ARITHMETIC)
+@pytest.mark.parametrize("a", SPANS, ids=str)
+def test_every_corner_counts(name, a):
+    """All pairs of spans of every sign: the extremes of the exact corners, give or take two floats, batch or not."""
+    operation, exact = ARITHMETIC[name]
+    spans = [b for b in SPANS if name != "/" or not b[0] <= 0 <= b[1]]
+    columns = [np.array([float(end) for end in ends]) for ends in zip(*spans, strict=True)]
+    batch = operation(Interval(float(a[0]), float(a[1])), Interval(*columns))
+    for k, b in enumerate(spans):
+        corners = [exact(p, q) for p in a for q in b]
+        single = operation(thin_or_wide(tuple(map(float, a))), thin_or_wide(tuple(map(float, b))))
+        for lo, hi in ((batch.lo[k], batch.hi[k]), (single.lo, single.hi)):
+            least, most = Fraction(float(lo)), Fraction(float(hi))
+            assert least <= min(corners)
+            assert max(corners) <= most
+            assert min(corners) - least <= Fraction(1, 10**14)
+            assert most - max(corners) <= Fraction(1, 10**14)
+
+
 @given(data=st.data(), n=st.integers(-7, 9))
 @SETTINGS
 def test_powers_contain_the_exact_result(data, n):
