@@ -35,6 +35,10 @@ class TubecertError(Exception):
         self.findings = tuple(findings)
         super().__init__("; ".join(f"{item.code}: {item.message}" for item in self.findings))
 
+    def __reduce__(self) -> tuple[type[TubecertError], tuple[tuple[Finding, ...]]]:
+        """From its findings, as it was made: an error crosses processes like any value."""
+        return type(self), (self.findings,)
+
 
 class SpecError(TubecertError):
     """The specification cannot be read or does not describe a system (exit code 2)."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import json
 import os
+import pickle
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -597,3 +599,24 @@ def test_numbers_are_bounded_before_anything_is_computed(key: str, number: str) 
     found = findings(minimal(old, key.format(number)))
     assert {f.code for f in found} <= {"TC102", "TC108"}, found
     assert all(f.location is not None for f in found)
+
+
+@pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
+def test_a_specification_travels(path: Path) -> None:
+    """Pickled or copied it is equal, with the very same expressions, and knows where its keys stand."""
+    spec = load(str(path))
+    for other in (pickle.loads(pickle.dumps(spec)), copy.deepcopy(spec), copy.copy(spec)):
+        assert other == spec
+        assert other.locations == spec.locations
+        assert all(a.expression is b.expression for a, b in zip(spec.f, other.f, strict=True))
+        assert canonical(other) == canonical(spec)
+        with pytest.raises(TypeError):
+            other.locations["name"] = None  # type: ignore[index]
+
+
+def test_the_problems_of_a_file_travel() -> None:
+    with pytest.raises(SpecError) as caught:
+        load_text(minimal("f: [-x]", "f: [-z]"))
+    other = pickle.loads(pickle.dumps(caught.value))
+    assert other.findings == caught.value.findings
+    assert other.exit_code == caught.value.exit_code

@@ -1,8 +1,8 @@
 """Exact expressions: an immutable, hash-consed graph over rational constants.
 
 Structurally equal expressions are the same object, so a derivative of a large matrix shares its common parts
-and `is` decides structural equality. Constants are `Fraction`s and are folded exactly; nothing is ever
-rounded here.
+and `is` decides structural equality, also after copying or pickling. Constants are `Fraction`s and are folded exactly;
+nothing is ever rounded here.
 
 Simplification (0*e -> 0, e/e never) may forget that a part was undefined somewhere; the parser therefore
 records every partial operation as an obligation *before* the graph is built (see `parse`), and the model
@@ -11,7 +11,7 @@ proves those.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from itertools import count
 from math import isqrt
@@ -19,6 +19,7 @@ from typing import Final
 from weakref import WeakValueDictionary
 
 Number = int | Fraction
+_Row = tuple[str, Fraction | str | int | None, tuple[int, ...]]  # operation, value, places of the arguments
 
 _table: WeakValueDictionary[tuple[object, ...], Expression]
 _serial = count()
@@ -86,6 +87,19 @@ class Expression:
             raise TypeError(f"{self.op} is not a rational constant")
         return self.value
 
+    def __copy__(self) -> Expression:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Expression:
+        return self
+
+    def __reduce__(self) -> tuple[Callable[[tuple[_Row, ...]], Expression], tuple[tuple[_Row, ...]]]:
+        """As a list of operations: what is unpickled is the one node that stands for it, in any process."""
+        order = topological([self])
+        place = {node: i for i, node in enumerate(order)}
+        rows = tuple((node.op, node.value, tuple(place[arg] for arg in node.args)) for node in order)
+        return _restored, (rows,)
+
     def __repr__(self) -> str:
         from tubecert.expression.text import to_text
 
@@ -105,6 +119,17 @@ def _node(
         found.op, found.args, found.value, found.serial = op, args, value, next(_serial)
         _table[key] = found
     return found
+
+
+def _restored(rows: tuple[_Row, ...]) -> Expression:
+    """The expression of `Expression.__reduce__`."""
+    nodes: list[Expression] = []
+    for op, value, places in rows:
+        args = tuple(nodes[i] for i in places)
+        if op == "add" or (op == "mul" and not args[0].is_constant):
+            args = _ordered(*args)  # by the history of this process, not of the one that wrote it
+        nodes.append(_node(op, args, value))
+    return nodes[-1]
 
 
 def constant(value: Number) -> Expression:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import Final
 
 from tubecert.errors import SpecError
@@ -17,7 +16,7 @@ from tubecert.spec.settings import read_adaptation, read_expectation, read_kerne
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty, wanted_metric
-from tubecert.spec.types import Metric, Spec, Synthesis
+from tubecert.spec.types import Metric, Places, Spec, Synthesis
 
 VERSION: Final = 1
 
@@ -139,7 +138,7 @@ def _read_named(
         expect=expect,
         obstacles=obstacles,
         simulation=simulation,
-        locations=MappingProxyType(dict(reader.places)),
+        locations=Places(reader.places),
     )
 
 

@@ -202,6 +202,24 @@ class Simulation:
     h: tuple[Term, ...] | None = None
 
 
+class Places(Mapping[str, Location]):
+    """Where the value of each key of the file stands; read-only, and it can be pickled."""
+
+    __slots__ = ("_found",)
+
+    def __init__(self, found: Mapping[str, Location]) -> None:
+        self._found = dict(found)
+
+    def __getitem__(self, path: str) -> Location:
+        return self._found[path]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
     """A system, its safe set, uncertainty, plan, metric and options; everything exact.
@@ -233,7 +251,7 @@ class Spec:
     expect: Expectation | None
     obstacles: tuple[Obstacle, ...] = ()
     simulation: Simulation | None = None
-    locations: Mapping[str, Location] = field(repr=False, compare=False, hash=False)
+    locations: Places = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
         n, m = len(self.states), len(self.inputs)
