@@ -83,6 +83,12 @@ def test_the_same_command_gives_the_same_bytes(files, drawn):
     assert "<dc:date>" not in svg
 
 
+def test_the_example_of_the_help_runs():
+    result = command("--runs", "0", "--controllers", "ccm,l1,sampled", "--control-rate", "500")
+    assert result.exit_code == 0, result.output
+    assert "cut to" in " ".join(result.stdout.split())
+
+
 def test_json_and_quiet():
     data = json.loads(command("--runs", "0", "--json").stdout)
     assert data["format"] == "tubecert-simulation/1"
@@ -219,6 +225,7 @@ def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
         (["--duration", "9"], "the plan ends at 4 s"),
         (["--certificate", "flat.yaml"], "is not a certificate"),
         (["--certificate", "none.json"], "cannot read"),
+        (["--controllers", "sampled", "--control-rate", "500", "--sample-time", "0.005"], "no multiple"),
         (["-o", "flat.yaml"], "cannot write"),
         (["-o", "/proc/nothing"], "cannot write"),
     ],

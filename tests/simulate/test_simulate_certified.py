@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from simulated import CONFIGS, certified, setting
+from simulated import CONFIGS, FLAT, certified, setting
 
 from tubecert.certificate import digest, dump, seal
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
 from tubecert.simulate.certified import adopted, plan_of, read_certificate, require_tube
+from tubecert.simulate.grid import computer
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 
@@ -156,3 +158,47 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
     _, result = certified("three_state")
     found = setting_of(load_text(text), result)
     assert found.h != setting("three_state").h
+
+
+# the sample time of C on the ticks of a computer (S7)
+
+
+def test_a_certified_sample_time_is_cut_to_whole_control_periods():
+    """`--controllers ccm,l1,sampled --control-rate 500`, the example of its own help, ended in a ValueError."""
+    where = setting("flat")
+    Ts = where.result["sampled"]["sample_time"]
+    for rate in (Fraction(500), Fraction(70), 1 / Fraction(repr(Ts))):
+        loop = loop_of(where, "sampled", Choice(), rate)
+        cut = loop.problem.gains.sample_time
+        periods = Fraction(repr(Ts)) * rate
+        assert cut == float(int(periods) / rate)
+        assert Ts - float(1 / rate) < cut <= Ts
+        assert computer(loop.problem).every == int(periods)
+        assert ("cut to" in loop.origin) == (cut != Ts)
+        assert loop.promise is None
+    untouched = loop_of(where, "l1", Choice(), Fraction(500))
+    assert "cut to" not in untouched.origin
+
+
+@pytest.mark.parametrize("rate", ["500", "1/10"])
+def test_a_chosen_sample_time_must_fit_the_control_rate(rate):
+    where, rate = setting("flat"), Fraction(rate)
+    fitting = loop_of(where, "sampled", Choice(sample_time=3 / rate), rate)
+    assert computer(fitting.problem).every == 3
+    error, finding = refused(loop_of, where, "sampled", Choice(sample_time=Fraction(7, 2) / rate), rate)
+    assert error.exit_code is ExitCode.INVALID
+    assert "is no multiple of the control period" in finding.message
+    assert f"--sample-time {3 / rate} or {4 / rate}" in finding.help
+
+
+def test_a_control_period_longer_than_the_sample_time_is_located():
+    slow = load_text(FLAT + "simulation: {control_rate: 2}\n")
+    where = replace(setting("flat"), spec=slow)
+    error, finding = refused(loop_of, where, "sampled", Choice(), Fraction(2))
+    assert error.exit_code is ExitCode.INVALID
+    assert "is longer than the sample time" in finding.message
+    least = int(re.search(r"(\d+) Hz", finding.help).group(1))
+    assert finding.location.line == FLAT.count("\n") + 1
+    assert loop_of(where, "sampled", Choice(), Fraction(least)).problem.gains.sample_time
+    _, finding = refused(loop_of, where, "sampled", Choice(), Fraction(21, 10))
+    assert finding.location is None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.expression import Expression
-from tubecert.findings import Finding
+from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.certified import Result, above, number, plan_of
 from tubecert.simulate.problem import Controller, Gains, LoopProblem
@@ -131,30 +131,43 @@ def _horizon(spec: Spec, duration: Fraction | None) -> float:
     return float(wanted)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tuning:
+    """The gains of a loop, the certificate they belong to ("" if none), and whether they are those it proves.
+
+    `words` say where they come from.
+    """
+
+    gains: Gains | None
+    source: str
+    certified: bool
+    words: str
+
+
 def loop_of(
     setting: Setting, controller: Controller, choice: Choice, control_rate: Fraction | None = None
 ) -> Loop:
-    """A loop with its gains; raises `TubecertError` if there are none for it."""
-    gains, source, origin = _gains(setting, controller, choice)
-    covered = controller in ADAPTIVE and control_rate is None and origin != CHOSEN
-    if source and control_rate is not None and origin != CHOSEN:
-        origin += ", but not for a controller that is held"
+    """A loop with its gains; raises `TubecertError` if there are none for it, or none at the control rate."""
+    tuning = _tuning(setting, controller, choice)
+    covered = controller in ADAPTIVE and control_rate is None and tuning.certified
+    if control_rate is not None:
+        tuning = _held(setting, tuning, choice, control_rate)
     problem = LoopProblem(
         model=setting.model,
         plan=setting.plan,
         controller=controller,
         horizon=setting.horizon,
         times=setting.times,
-        gains=gains,
+        gains=tuning.gains,
         control_rate=None if control_rate is None else float(control_rate),
     )
-    return Loop(problem=problem, origin=origin, promise=promise(setting.result, source) if covered else None)
+    promised = promise(setting.result, tuning.source) if covered else None
+    return Loop(problem=problem, origin=tuning.words, promise=promised)
 
 
-def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[Gains | None, str, str]:
-    """Gains, the certificate they belong to, and their origin in words."""
+def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning:
     if controller in ("nominal", "ccm"):
-        return None, "", "no adaptation"
+        return _Tuning(gains=None, source="", certified=False, words="no adaptation")
     source = "sampled" if controller == "sampled" or choice.source == "sampled" else choice.source
     if controller == "l1" and source == "sampled":
         source = "distance"
@@ -178,7 +191,68 @@ def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[Ga
         sample_time=numbers.get("sample_time") if controller == "sampled" else None,
     )
     same = all(found.get(name) == value for name, value in replaced.items())
-    return gains, source, f"certified by {TITLES[source]}" if same else CHOSEN
+    words = f"certified by {TITLES[source]}" if same else CHOSEN
+    return _Tuning(gains=gains, source=source, certified=same, words=words)
+
+
+def _held(setting: Setting, tuning: _Tuning, choice: Choice, rate: Fraction) -> _Tuning:
+    """The tuning for a controller that is held between the samples of a computer: no certificate covers it."""
+    if tuning.gains is not None and tuning.gains.sample_time is not None:
+        tuning = _on_ticks(setting, tuning, tuning.gains.sample_time, choice.sample_time, rate)
+    if not tuning.certified:
+        return tuning
+    return replace(tuning, words=f"{tuning.words}, but not for a controller that is held")
+
+
+def _on_ticks(
+    setting: Setting, tuning: _Tuning, sample_time: float, chosen: Fraction | None, rate: Fraction
+) -> _Tuning:
+    """The tuning with a sample time of whole control periods.
+
+    That of a certificate becomes the largest multiple below it; one that was chosen must be a multiple.
+    """
+    Ts = Fraction(repr(sample_time)) if chosen is None else chosen
+    every = math.floor(Ts * rate)
+    if chosen is not None and every != chosen * rate:
+        raise TubecertError([_off_ticks(setting, chosen, rate)])
+    if every < 1:
+        raise TubecertError([_too_slow(setting, Ts, rate)])
+    if every == Ts * rate:
+        return tuning
+    assert tuning.gains is not None
+    held = float(every / rate)
+    shortened = f"the sample time {sample_time:.4g} s cut to {every} control periods, {held:.4g} s"
+    gains = replace(tuning.gains, sample_time=held)
+    return replace(tuning, gains=gains, words=f"{tuning.words}, {shortened}")
+
+
+def _off_ticks(setting: Setting, chosen: Fraction, rate: Fraction) -> Finding:
+    every = math.floor(chosen * rate)
+    near = " or ".join(str(count / rate) for count in (every, every + 1) if count)
+    period = float(1 / rate)
+    return Finding(
+        code="TC707",
+        message=f"the sample time {float(chosen):.6g} s is no multiple of the control period {period:.6g} s",
+        location=_place_of_rate(setting, rate),
+        help=f"choose --sample-time {near}, or another control rate",
+    )
+
+
+def _too_slow(setting: Setting, Ts: Fraction, rate: Fraction) -> Finding:
+    return Finding(
+        code="TC707",
+        message=f"the control period {float(1 / rate):.6g} s is longer than the sample time {float(Ts):.6g} s",
+        location=_place_of_rate(setting, rate),
+        help=f"the control rate must be {math.ceil(1 / Ts)} Hz at least, or choose a longer --sample-time",
+    )
+
+
+def _place_of_rate(setting: Setting, rate: Fraction) -> Location | None:
+    """Where the specification sets the control rate; None if the command line does."""
+    simulation = setting.spec.simulation
+    if simulation is None or simulation.control_rate != rate:
+        return None
+    return setting.spec.location("simulation.control_rate")
 
 
 def _certified(result: Result, source: str) -> dict[str, float]:
