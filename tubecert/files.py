@@ -1,6 +1,8 @@
-"""Files that are replaced as a whole, and what is kept between runs in the user's cache.
+"""Files that users name are read here and nowhere else; files are replaced as a whole; what is kept between runs.
 
-A cache entry that is broken, altered, absent or unwritable counts as absent: it only costs time.
+A name may stand for anything: a pipe that nobody writes to, a device without end, a folder. Only regular files are
+read, and not more of them than their kind allows. A cache entry that is broken, altered, absent or unwritable counts
+as absent: it only costs time.
 """
 
 from __future__ import annotations
@@ -9,9 +11,85 @@ import contextlib
 import hashlib
 import json
 import os
+import stat
+import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+from tubecert.errors import TargetError
+from tubecert.findings import Finding, Location
+from tubecert.printable import visible
+
+STDIN: Final = "-"
+_LARGEST_ENTRY: Final = 64_000_000  # of what is kept between runs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """What a user names a file for: how large one may be, the codes of its findings, and what to give instead."""
+
+    most: int
+    unreadable: str
+    too_large: str
+    help: str = ""
+
+
+def read(path: str, kind: Kind) -> bytes:
+    """The bytes of a regular file; raises `TargetError` for anything else, and for more bytes than its kind allows."""
+    try:
+        with _opened(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            data = b"" if size > kind.most else file.read(kind.most + 1)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        message = f"cannot read '{visible(path)}': {reason}"
+        raise TargetError([Finding(code=kind.unreadable, message=message, help=kind.help)]) from None
+    return _within(path, data, max(size, len(data)), kind)
+
+
+def read_stdin(kind: Kind) -> bytes:
+    """What is on stdin, within the limit of its kind; raises `TargetError`."""
+    try:
+        data = b"" if sys.stdin is None else sys.stdin.buffer.read(kind.most + 1)
+    except OSError as error:
+        message = f"cannot read stdin: {error.strerror or error}"
+        raise TargetError([Finding(code=kind.unreadable, message=message, help=kind.help)]) from None
+    return _within("<stdin>", data, len(data), kind)
+
+
+def _within(path: str, data: bytes, size: int, kind: Kind) -> bytes:
+    if size <= kind.most:
+        return data
+    message = f"the file is larger than {kind.most:,} bytes"
+    place = Location(file=path, line=1, column=1)
+    raise TargetError([Finding(code=kind.too_large, message=message, location=place, help=kind.help)])
+
+
+def _opened(path: str | Path) -> Any:
+    """A regular file, opened for reading; raises `OSError` for anything else, without waiting for it."""
+    # Without O_NONBLOCK the call would wait for somebody to open the other end of a pipe.
+    flags = (
+        os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    )
+    handle = os.open(path, flags)
+    try:
+        mode = os.fstat(handle).st_mode
+        if not stat.S_ISREG(mode):
+            raise OSError(0, f"it is {_name(mode)}, not a regular file")
+        return os.fdopen(handle, "rb")
+    except BaseException:
+        os.close(handle)
+        raise
+
+
+def _name(mode: int) -> str:
+    if stat.S_ISDIR(mode):
+        return "a folder"
+    if stat.S_ISFIFO(mode):
+        return "a pipe"
+    return "a socket" if stat.S_ISSOCK(mode) else "a device"
 
 
 def replace(path: Path, data: bytes) -> None:
@@ -45,7 +123,8 @@ def kept_folder(kind: str) -> Path:
 def read_kept(kind: str, name: str) -> Any:
     """The JSON data kept under a name; None if there are none, or they are not sealed as they were written."""
     try:
-        kept = json.loads((kept_folder(kind) / f"{name}.json").read_text(encoding="utf-8"))
+        with _opened(kept_folder(kind) / f"{name}.json") as file:
+            kept = json.loads(file.read(_LARGEST_ENTRY).decode())
         return kept["data"] if kept["key"] == name and kept["seal"] == seal(kept["data"]) else None
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, RecursionError):
         return None

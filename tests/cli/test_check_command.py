@@ -28,6 +28,7 @@ from tubecert.cli.app import app
 from tubecert.errors import ExitCode
 from tubecert.files import kept_folder, seal
 from tubecert.findings import Finding, Location, Severity
+from tubecert.printable import visible
 from tubecert.report import github, junit, sarif
 
 ROOT = Path(__file__).parents[2]
@@ -243,7 +244,7 @@ def test_annotations():
         "endColumn": "9",
         "title": "tubecert TC109",
     }
-    assert message == "no: 100 %, really\nnot\nhelp: write **"
+    assert message == "no: 100 %, really\\nnot\nhelp: write **"
     assert parsed_command(second)[0] == "warning"
     assert parsed_command(third) == ("notice", {"title": "tubecert TC205"}, "::error::injected")
     assert closing == "1 specification checked: 1 error, 1 warning, 1 note"
@@ -254,10 +255,9 @@ def test_no_text_escapes_an_annotation(message, file):
     place = Location(file=file.replace("\0", ""), line=1, column=1)
     finding = Finding(code="TC100", message=message, location=place)
     text = github.annotation(finding)
-    assert "\n" not in text
-    assert "\r" not in text
+    assert text.isprintable()
     command, properties, said = parsed_command_of(text)
-    assert (command, said) == ("error", message)
+    assert (command, said) == ("error", visible(message))
     assert properties["title"] == "tubecert TC100"
 
 

@@ -14,6 +14,7 @@ PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
 ROOMS = [
     "errors",
+    "printable",
     "findings",
     "files",
     "expression",

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from simulated import CONFIGS, FLAT, certified, setting
 
+from tubecert import certificate
 from tubecert.certificate import digest, dump, seal
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
-from tubecert.simulate.certified import adopted, plan_of, read_certificate, require_tube
+from tubecert.simulate.certified import adopted, plan_of, require_tube
 from tubecert.simulate.grid import computer
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
@@ -35,25 +36,34 @@ def written(tmp_path, result, **changes):
 
 def test_a_certificate_is_read_back(tmp_path):
     _, result = certified("flat")
-    assert read_certificate(written(tmp_path, result))["result"]["verdict"] == "certified"
+    assert certificate.load(written(tmp_path, result))["result"]["verdict"] == "certified"
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": "tubecert-certificate/1"}', "[" * 50_000, "\x00"]
+    ("text", "code"),
+    [
+        ("", "TC600"),
+        ("[]", "TC601"),
+        ("{}", "TC601"),
+        ('{"format": "tubecert-certificate/2"}', "TC602"),
+        ('{"format": "tubecert-certificate/1"}', "TC603"),
+        ("[" * 50_000, "TC600"),
+        ("\x00", "TC600"),
+        ('{"format": "x", "format": "tubecert-certificate/1"}', "TC600"),
+    ],
 )
-def test_other_files_are_no_certificates(tmp_path, text):
+def test_other_files_are_no_certificates(tmp_path, text, code):
     path = tmp_path / "c.json"
     path.write_text(text)
-    error, finding = refused(read_certificate, str(path))
-    assert error.exit_code is ExitCode.INVALID
-    assert "is not a certificate" in finding.message
+    error, finding = refused(certificate.load, str(path))
+    assert (error.exit_code, finding.code) == (ExitCode.INVALID, code)
 
 
 def test_a_changed_certificate_is_refused(tmp_path):
     _, result = certified("flat")
     changed = json.loads(json.dumps(result))
     changed["distance"]["least_adaptation"]["adaptation_rate"] *= 0.9
-    _, finding = refused(read_certificate, written(tmp_path, changed, hash=digest(result)))
+    _, finding = refused(certificate.load, written(tmp_path, changed, hash=digest(result)))
     assert "was changed" in finding.message
 
 

@@ -5,13 +5,16 @@ In: the values of a certification. Out: the JSON of the contract (design: `resul
 
 from tubecert.certificate.file import (
     FORMAT,
+    KIND,
     STDOUT,
     canonical_bytes,
     check_target,
     digest,
     dump,
     exit_code,
+    incomplete,
     load,
+    parse,
     same_file,
     seal,
     unreadable,
@@ -21,13 +24,16 @@ from tubecert.certificate.file import (
 
 __all__ = [
     "FORMAT",
+    "KIND",
     "STDOUT",
     "canonical_bytes",
     "check_target",
     "digest",
     "dump",
     "exit_code",
+    "incomplete",
     "load",
+    "parse",
     "same_file",
     "seal",
     "unreadable",

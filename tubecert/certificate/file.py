@@ -9,19 +9,25 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, cast
 
 from tubecert.errors import ExitCode, TargetError
-from tubecert.files import replace
+from tubecert.files import STDIN, Kind, read, read_stdin, replace
 from tubecert.findings import Finding
+from tubecert.printable import printable_json, visible
 
 FORMAT = "tubecert-certificate/1"
+KIND: Final = Kind(
+    most=64_000_000, unreadable="TC600", too_large="TC600", help="give a file that tubecert certify wrote"
+)
 STDOUT = "-"
 REMEDY = "choose another file with -o FILE, or -o - for stdout"
 
+_VERSIONED = re.compile(r"tubecert-certificate/\d{1,9}", re.ASCII)
 _CODES = {
     "certified": ExitCode.CERTIFIED,
     "refuted": ExitCode.NOT_CERTIFIED,
@@ -52,45 +58,70 @@ def exit_code(result: Mapping[str, Any]) -> ExitCode:
 
 def dump(certificate: Mapping[str, Any]) -> str:
     """The file's text: sorted keys, indented."""
-    return json.dumps(certificate, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(certificate, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
+    return printable_json(text) + "\n"
 
 
 def load(path: str) -> dict[str, Any]:
-    """The certificate in a file, if its format is known and its hash is that of its result.
+    """The certificate in a file (`-`: on stdin), if its format is known and its hash is that of its result.
 
-    Raises `TargetError` (TC121) for anything else. What the result says is not examined here.
+    Raises `TargetError` for anything else. What the result says is not examined here.
     """
-    try:
-        certificate = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_no_number)
-        if not isinstance(certificate, dict) or not isinstance(certificate.get("result"), dict):
-            raise ValueError("it is JSON, but no certificate")
-        if certificate.get("format") != FORMAT:
-            raise ValueError(f"its format is {str(certificate.get('format'))[:60]!r}, not {FORMAT!r}")
-        if certificate.get("hash") != digest(certificate["result"]):
-            raise ValueError("its hash is not that of its result: the file was changed")
-    except OSError as error:
-        raise unreadable(path, error.strerror or str(error)) from error
-    except UnicodeDecodeError as error:
-        raise unreadable(path, "it is not UTF-8") from error
-    except json.JSONDecodeError as error:
-        raise unreadable(path, f"it is not JSON (line {error.lineno}: {error.msg})") from error
-    except RecursionError as error:
-        raise unreadable(path, "it is nested too deeply") from error
-    except ValueError as error:
-        raise unreadable(path, str(error)) from error
+    certificate = parse(read_stdin(KIND) if path == STDIN else read(path, KIND), path)
+    if certificate.get("hash") != digest(certificate["result"]):
+        raise foreign(path, "was changed after it had been written: its hash is not that of its result")
     return certificate
+
+
+def parse(data: bytes, name: str) -> dict[str, Any]:
+    """The certificate that bytes say; its hash is not compared. Raises `TargetError`."""
+    try:
+        certificate = json.loads(data.decode(), parse_constant=_no_number, object_pairs_hook=_once)
+    except UnicodeDecodeError:
+        raise unreadable(name, "it is not UTF-8") from None
+    except json.JSONDecodeError as error:
+        raise unreadable(name, f"it is not JSON (line {error.lineno}: {error.msg})") from None
+    except RecursionError:
+        raise unreadable(name, "it is nested too deeply") from None
+    except ValueError as error:
+        raise unreadable(name, str(error)) from None
+    known = certificate.get("format") if isinstance(certificate, dict) else None
+    if not isinstance(known, str) or not _VERSIONED.fullmatch(known):
+        raise foreign(name, f"is not a certificate ({FORMAT})")
+    if known != FORMAT:
+        message = f"{visible(name)} has the format {known}; this version reads {FORMAT}"
+        raise TargetError([Finding(code="TC602", message=message, help="certify again")])
+    if not isinstance(certificate.get("result"), dict):
+        raise incomplete(name, "it has no result")
+    return cast(dict[str, Any], certificate)
 
 
 def _no_number(word: str) -> None:
     raise ValueError(f"it holds {word}, which is no number of JSON")
 
 
-def unreadable(path: str, why: str) -> TargetError:
-    """The error for a file that is no certificate."""
-    remedy = "give a file that tubecert certify wrote"
-    return TargetError(
-        [Finding(code="TC121", message=f"{path} is no certificate that can be read: {why}", help=remedy)]
-    )
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose keys are all different: readers must not differ about what it says."""
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise ValueError("a key occurs twice in one object")
+    return found
+
+
+def unreadable(name: str, why: str) -> TargetError:
+    """The error for a file that cannot be read as a certificate."""
+    return TargetError([Finding(code="TC600", message=f"cannot read {visible(name)}: {why}", help=KIND.help)])
+
+
+def foreign(name: str, why: str) -> TargetError:
+    """The error for a file that is no certificate, or no longer the one that was written."""
+    return TargetError([Finding(code="TC601", message=f"{visible(name)} {why}", help=KIND.help)])
+
+
+def incomplete(name: str, why: str) -> TargetError:
+    """The error for a certificate that lacks something, or has it of another kind, below a hash that is right."""
+    message = f"the certificate {visible(name)} is not complete: {why}"
+    return TargetError([Finding(code="TC603", message=message, help="certify again")])
 
 
 def check_target(target: str, remedy: str = REMEDY) -> None:
@@ -142,4 +173,4 @@ def same_file(target: str, source: str | Path) -> bool:
 
 
 def _unwritable(target: str, why: str, remedy: str) -> TargetError:
-    return TargetError([Finding(code="TC120", message=f"cannot write {target}: {why}", help=remedy)])
+    return TargetError([Finding(code="TC120", message=f"cannot write {visible(target)}: {why}", help=remedy)])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from tubecert.errors import ExitCode, TubecertError
@@ -41,7 +40,7 @@ def belongs(document: Node, name: str, path: str) -> str:
         message = f"{name} does not belong to {path}: {', '.join(serious)} differ"
         help_ = "certify again, or give the specification that was certified"
         raise ForeignError([Finding(code="TC604", message=message, help=help_)])
-    digest = "sha256:" + hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    digest = "sha256:" + hashlib.sha256(loaded.source.encode()).hexdigest()
     notes = [f"with {', '.join(overridden)} given on the command line"] if overridden else []
     if "synthesise" in own.get("metric", {}):
         notes.append("the metric was synthesised for it")

@@ -17,7 +17,8 @@ from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.cli.version import versions
-from tubecert.errors import ExitCode
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.files import read
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -114,9 +115,11 @@ def _kept_place(given: Mapping[str, Any], system: Spec, beside: str) -> str | No
 
 def _synthesised(path: str) -> bool:
     """Whether a file is a metric that tubecert wrote: it can write it again."""
+    from tubecert.spec.source import METRIC
+
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = json.loads(read(path, METRIC))
+    except (TubecertError, ValueError, RecursionError):
         return False
     return isinstance(content, dict) and "solver" in content and "verified_on" in content
 

@@ -141,11 +141,13 @@ def _expand(paths: Sequence[str]) -> Iterator[str]:
 
 
 def _below(folder: Path) -> list[str]:
-    """Specifications in a folder and its subfolders; hidden ones are left alone."""
+    """Specifications in a folder and its subfolders; hidden ones, and links that lead out of it, are left alone."""
+    root = folder.resolve()
     return sorted(
         str(file)
         for file in folder.rglob("*")
         if file.suffix in _SUFFIXES
         and file.is_file()
+        and file.resolve().is_relative_to(root)
         and not any(part.startswith(".") for part in file.relative_to(folder).parts)
     )

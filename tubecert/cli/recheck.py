@@ -6,14 +6,16 @@ import contextlib
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
+from tubecert.certificate import KIND, unreadable
 from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
 from tubecert.errors import ExitCode
-from tubecert.recheck.document import MOST_BYTES, read, wrong
+from tubecert.files import STDIN, read, read_stdin
+from tubecert.printable import harmless, printable_json, visible
+from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
 
 _WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
@@ -26,7 +28,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     numbers.check()
     name = str(given["certificate"])
     text = _text(name)
-    note = belongs(read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
+    note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
     with _progress(output) as report:
         found = recheck(text, name, BUDGET if budget is None else budget, report)
     shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
@@ -35,13 +37,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 
 
 def _text(name: str) -> str:
+    data = read_stdin(KIND) if name == STDIN else read(name, KIND)
     try:
-        data = sys.stdin.buffer.read(MOST_BYTES + 1) if name == "-" else Path(name).read_bytes()
-        return data.decode("utf-8")
+        return data.decode()
     except UnicodeDecodeError:
-        raise wrong("TC600", f"{name} is not UTF-8") from None
-    except OSError as error:
-        raise wrong("TC600", f"cannot read {name}: {error.strerror or error}") from None
+        raise unreadable(name, "it is not UTF-8") from None
 
 
 def _as_json(found: Recheck, name: str, note: str) -> str:
@@ -65,7 +65,7 @@ def _as_json(found: Recheck, name: str, note: str) -> str:
     }
     if note:
         data["specification"] = note
-    return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+    return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
 def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
@@ -83,7 +83,7 @@ def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
         lines += ["", f"  {found.hash}"]
         if found.unread:
             lines.append(f"  for orientation, not examined: {', '.join(found.unread)}")
-    return "\n".join(lines) + "\n"
+    return "".join(f"{harmless(visible(line))}\n" for line in lines)
 
 
 def _line(name: str, outcome: Any, *, verbose: bool) -> str:
@@ -98,7 +98,7 @@ def _progress(output: Output) -> Iterator[Report | None]:
     if output.quiet or output.no_progress or not sys.stderr.isatty():
         yield None
         return
-    yield lambda name: _status(name[:78])
+    yield lambda name: _status(visible(name)[:78])
     _status("")
 
 

@@ -12,6 +12,8 @@ from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
+from tubecert.files import STDIN
+from tubecert.printable import printable_json, visible
 
 _HTML, _MARKDOWN = (".html", ".htm"), (".md", ".markdown")
 _REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
@@ -19,6 +21,8 @@ _REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
 
 def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
     """Write the pages of the certificate in `source`. Raises `TargetError`."""
+    if source == STDIN and not targets:
+        raise refused("a certificate on stdin has no name that the page could have", "give -o FILE.html")
     pages = list(targets) if targets else [_beside(source)]
     check_pages(pages, {"certificate": source})
     sealed = certificate.load(source)
@@ -26,13 +30,13 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
         texts = {page: _render(page, sealed) for page in pages}
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
         # with a hash that is right: somebody sealed a result that lacks something, or has it of another kind
-        raise certificate.unreadable(source, f"its result is not complete ({_what(error)})") from error
+        raise certificate.incomplete(source, _what(error)) from error
     for page, text in texts.items():
         certificate.write_text(page, text, _REMEDY)
     if output.json:
-        write_stdout(json.dumps({"pages": pages}, ensure_ascii=False) + "\n")
+        write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
-        write_stdout("".join(f"page {page}\n" for page in pages))
+        write_stdout("".join(f"page {visible(page)}\n" for page in pages))
 
 
 def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:

@@ -142,10 +142,10 @@ def _certificate(
     given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Step | None
 ) -> tuple[Spec, dict[str, Any]]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
-    from tubecert.simulate.certified import adopted, read_certificate, require_tube
+    from tubecert.simulate.certified import adopted, require_tube
 
     if given["certificate"] is not None:
-        sealed = read_certificate(str(given["certificate"]))
+        sealed = certificate.load(str(given["certificate"]))
         system = adopted(system, sealed["result"])
         require_tube(sealed["result"])
         return system, sealed

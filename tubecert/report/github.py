@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tubecert.checking import Checked
 from tubecert.findings import Finding, Severity
+from tubecert.printable import visible
 from tubecert.report.findings import summary
 
 _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
@@ -44,12 +45,12 @@ def annotation(finding: Finding) -> str:
 
 def escape_data(text: str) -> str:
     """A message as it may stand after `::`."""
-    return _replaced(text, _DATA)
+    return _replaced("\n".join(map(visible, text.split("\n"))), _DATA)
 
 
 def escape_property(text: str) -> str:
     """A value as it may stand between `=` and `,`."""
-    return _replaced(text, _PROPERTY)
+    return _replaced(visible(text), _PROPERTY)
 
 
 def _replaced(text: str, table: Mapping[str, str]) -> str:
@@ -96,7 +97,7 @@ def _where(finding: Finding) -> str:
 def _cell(text: str) -> str:
     """Text in a cell of a table: no markup, no line breaks."""
     table = {character: f"\\{character}" for character in "\\`*_{}[]()#+-!|~>"} | {"<": "&lt;", "&": "&amp;"}
-    return _replaced(" ".join(text.split()), table)
+    return _replaced(visible(" ".join(text.split())), table)
 
 
 def append_step_summary(results: Sequence[Checked]) -> None:

@@ -1,4 +1,7 @@
-"""Where text goes: a terminal with its width and colours, or a pipe with neither."""
+"""Where text goes: a terminal with its width and colours, or a pipe with neither.
+
+Whatever the text holds, nothing but our own colours steers the terminal, and no line is a command of a workflow.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,8 @@ from typing import TYPE_CHECKING, TextIO
 from rich.color import ColorSystem
 from rich.console import Console
 from rich.segment import Segment
+
+from tubecert.printable import harmless, visible
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -79,7 +84,7 @@ class Terminal:
         colors = ColorSystem.STANDARD if self.colored else None
         for renderable in renderables:
             for line in Segment.split_lines(console.render(renderable, console.options)):
-                buffer.write(_line(line, colors) + "\n")
+                buffer.write(_line(_harmless(line), colors) + "\n")
         return buffer.getvalue()
 
     def show(self, renderables: RenderableType | Iterable[RenderableType]) -> None:
@@ -91,6 +96,13 @@ class Terminal:
             self.stream.flush()
         except (OSError, ValueError):
             return
+
+
+def _harmless(line: list[Segment]) -> list[Segment]:
+    """The line with visible characters only; one that could be a command loses its colours and is none."""
+    shown = [Segment(visible(segment.text), segment.style) for segment in line if not segment.control]
+    text = "".join(segment.text for segment in shown)
+    return shown if harmless(text) == text else [Segment(harmless(text))]
 
 
 def _line(line: list[Segment], colors: ColorSystem | None) -> str:

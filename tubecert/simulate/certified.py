@@ -11,39 +11,16 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Final, cast
 
-from tubecert.certificate import FORMAT, digest
-from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
+from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Interpolation, Knots, Spec, Tube, canonical, load_text
-from tubecert.spec.source import read_bytes
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
 
 Result = Mapping[str, Any]
 
-MAX_BYTES: Final = 100_000_000
 _FREE: Final = ("name", "obstacles", "simulation", "expect", "conditions")  # no claim depends on them
-
-
-def read_certificate(path: str) -> dict[str, Any]:
-    """The certificate in a file; raises `TargetError` if it cannot be read or is none, or was changed."""
-    data = read_bytes(path, "give the JSON file that certify has written", MAX_BYTES)
-    try:
-        certificate = json.loads(data)
-        genuine = certificate["format"] == FORMAT and certificate["result"]["verdict"]
-        unchanged = certificate["hash"] == digest(certificate["result"])
-    except (ValueError, KeyError, TypeError, RecursionError):
-        genuine = unchanged = False
-    if not genuine:
-        help = "give the JSON file that certify has written"
-        raise TargetError(
-            [Finding(code="TC601", message=f"{path} is not a certificate ({FORMAT})", help=help)]
-        )
-    if not unchanged:
-        message = f"{path} was changed after it had been written: its hash does not match its result"
-        raise TargetError([Finding(code="TC601", message=message, help="certify again")])
-    return cast(dict[str, Any], certificate)
 
 
 def adopted(spec: Spec, result: Result) -> Spec:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 from tubecert.errors import SpecError
-from tubecert.findings import Finding
+from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import completed, read_initial_state, read_trajectory
-from tubecert.spec.reader import MAX_FINDINGS, Field, Reader, root_field
+from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
@@ -65,12 +65,7 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
     def position(finding: Finding) -> tuple[int, int]:
         return (finding.location.line, finding.location.column) if finding.location else (0, 0)
 
-    ordered = sorted(findings, key=position)
-    if len(ordered) > MAX_FINDINGS:
-        rest = len(ordered) - MAX_FINDINGS
-        more = Finding(code=codes.LIMIT, message=f"and {rest} more problems", location=ordered[-1].location)
-        return [*ordered[:MAX_FINDINGS], more]
-    return ordered
+    return capped(sorted(findings, key=position), codes.LIMIT)
 
 
 def _read(root: Field) -> Spec | None:

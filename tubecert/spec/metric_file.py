@@ -14,7 +14,7 @@ from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader, root_field
-from tubecert.spec.source import Source, check_limits, read_source
+from tubecert.spec.source import METRIC, Source, check_limits, read_source
 from tubecert.spec.system import metric_of
 from tubecert.spec.types import Metric, Spec
 
@@ -32,7 +32,7 @@ def with_metric(spec: Spec, path: str) -> Spec:
 
     Raises `TargetError` if the file cannot be read, `SpecError` with every problem in it.
     """
-    return _with(spec, read_source(path, "give the path of a metric file (tubecert synth writes them)"))
+    return _with(spec, read_source(path, METRIC))
 
 
 def with_metric_text(spec: Spec, text: str, file: str) -> Spec:

@@ -21,17 +21,16 @@ from tubecert.expression import (
     suggestion,
     topological,
 )
-from tubecert.findings import Finding, Location
+from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
-from tubecert.spec.source import Mark, Source, displayed
+from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
 
 Parameters = Mapping[str, Fraction]
 T = TypeVar("T")
 
 _GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
-MAX_FINDINGS = 200  # that are shown; what comes after them is only counted
 
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
@@ -72,8 +71,7 @@ class Reader:
         self.places: dict[str, Location] = {}
 
     def report(self, code: str, location: Location, message: str, help: str = "") -> None:
-        """Adds an error; what is quoted of the file cannot steer a terminal."""
-        message, help = displayed(message), displayed(help)
+        """Adds an error."""
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
 
 
@@ -310,7 +308,7 @@ class Field:
 
     def _unknown(self, key: Scalar, known: Sequence[str]) -> list[str]:
         """Reports an unknown key; returns the known ones that it may stand for."""
-        if len(self.reader.findings) > MAX_FINDINGS:
+        if len(self.reader.findings) > MOST:
             self._at(codes.UNKNOWN_KEY, key, "unknown key")
             return []
         shown = key.text[:60]

@@ -6,12 +6,21 @@ import re
 from dataclasses import dataclass, field
 from typing import Final, NoReturn
 
-from tubecert.errors import SpecError, TargetError
+from tubecert.errors import SpecError
+from tubecert.files import Kind, read
 from tubecert.findings import Finding, Location
+from tubecert.printable import blanked
 from tubecert.spec import codes
 
 MAX_BYTES: Final = 1_000_000
 MAX_NESTING: Final = 50
+
+_CODES = {"unreadable": codes.UNREADABLE, "too_large": codes.LIMIT}
+SPECIFICATION: Final = Kind(most=MAX_BYTES, **_CODES, help="give the path of a specification (a YAML file)")
+METRIC: Final = Kind(
+    most=MAX_BYTES, **_CODES, help="give the path of a metric file (tubecert synth writes them)"
+)
+PLAN: Final = Kind(most=10_000_000, **_CODES)
 
 _BREAK = re.compile(r"\r\n|\r|\n")
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
@@ -39,7 +48,7 @@ class Source:
     def of(cls, file: str, text: str) -> Source:
         """The source with its lines found."""
         starts = (0, *(match.end() for match in _BREAK.finditer(text)))
-        lines = tuple(displayed(line) for line in _BREAK.split(text))
+        lines = tuple(blanked(line) for line in _BREAK.split(text))
         return cls(file=file, text=text, lines=lines, starts=starts)
 
     def location(self, mark: Mark, width: int = 1) -> Location:
@@ -64,28 +73,9 @@ class Source:
         return Mark(line=low, column=index - self.starts[low])
 
 
-def displayed(line: str) -> str:
-    """The text with a space for every character that is not printable."""
-    return line if line.isprintable() else "".join(c if c.isprintable() else " " for c in line)
-
-
-def read_source(path: str, help: str = "give the path of a specification (a YAML file)") -> Source:
-    """The file's text; raises `TargetError` if it cannot be read, `SpecError` if it breaks a limit."""
-    return decoded(path, read_bytes(path, help))
-
-
-def read_bytes(path: str, help: str, limit: int = MAX_BYTES) -> bytes:
-    """The file's bytes, `limit` of them at most."""
-    try:
-        with open(path, "rb") as file:
-            data = file.read(limit + 1)
-    except (OSError, ValueError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)).lower()
-        finding = Finding(code=codes.UNREADABLE, message=f"cannot read {path!r}: {reason}", help=help)
-        raise TargetError([finding]) from None
-    if len(data) > limit:
-        _refuse(Source.of(path, ""), 0, codes.LIMIT, f"the file is larger than {limit:,} bytes")
-    return data
+def read_source(path: str, kind: Kind = SPECIFICATION) -> Source:
+    """The file's text; raises `TargetError` if it cannot be read or is too large, `SpecError` if it is no text."""
+    return decoded(path, read(path, kind))
 
 
 def decoded(path: str, data: bytes) -> Source:

@@ -2,6 +2,9 @@
 
 The first line names the columns: t, every state and every input, in any order. Each further line is a knot; times
 begin at 0 and increase. Numbers are read exactly from their text.
+
+A specification may come from a stranger and name any file that its reader may read. So nothing of a file is shown that
+is not a plan: names of columns if one of them is wanted, lines of numbers below a header that is complete.
 """
 
 from __future__ import annotations
@@ -9,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Final
@@ -17,17 +20,19 @@ from typing import Final
 from tubecert.errors import TubecertError
 from tubecert.expression import ExpressionError, parse_number, suggestion
 from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
-from tubecert.findings import Finding
+from tubecert.files import read
+from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import MODERATE, Field, out_of_range
-from tubecert.spec.source import Mark, Source, decoded, read_bytes
+from tubecert.spec.source import PLAN, Mark, Source, decoded
 from tubecert.spec.types import Interpolation, Knots, Table
 
-MAX_FILE: Final = 10_000_000
 MAX_ROWS: Final = 10_001
+MAX_COLUMNS: Final = 200
 
 _DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?", re.ASCII)
+_COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)
 _ENOUGH: Final = 20  # findings of one file
 
 
@@ -42,15 +47,17 @@ class _Cell:
 
 @dataclass(slots=True, kw_only=True)
 class _Sheet:
-    """A file being read, and what is wrong with it."""
+    """A file being read, and what is wrong with it; its lines are `shown` once it is known to be a plan."""
 
     source: Source
+    shown: bool = False
     findings: list[Finding] = field(default_factory=list)
 
     def fail(self, cell: _Cell, code: str, message: str, help: str = "") -> None:
         """Adds a finding at a cell."""
         mark = Mark(line=cell.line, column=cell.column)
         location = self.source.location(mark, len(cell.text))
+        location = location if self.shown else replace(location, source="")
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
 
 
@@ -61,13 +68,13 @@ def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Tabl
         return None
     path = Path(entry.reader.source.file).parent / name
     try:
-        data = read_bytes(str(path), "", MAX_FILE)
+        data = read(str(path), PLAN)
         sheet = _Sheet(source=decoded(str(path), data))
     except TubecertError as error:
         _forward(entry, error)
         return None
     knots = _read(sheet, names, interpolation)
-    entry.reader.findings.extend(sheet.findings)
+    entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, _ENOUGH))
     if knots is None or sheet.findings:
         return None
     return Table(file=name, sha256=hashlib.sha256(data).hexdigest(), knots=knots)
@@ -77,7 +84,8 @@ def _forward(entry: Field, error: TubecertError) -> None:
     """What is wrong with the file as a whole: located in it if it could be read, else where it is named."""
     for finding in error.findings:
         if finding.location is not None:
-            entry.reader.findings.append(finding)
+            unseen = replace(finding.location, source="")
+            entry.reader.findings.append(replace(finding, location=unseen))
         else:
             entry.fail(
                 finding.code, finding.message, "the name is relative to the folder of the specification"
@@ -85,8 +93,10 @@ def _forward(entry: Field, error: TubecertError) -> None:
 
 
 def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | None:
-    rows = _rows(sheet.source)
+    rows = _rows(sheet)
     header = next(rows, None)
+    if sheet.findings:
+        return None
     if header is None:
         message = "the plan file is empty"
         sheet.fail(_Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(names))
@@ -122,9 +132,13 @@ def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | 
     )
 
 
-def _rows(source: Source) -> Iterator[list[_Cell]]:
-    """The cells of every line that is not blank."""
-    for number, line in enumerate(source.lines):
+def _rows(sheet: _Sheet) -> Iterator[list[_Cell]]:
+    """The cells of every line that is not blank, up to the first line that has too many."""
+    for number, line in enumerate(sheet.source.lines):
+        if line.count(",") >= MAX_COLUMNS:
+            message = f"the line has {line.count(',') + 1:,} cells; a plan has at most {MAX_COLUMNS} columns"
+            sheet.fail(_Cell(text="", line=number, column=0), codes.LIMIT, message)
+            return
         if line.strip():
             yield list(_cells(line, number))
 
@@ -143,23 +157,23 @@ def _cells(line: str, number: int) -> Iterator[_Cell]:
 def _columns(sheet: _Sheet, header: list[_Cell], names: Names) -> list[int] | None:
     """Where t, the states and the inputs stand."""
     wanted = (TIME, *names.states, *names.inputs)
-    place: dict[str, int] = {}
     if header[0].text.startswith("#"):  # as numpy.savetxt writes it
         bare = header[0].text.lstrip("# \t")
         moved = header[0].column + len(header[0].text) - len(bare)
         header[0] = _Cell(text=bare, line=header[0].line, column=moved)
-    for index, cell in enumerate(header):
-        if cell.text in place:
-            sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
-        elif cell.text not in wanted:
-            help = suggestion(cell.text, wanted, what="columns")
-            if len(header) == 1 and re.search(r"[;\t ]", cell.text):
-                help = "separate columns by commas"
-            sheet.fail(
-                cell, codes.PLAN_COLUMNS, f"{cell.text[:60]!r} is neither t nor a state nor an input", help
-            )
-        else:
-            place[cell.text] = index
+    if not any(cell.text in wanted for cell in header):
+        cells = "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
+        message = f"the first line {cells} t, a state or an input"
+        commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
+        sheet.fail(
+            _Cell(text="", line=header[0].line, column=0),
+            codes.PLAN_COLUMNS,
+            message,
+            f"separate columns by commas; {_wanted(names)}" if commas else _wanted(names),
+        )
+        return None
+    sheet.shown = all(_COLUMN.fullmatch(cell.text) for cell in header)
+    place = _placed(sheet, header, wanted)
     missing = [name for name in wanted if name not in place]
     if missing and not sheet.findings:
         message = f"the plan file lacks {'a column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
@@ -167,8 +181,28 @@ def _columns(sheet: _Sheet, header: list[_Cell], names: Names) -> list[int] | No
     return None if sheet.findings else [place[name] for name in wanted]
 
 
+def _placed(sheet: _Sheet, header: list[_Cell], wanted: tuple[str, ...]) -> dict[str, int]:
+    """The columns by name; those that are not wanted, or occur twice, are findings."""
+    place: dict[str, int] = {}
+    for index, cell in enumerate(header):
+        if cell.text in place:
+            sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
+        elif cell.text in wanted:
+            place[cell.text] = index
+        else:
+            said = f"{cell.text!r}" if _COLUMN.fullmatch(cell.text) else f"the name of column {index + 1}"
+            message = f"{said} is neither t nor a state nor an input"
+            help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted_of(wanted)
+            sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
+    return place
+
+
 def _wanted(names: Names) -> str:
-    return f"the first line names the columns: {','.join((TIME, *names.states, *names.inputs))}"
+    return _wanted_of((TIME, *names.states, *names.inputs))
+
+
+def _wanted_of(columns: tuple[str, ...]) -> str:
+    return f"the first line names the columns: {','.join(columns)}"
 
 
 def _numbers(sheet: _Sheet, row: list[_Cell], width: int) -> list[Fraction] | None:
