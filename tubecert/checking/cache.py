@@ -12,7 +12,6 @@ import json
 from dataclasses import asdict
 from fractions import Fraction
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +19,10 @@ import tubecert
 from tubecert.checking.expectations import Claim, Outcome
 from tubecert.files import keep, read_kept
 from tubecert.findings import Finding, Location, Severity
+from tubecert.libraries import versions
 from tubecert.spec import Spec, canonical
 
 KIND = "checks"
-_LIBRARIES = ("numpy", "scipy", "pyyaml")
 
 
 def key_of_text(what: str, spec: Spec) -> str:
@@ -47,13 +46,12 @@ def _key(content: Any) -> str:
 
 @cache
 def _program() -> list[str]:
-    """A fingerprint of the program: its version, its source, and the versions of libraries."""
+    """A fingerprint of the program: its source, and the versions of all that results rest on."""
     package = Path(tubecert.__file__).parent
     source = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         source.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
-    versions = [f"{name} {metadata.version(name)}" for name in _LIBRARIES]
-    return [tubecert.__version__, source.hexdigest(), *versions]
+    return [source.hexdigest(), *(f"{name} {version}" for name, version in versions().items())]
 
 
 def read_findings(name: str, spec: Spec) -> list[Finding] | None:

@@ -16,9 +16,9 @@ from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.targets import plan_of, refused, spare
-from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
+from tubecert.libraries import versions
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:

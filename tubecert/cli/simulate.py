@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
-from tubecert.cli.version import versions
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding
+from tubecert.libraries import versions
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
