@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
 from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
@@ -16,6 +16,7 @@ from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
+from tubecert.spec.synthesis import solver_name
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
@@ -71,7 +72,9 @@ def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -
     changes: dict[str, Any] = {
         name: values[name] for name in ("rate", "condition_number") if values[name] is not None
     }
-    for name in ("degree", "route", "solver", "objective"):
+    if given["solver"] is not None:
+        changes["solver"] = _solver(given["solver"])
+    for name in ("degree", "route", "objective"):
         if given[name] is not None:
             changes[name] = given[name] if name == "degree" else str(given[name])
     if given["variables"] is not None:
@@ -91,6 +94,13 @@ def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -
     return wanted
 
 
+def _solver(text: str) -> str:
+    found = solver_name(text)
+    if found is None:
+        _refuse("--solver", text, "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows")
+    return found
+
+
 def _names(system: Spec, text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
@@ -99,7 +109,7 @@ def _names(system: Spec, text: str) -> tuple[str, ...]:
     return names
 
 
-def _refuse(option: str, text: str, message: str) -> None:
+def _refuse(option: str, text: str, message: str) -> Never:
     place = OptionPlace(file=option, line=1, column=1, source=text, width=len(text))
     raise SpecError([Finding(code="TC112", message=message, location=place)])
 

@@ -14,6 +14,7 @@ _AFTER = """\b
 Examples:
   tubecert synth plant.yaml --rate 0.8 -o metric.json
   tubecert synth plant.yaml --objective adaptation --plot sweep.svg
+  tubecert synth plant.yaml --rate 0.8 --solver cvxpy:MOSEK
   tubecert certify plant.yaml --metric metric.json
 
 \b
@@ -38,13 +39,6 @@ class Route(StrEnum):
     AUTO = "auto"
     SOS = "sos"
     CEGIS = "cegis"
-
-
-class Solver(StrEnum):
-    """Which solver proposes."""
-
-    CLARABEL = "clarabel"
-    SCS = "scs"
 
 
 def register(app: typer.Typer) -> None:
@@ -76,7 +70,13 @@ def synth(
         str | None, number_option("--condition-number", "Not to be exceeded on the safe set.")
     ] = None,
     route: Annotated[Route | None, typer.Option(help="How metrics are found.  [auto]")] = None,
-    solver: Annotated[Solver | None, typer.Option(help="Which solver proposes.  [clarabel]")] = None,
+    solver: Annotated[
+        str | None,
+        typer.Option(
+            metavar="<clarabel|scs|cvxpy:NAME>",
+            help="Which solver proposes; NAME: one that cvxpy knows.  [clarabel]",
+        ),
+    ] = None,
     sweep: Annotated[bool, typer.Option("--sweep", help="Compare metrics over a range of rates.")] = False,
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --sweep.")

@@ -23,6 +23,7 @@ from tubecert.pipeline.options import CONDITIONS, Options, Progress, Step, overr
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
+from tubecert.synthesis.bridge import required
 
 __all__ = [
     "CONDITIONS",
@@ -58,8 +59,9 @@ def synthesise(
 ) -> Synthesised:
     """A proven metric for a specification, or why there is none; with `sweep` others over a range of rates beside it.
 
-    Raises `SpecError` for what makes the question meaningless.
+    Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
+    required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)
     findings, time = time_of(spec)
     findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []

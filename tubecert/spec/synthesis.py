@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
+from tubecert.expression import suggestion
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
@@ -14,6 +16,7 @@ KEYS: Final = ("rate", "objective", "degree", "variables", "condition_number", "
 OBJECTIVES: Final = ("condition", "margin", "rate", "adaptation", "tube")
 ROUTES: Final = ("auto", "sos", "cegis")
 SOLVERS: Final = ("clarabel", "scs")
+_THROUGH_CVXPY: Final = re.compile(r"cvxpy:[A-Za-z][A-Za-z0-9_]{0,31}")
 MAX_DEGREE: Final = 8
 _SEARCHED = "auto"
 
@@ -34,7 +37,7 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
         variables=_variables(_unless_auto(entries.get("variables")), names),
         condition_number=limit.number(names.values, least=1) if limit else None,
         route=entries["route"].word(ROUTES) or "auto" if "route" in entries else "auto",
-        solver="scs" if "solver" in entries and entries["solver"].word(SOLVERS) == "scs" else "clarabel",
+        solver=_solver(entries["solver"]) or "clarabel" if "solver" in entries else "clarabel",
     )
     _consistent(field, found)
     return found if len(field.reader.findings) == before else None
@@ -43,6 +46,29 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
 def _unless_auto(field: Field | None) -> Field | None:
     automatic = field is not None and isinstance(field.node, Scalar) and field.node.text == _SEARCHED
     return None if automatic else field
+
+
+def solver_name(text: str) -> str | None:
+    """The solver as it is kept: clarabel, scs, or cvxpy:NAME with the name in capitals; None if it is none of these.
+
+    Whether cvxpy has it is known where it is used.
+    """
+    if _THROUGH_CVXPY.fullmatch(text):
+        library, name = text.split(":")
+        return f"{library}:{name.upper()}"
+    return text if text in SOLVERS else None
+
+
+def _solver(field: Field) -> str | None:
+    text = field.text("the name of a solver")
+    found = None if text is None else solver_name(text)
+    if text is not None and found is None:
+        field.fail(
+            codes.RANGE,
+            f"{field.path} is {text[:60]!r}, not one of the choices",
+            suggestion(text, SOLVERS, what="choices") + ", or cvxpy:NAME, a solver by its name in cvxpy",
+        )
+    return found
 
 
 def _degree(field: Field | None, names: Names) -> int | None:

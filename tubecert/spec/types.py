@@ -136,7 +136,7 @@ class Synthesis:
 
     `rate` in 1/s, None if it is searched for; `objective`: least condition number, greatest margin (in C2), greatest
     rate, least adaptation rate of the distance form, smallest tube; `degree` and `variables` of W, None: chosen
-    automatically; `condition_number`: not to be exceeded.
+    automatically; `condition_number`: not to be exceeded; `solver`: clarabel, scs or cvxpy:NAME.
     """
 
     rate: Fraction | None = None
@@ -145,7 +145,7 @@ class Synthesis:
     variables: tuple[str, ...] | None = None
     condition_number: Fraction | None = None
     route: str = "auto"
-    solver: Literal["clarabel", "scs"] = "clarabel"
+    solver: str = "clarabel"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

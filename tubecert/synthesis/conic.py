@@ -2,7 +2,7 @@
 
 Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block, g_0 + G y >= 0 and e_0 + E y = 0. All slopes are
 sparse and nothing is canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed
-settings; SCS is the second solver, for cross-checks.
+settings; SCS is the second solver, for cross-checks; every other one is reached through cvxpy (`bridge`).
 Untrusted: what comes back is a proposal with an opinion, never a verdict.
 """
 
@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 Array = NDArray[np.float64]
-Solver = Literal["clarabel", "scs"]
+CVXPY = "cvxpy:"  # and a name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,12 +133,12 @@ def semidefinite(constant: ArrayLike, slopes: ArrayLike) -> Semidefinite:
 
 def solve(
     program: ConicProgram,
-    solver: Solver = "clarabel",
+    solver: str = "clarabel",
     *,
     tolerance: float = 1e-8,
     iterations: int | None = None,
 ) -> ConicSolution:
-    """The solver's answer, deterministic on one machine.
+    """The answer of `solver` (clarabel, scs, or cvxpy:NAME), deterministic on one machine.
 
     `tolerance` is on gap and residuals; `iterations` bounds the work (default 200, of SCS 20 000). Data that are not
     finite end without calling a solver.
@@ -146,6 +146,10 @@ def solve(
     lifted = _stacked(program)
     if not (np.isfinite(lifted.slopes.data).all() and np.isfinite(lifted.constant).all()):
         return ConicSolution.none("the program has coefficients that are not finite")
+    if solver.startswith(CVXPY):
+        from tubecert.synthesis.bridge import solve_through_cvxpy
+
+        return solve_through_cvxpy(program, solver.removeprefix(CVXPY), tolerance, iterations)
     if solver == "scs":
         return _scs(program, lifted, tolerance, iterations or 20_000)
     return _clarabel(program, lifted, tolerance, iterations or 200)
@@ -208,7 +212,7 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
         "PrimalInfeasible": False,
         "AlmostPrimalInfeasible": False,
     }
-    return _judged(
+    return judged(
         np.array(found.x),
         objective=float(found.obj_val),
         bound=float(found.obj_val_dual),
@@ -241,7 +245,7 @@ def _scs(program: ConicProgram, rows: Affine, tolerance: float, iterations: int)
     found = run.solve()
     info = found["info"]
     code = int(info["status_val"])
-    return _judged(
+    return judged(
         np.array(found["x"]),
         objective=float(info["pobj"]),
         bound=float(info["dobj"]),
@@ -264,7 +268,8 @@ def _lower(program: ConicProgram) -> list[NDArray[np.intp]]:
     return places
 
 
-def _judged(values: Array, **rest: Any) -> ConicSolution:
+def judged(values: Array, **rest: Any) -> ConicSolution:
+    """The solution; values that are not finite are none."""
     return ConicSolution(values=values if np.isfinite(values).all() else None, **rest)
 
 

@@ -15,7 +15,7 @@ from math import floor, inf, isfinite, log10, sqrt
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily, metric_family
-from tubecert.synthesis.problem import Floor, Proposal, Solver, SynthesisProblem
+from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
 
 _DEGREES = (0, 1, 2, 3, 4)
@@ -46,7 +46,7 @@ class Request:
     degree: int | None = None
     variables: tuple[str, ...] | None = None
     limit: float | None = None
-    solver: Solver = "clarabel"
+    solver: str = "clarabel"
     thorough: bool = True
     effort: Effort = field(default_factory=Effort)
     progress: Callable[[str], None] | None = None

@@ -12,7 +12,6 @@ from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily
 
 Floor = Literal["identity", "input"]
-Solver = Literal["clarabel", "scs"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +31,7 @@ class SynthesisProblem:
     rate: float
     floor: Floor = "identity"
     limit: float | None = None
-    solver: Solver = "clarabel"
+    solver: str = "clarabel"
     progress: Callable[[str], None] | None = field(default=None, repr=False)
 
 

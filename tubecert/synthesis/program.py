@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from tubecert.enclosure.interval import Array
-from tubecert.synthesis.conic import Affine, ConicProgram, ConicSolution, Semidefinite, Solver, solve
+from tubecert.synthesis.conic import Affine, ConicProgram, ConicSolution, Semidefinite, solve
 from tubecert.synthesis.forms import FormsTape, Unknowns, upper
 from tubecert.synthesis.problem import Floor
 
@@ -52,7 +52,7 @@ class PointProgram:
     high: Points
     contraction: Points
     floor: Floor
-    solver: Solver
+    solver: str
 
     def least_kappa(self) -> ConicSolution:
         """Minimise kappa; the unknowns come first, kappa last."""

@@ -1,0 +1,193 @@
+"""Solvers through cvxpy: the same programs, the same answers; no warning, no breakdown and no lie gets through."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import cvxpy
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from tubecert import pipeline
+from tubecert.cli.app import app
+from tubecert.errors import SpecError
+from tubecert.spec import canonical, load_text
+from tubecert.synthesis import bridge, conic
+from tubecert.synthesis.conic import Affine, ConicProgram, SemidefiniteBlocks, semidefinite, solve
+
+ROOT = Path(__file__).parents[2]
+TWO = ROOT / "configs" / "two_state.yaml"
+SMALL = """
+tubecert: 1
+name: small
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + y", "x"]
+  B: [[0], [1]]
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {synthesise: {rate: 0.5, solver: SOLVER}}
+tube: {epsilon: 0.3, rho_a: 0.3}
+"""
+EIGENVALUE = ConicProgram(cost=np.ones(1), semidefinite=[semidefinite([[-1, -2], [-2, -1]], [np.eye(2)])])
+
+
+def small(solver):
+    return load_text(SMALL.replace("SOLVER", solver))
+
+
+def random_program(seed):
+    """Feasible and bounded by construction: 0 is interior, the cost a combination of the constraints."""
+    rng = np.random.default_rng(seed)
+    N, orders = 5, (1, 3, 2)
+    slopes, constants, cost = [], [], np.zeros(N)
+    for n in orders:
+        s = rng.normal(size=(N, n, n))
+        block = semidefinite(np.eye(n), s + s.transpose(0, 2, 1))
+        root = rng.normal(size=(n, n))
+        cost += np.einsum("kij,ij->k", s + s.transpose(0, 2, 1), root @ root.T + np.eye(n))
+        constants.append(block.entries.constant)
+        slopes.append(block.entries.slopes.toarray())
+    entries = Affine(constant=np.concatenate(constants), slopes=np.concatenate(slopes))
+    G, E = rng.normal(size=(2, N)), rng.normal(size=(1, N))
+    return ConicProgram(
+        cost=cost + G.T @ np.ones(2) + E.T @ np.ones(1),
+        semidefinite=[SemidefiniteBlocks(orders=orders, entries=entries)],
+        inequalities=Affine(constant=np.ones(2), slopes=G),
+        equalities=Affine(constant=np.array([0.1]), slopes=E),
+    )
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from(["cvxpy:CLARABEL", "cvxpy:SCS"]))
+def test_the_program_is_the_same(seed, solver):
+    program = random_program(seed)
+    ours, theirs = (solve(program, name, tolerance=1e-7) for name in ("clarabel", solver))
+    assert theirs.feasible
+    assert theirs.objective == pytest.approx(ours.objective, rel=1e-4, abs=1e-4)
+    assert theirs.bound == pytest.approx(theirs.objective, rel=1e-4, abs=1e-4)
+    assert theirs.objective == pytest.approx(program.cost @ theirs.values)
+
+
+@pytest.mark.parametrize("solver", ["cvxpy:CLARABEL", "cvxpy:SCS"])
+def test_infeasible_is_an_opinion_and_has_no_value(solver):
+    both = [semidefinite([[-1.0]], [[[1.0]]]), semidefinite([[-1.0]], [[[-1.0]]])]
+    found = solve(ConicProgram(cost=np.ones(1), semidefinite=both), solver)
+    assert found.feasible is False
+    assert "infeasible" in found.status
+
+
+def test_too_few_iterations_are_said():
+    found = solve(random_program(1), "cvxpy:SCS", iterations=1, tolerance=1e-12)
+    assert not found.finished
+
+
+def test_a_solver_without_multipliers_is_believed_as_far_as_its_tolerance(monkeypatch):
+    monkeypatch.setattr(bridge, "_bound", lambda *_: None)
+    found = solve(EIGENVALUE, "cvxpy:CLARABEL", tolerance=1e-6)
+    assert found.objective == pytest.approx(3, abs=1e-5)
+    assert found.bound == pytest.approx(3, abs=1e-5)
+    assert found.bound < found.objective
+
+
+@pytest.mark.parametrize("kind", [UserWarning, FutureWarning, DeprecationWarning])
+def test_warnings_stay_inside(monkeypatch, kind):
+    honest = cvxpy.Problem.solve
+
+    def warning(*given, **options):
+        warnings.warn("Solution may be inaccurate.", kind, stacklevel=1)
+        return honest(*given, **options)
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", warning)
+    assert solve(EIGENVALUE, "cvxpy:CLARABEL").objective == pytest.approx(3, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "error", [cvxpy.SolverError("no licence"), OSError("libfoo.so"), TypeError(), KeyError("x")]
+)
+def test_a_solver_that_breaks_down_has_no_solution(monkeypatch, error):
+    def broken(*_, **__):
+        raise error
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", broken)
+    found = solve(EIGENVALUE, "cvxpy:CLARABEL")
+    assert found.values is None
+    assert found.feasible is None
+    assert found.status.startswith("CLARABEL through cvxpy failed: ")
+
+
+def test_inaccurate_is_not_finished(monkeypatch):
+    monkeypatch.setattr(cvxpy.Problem, "status", property(lambda _: cvxpy.OPTIMAL_INACCURATE))
+    found = solve(EIGENVALUE, "cvxpy:CLARABEL")
+    assert found.feasible
+    assert not found.finished
+
+
+# -- names
+
+
+@pytest.mark.parametrize(
+    ("solver", "why"),
+    [("cvxpy:NONESUCH", "is not installed"), ("cvxpy:OSQP", "does not solve semidefinite programs")],
+)
+def test_a_solver_that_is_not_there_is_refused_with_those_that_are(solver, why, tmp_path):
+    target = tmp_path / "metric.json"
+    done = CliRunner().invoke(
+        app, ["synth", str(TWO), "--rate", "1.5", "--solver", solver, "-o", str(target)]
+    )
+    assert done.exit_code == 2
+    assert f"error TC112: the solver {solver} cannot be used: {solver[6:]} {why}" in done.stderr
+    assert "installed: cvxpy:CLARABEL, cvxpy:SCS; without cvxpy: clarabel, scs" in " ".join(
+        done.stderr.split()
+    )
+    assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    "text", ["cvxpy", "cvxpy:", "cvxpy:A B", "CVXPY:SCS", "mosek", "cvxpy:" + 40 * "A", ""]
+)
+def test_what_names_no_solver_is_refused(text):
+    done = CliRunner().invoke(app, ["synth", str(TWO), "--rate", "1.5", "--solver", text])
+    assert done.exit_code == 2
+    assert "TC112" in done.stderr
+    assert "cvxpy:NAME" in done.stderr
+
+
+def test_the_specification_names_it_too():
+    assert canonical(small("cvxpy:scs"))["metric"]["synthesise"]["solver"] == "cvxpy:SCS"
+    with pytest.raises(SpecError, match="cvxpy:NONESUCH cannot be used"):
+        pipeline.certify(small("cvxpy:NONESUCH"), pipeline.Options())
+
+
+# -- whole runs
+
+
+def test_metrics_are_found_and_proven_as_ever(tmp_path):
+    target = tmp_path / "metric.json"
+    found = {}
+    for solver in ("clarabel", "cvxpy:clarabel"):
+        options = ["--rate", "1.7", "--solver", solver, "-o", str(target)]
+        done = CliRunner().invoke(app, ["synth", str(TWO), *options])
+        assert done.exit_code == 0, done.output
+        found[solver] = json.loads(target.read_text())["condition_number"][1]
+    assert found["cvxpy:clarabel"] == pytest.approx(found["clarabel"], rel=0.01)
+
+
+def test_a_lie_writes_no_metric(monkeypatch, tmp_path):
+    monkeypatch.setattr(
+        conic,
+        "judged",
+        lambda values, **rest: conic.ConicSolution(values=-values, **{**rest, "feasible": True}),
+    )
+    monkeypatch.setattr(bridge, "judged", conic.judged)
+    target = tmp_path / "metric.json"
+    options = ["--rate", "1.7", "--degree", "0", "--solver", "cvxpy:CLARABEL", "-o", str(target)]
+    assert CliRunner().invoke(app, ["synth", str(TWO), *options]).exit_code == 4
+    assert not target.exists()
