@@ -75,6 +75,7 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         "distance": distance,
         "worst": worst,
         "error": np.zeros(N),
+        "unresolved": np.full(N, np.nan),
         "failures": (),
         "steps": np.ones(N),
     }

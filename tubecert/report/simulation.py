@@ -64,7 +64,11 @@ def _because(data: Data) -> str:
         case "falsified":
             return f"a promise of the certificate is broken; see VIOLATION below ({_runs(runs)})"
         case "tube left":
-            return f"the tube is left in {left} of {_runs(runs)}, with gains that no certificate covers"
+            exits = [
+                part["first_exit"]["t"] for part in _parts(data) if part["tested"] and part["first_exit"]
+            ]
+            first = f"first at t = {short(min(exits))} s"
+            return f"the tube is left in {left} of {_runs(runs)}, {first}; no certificate covers these gains"
         case "no result":
             return f"the error estimate of some runs exceeds rho/100, or they failed ({_runs(runs)})"
         case "interrupted":
@@ -100,8 +104,12 @@ def _sections(data: Data, verbose: bool) -> Iterator[tuple[str, list[RenderableT
     if broken:
         yield "VIOLATION", list(broken)
     stopped = [_stopped(part, item) for part in _parts(data) for item in part["stopped"][:3]]
-    if stopped:
-        yield "Stopped", list(stopped)
+    stopped += [_unresolved(part, item) for part in _parts(data) for item in part["unresolved"][:3]]
+    cautions = [
+        Text(f"{loop['controller']}: {loop['caution']}") for loop in data["loops"] if "caution" in loop
+    ]
+    if stopped or cautions:
+        yield "Stopped, or no result" if stopped else "Unstable", [*cautions, *stopped]
     yield (
         f"Loops under the uncertainty {data['uncertainty']}, 0 <= t <= {short(data['horizon'])} s",
         [_loops(data)],
@@ -132,6 +140,15 @@ def _violation(part: Data, item: Data) -> Text:
 def _stopped(part: Data, item: Data) -> Text:
     where = part["what"].replace("{run}", str(item["run"]))
     return Text(f"{part['controller']}: {item['reason']} at t = {short(item['t'])} s, {where}")
+
+
+def _unresolved(part: Data, item: Data) -> Text:
+    where = part["what"].replace("{run}", str(item["run"]))
+    since = UNKNOWN if item["t"] is None else f"{short(item['t'])} s"
+    return Text(
+        f"{part['controller']}: from t = {since} on the run depends on the steps of the integration: "
+        f"the loop is unstable, or too fast to be followed; {where}"
+    )
 
 
 def _loops(data: Data) -> Table:

@@ -11,7 +11,7 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `program`, `compiled` | expressions as arrays for one compiled interpreter; compilation kept between runs |
 | `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
-| `computer` | the controller as a computer: everything held between samples |
+| `computer`, `held` | the controller as a computer: everything held between samples; whether that is stable |
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
 | `certified`, `promise` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |

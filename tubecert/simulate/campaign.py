@@ -115,6 +115,8 @@ def simulate(
 ) -> Campaign:
     """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
 
+    A loop whose own run is no result is not attacked: neither would the others be.
+
     The loops are drawn under the specification's h, or as random run `replay`. Raises `TubecertError` if the
     specification's h leaves its class while the state is in the tube.
     """
@@ -132,8 +134,8 @@ def simulate(
             check_class(setting, item.runs, setting.h, where)
     attacks: list[Attack] = []
     interrupted = False
-    for loop in loops:
-        if loop.tested and count and not interrupted:
+    for loop, own in zip(loops, drawn, strict=True):
+        if loop.tested and count and not interrupted and not own.comparison.unreliable:
             attacks.append(_attack(setting, loop, count, seed, report))
             sample = attacks[-1].sample
             interrupted = sample is None or sample.interrupted or attacks[-1].worst is None

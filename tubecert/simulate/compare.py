@@ -5,7 +5,7 @@ All numbers of a run are known up to its own error estimate, relative to rho: a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -55,7 +55,11 @@ class Violation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """What runs used of the tube and of every bound; from `settled` on all of them stay in the ultimate radius."""
+    """What runs used of the tube and of every bound; from `settled` on all of them stay in the ultimate radius.
+
+    `first_exit` is the lane that leaves the tube first, and when; `unresolved` are lanes that are no result, and from
+    when on they depend on the steps of the integration.
+    """
 
     count: int
     uses: Mapping[str, Use]
@@ -66,6 +70,8 @@ class Comparison:
     settled: float | None = None
     final: float | None = None
     failures: tuple[tuple[int, float, str], ...] = field(default=())
+    first_exit: tuple[int, float] | None = None
+    unresolved: tuple[tuple[int, float], ...] = ()
 
 
 def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison:
@@ -79,18 +85,19 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
     outside = usable & (runs.worst.deviation.value > setting.rho * slack)
     outside |= usable & (runs.worst.distance.value > setting.reach * slack)
     lanes = set(np.flatnonzero(outside).tolist()) | _left_before(setting, runs)
+    unreliable = [int(lane) for lane in np.flatnonzero(~usable) if lane not in lanes and lane not in stopped]
     return Comparison(
         count=runs.lanes,
         uses=uses,
         violations=tuple(_violations(setting, runs, promise, usable, slack)) if promise else (),
         outside=tuple(sorted(lanes)),
-        unreliable=tuple(
-            int(lane) for lane in np.flatnonzero(~usable) if lane not in lanes and lane not in stopped
-        ),
+        unreliable=tuple(unreliable),
         error=float(np.max(runs.error[usable], initial=0.0)),
         settled=_settled(runs, promise, usable),
         final=float(np.max(_deviation(runs)[usable, -1])) if usable.any() else None,
         failures=tuple((item.lane, item.t, item.reason) for item in runs.failures),
+        first_exit=_first_exit(setting, runs, sorted(lanes)),
+        unresolved=tuple((lane, float(runs.unresolved[lane])) for lane in unreliable),
     )
 
 
@@ -108,6 +115,17 @@ def _deviation(runs: Runs) -> Array:
 def _left_before(setting: Setting, runs: Runs) -> set[int]:
     """Lanes that were stopped after they had left the tube: their error estimate is void, their exit is not."""
     return {item.lane for item in runs.failures if runs.worst.deviation.value[item.lane] > 2 * setting.rho}
+
+
+def _first_exit(setting: Setting, runs: Runs, lanes: Sequence[int]) -> tuple[int, float] | None:
+    """The first of these lanes that is outside of the tube at an output time (else when its distance peaks)."""
+    if not lanes:
+        return None
+    rows = list(lanes)
+    beyond = (_deviation(runs)[rows] > setting.rho) | (runs.distance[rows] > setting.reach)
+    first = np.where(beyond.any(axis=1), runs.t[np.argmax(beyond, axis=1)], runs.worst.deviation.time[rows])
+    earliest = int(np.argmin(first))
+    return lanes[earliest], float(first[earliest])
 
 
 def _violations(

@@ -24,6 +24,9 @@ Progress = Callable[[int, int], None]
 _MOST_HALVINGS = 14
 _CHUNK = 16  # lanes that one thread takes at once
 _AGREEING = 0.02  # of the horizon: two levels that stop a lane this near to each other are believed
+_PATIENCE = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
+_DOUBTFUL = 7  # the level from which on a run that does not converge is given up
+_DOUBTFUL_HELD = 4  # the same where a computer holds the input: what is between its samples is smooth
 
 
 def integrate(
@@ -36,9 +39,10 @@ def integrate(
 ) -> Runs:
     """N runs from x0 (N, n) under a disturbance of N lanes, to an error of about `tolerance` in |x|.
 
-    A lane that cannot be integrated so far has a larger `error` than asked for; one that diverges or has no geodesic
-    is stopped and listed in `failures`, and the others go on. ValueError for arguments that do not fit. `progress` is
-    told how many of how many lanes are done.
+    A lane that cannot be integrated so far has a larger `error` than asked for, and `unresolved` says from when on; it
+    is given up as soon as halving its steps no longer helps, which is so where the loop itself amplifies every
+    difference. One that diverges or has no geodesic is stopped and listed in `failures`, and the others go on.
+    ValueError for arguments that do not fit. `progress` is told how many of how many lanes are done.
     """
     starts = np.ascontiguousarray(x0, dtype=float)
     N, n = starts.shape
@@ -78,7 +82,8 @@ class Ladder:
         if number not in self._levels:
             steps, lengths = grid.steps(self.problem, number)
             fast = grid.fast_part(self.problem, lengths, number)
-            self._levels[number] = Loop(self.field, acting, fast, self.computer, self.holds, steps)
+            limit = self.problem.limit
+            self._levels[number] = Loop(self.field, acting, fast, self.computer, self.holds, limit, steps)
         return self._levels[number]._replace(force=acting)
 
 
@@ -99,6 +104,9 @@ class _Lanes:
         self.N, n = starts.shape
         self.found = output(self.N, len(problem.times), n, len(problem.model.inputs))
         self.error = np.full(self.N, np.inf)
+        self.unresolved = np.full(self.N, np.nan)
+        self.changes = np.full((self.N, _MOST_HALVINGS + 1), np.inf)
+        self.failed = np.zeros((self.N, _MOST_HALVINGS + 1), dtype=bool)
         self.steps = np.zeros(self.N, dtype=np.int64)
 
     def halve(self, tolerance: float, progress: Progress | None) -> Runs:
@@ -131,16 +139,31 @@ class _Lanes:
         """Takes the finer runs, estimates their errors, and says which lanes are done."""
         coarser, n = self.found, self.starts.shape[1]
         difference = finer.values[:, :, :n] - coarser.values[lanes, :, :n]
-        change = np.sqrt(np.sum(difference**2, axis=2)).max(axis=1)
+        apart = np.sqrt(np.sum(difference**2, axis=2))
+        change = apart.max(axis=1)
         change = np.where(np.isnan(change), np.inf, change)
         failed, before = finer.ends[:, 0] != 0, coarser.ends[lanes, 0] != 0
         agree = np.abs(finer.ends[:, 1] - coarser.ends[lanes, 1]) <= _AGREEING * self.problem.horizon
         for ours, theirs in zip(coarser, finer, strict=True):
             ours[lanes] = theirs
         self.error[lanes] = np.where(failed, np.inf, change)
+        self.changes[lanes, number], self.failed[lanes, number] = change, failed
         if number == 0:
             return np.zeros(len(lanes), dtype=bool)
-        return np.asarray(np.where(failed, before & agree, change <= tolerance))
+        beyond = ~(apart <= tolerance)
+        first = self.problem.times[np.argmax(beyond, axis=1)]
+        self.unresolved[lanes] = np.where(beyond.any(axis=1), first, np.nan)
+        done = np.where(failed, before & agree, change <= tolerance)
+        return np.asarray(done | self._hopeless(lanes, number))
+
+    def _hopeless(self, lanes: NDArray[np.intp], number: int) -> NDArray[np.bool_]:
+        """Whether smaller steps do not help: a change that stays, or a lane that is stopped at every level."""
+        if number < (_DOUBTFUL_HELD if self.ladder.holds else _DOUBTFUL):
+            return np.zeros(len(lanes), dtype=bool)
+        changes, failed = self.changes[lanes], self.failed[lanes]
+        now, then = changes[:, number], changes[:, number - _PATIENCE]
+        stays = np.isfinite(now) & np.isfinite(then) & (now > 0.5 * then)
+        return np.asarray(stays | failed[:, number - _PATIENCE : number + 1].all(axis=1))
 
     def _runs(self) -> Runs:
         from tubecert.simulate.stepping import PEAKS
@@ -169,6 +192,7 @@ class _Lanes:
             distance=distance[:, :, 0],
             worst=Worst(**peaks),
             error=self.error,
+            unresolved=self.unresolved,
             failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.ends[:, 0])),
             steps=self.steps,
         )
@@ -181,10 +205,15 @@ class _Lanes:
         reasons = {
             **REASONS,
             INFEASIBLE: "no input makes the metric contract here",
-            DIVERGED: "the state diverges from the plan",
+            DIVERGED: _diverged(self.problem),
         }
         status, t = self.found.ends[lane]
         return Failure(lane=lane, t=float(t), reason=reasons[int(status)])
+
+
+def _diverged(problem: LoopProblem) -> str:
+    beyond = "" if np.isinf(problem.limit) else f": |x - x*| exceeds {problem.limit:.4g}"
+    return f"the state diverges from the plan{beyond}"
 
 
 def run(loop: Loop, point: Point, starts: Array, outputs: int) -> Output:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -64,7 +65,8 @@ class LoopProblem:
     `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference
     system (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in
     Hz the whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing
-    in [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant).
+    in [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A
+    lane is stopped where |x - x*| exceeds `limit`.
     """
 
     model: ControlAffineModel
@@ -75,6 +77,7 @@ class LoopProblem:
     gains: Gains | None = None
     control_rate: float | None = None
     degree: int = 5
+    limit: float = math.inf
 
     def __post_init__(self) -> None:
         if self.controller not in CONTROLLERS:
@@ -89,6 +92,8 @@ class LoopProblem:
             raise ValueError("times must lie in [0, horizon]")
         if self.control_rate is not None and not (np.isfinite(self.control_rate) and self.control_rate > 0):
             raise ValueError(f"control_rate must be a positive frequency, not {self.control_rate}")
+        if not self.limit > 0:
+            raise ValueError(f"limit must be a positive distance, not {self.limit}")
         if self.degree < 2:
             raise ValueError("degree must be at least 2")
         needed = {"l1": "adaptation_rate", "sampled": "sample_time"}.get(self.controller)

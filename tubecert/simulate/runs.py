@@ -52,6 +52,7 @@ class Runs:
     is then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is
     0. After a lane was stopped its values are nan. `error` (N,) is the largest difference in |x| to the run with steps
     twice as long, an estimate of the error and mostly far above it; it is inf for a lane that was stopped.
+    `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it never does.
     """
 
     t: Array
@@ -66,6 +67,7 @@ class Runs:
     distance: Array
     worst: Worst
     error: Array
+    unresolved: Array
     failures: tuple[Failure, ...]
     steps: NDArray[np.int64]  # (N,), how many steps the run took
 
@@ -102,7 +104,7 @@ def joined(parts: list[Runs]) -> Runs:
         )
         for item in fields(Worst)
     }
-    lanewise = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance", "error")
+    lanewise = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance", "error", "unresolved")
     return Runs(
         t=parts[0].t,
         x_plan=parts[0].x_plan,

@@ -20,6 +20,7 @@ from tubecert.expression import Expression
 from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.certified import Result, above, number, plan_of
+from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.problem import Controller, Gains, LoopProblem
 from tubecert.simulate.promise import SECTIONS, TITLES, Promise, promise
 from tubecert.simulate.uncertainty import Class, class_of
@@ -30,6 +31,7 @@ ADAPTIVE: Final = ("l1", "sampled")
 TIMES: Final = 501  # output times of the loops that are drawn
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _TOLERANCE: Final = 1e-3  # of rho, asked of the integrator
+_LIMIT: Final = 100  # of rho: what is further away from the plan is not followed any more
 CHOSEN: Final = "chosen, not certified"
 
 
@@ -45,11 +47,15 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
+    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one.
+
+    `caution` says what is wrong with it before it is simulated, if anything is.
+    """
 
     problem: LoopProblem
     origin: str
     promise: Promise | None
+    caution: str = ""
 
     @property
     def controller(self) -> Controller:
@@ -160,9 +166,31 @@ def loop_of(
         times=setting.times,
         gains=tuning.gains,
         control_rate=None if control_rate is None else float(control_rate),
+        limit=_LIMIT * setting.rho,
     )
     promised = promise(setting.result, tuning.source) if covered else None
-    return Loop(problem=problem, origin=tuning.words, promise=promised)
+    return Loop(problem=problem, origin=tuning.words, promise=promised, caution=_caution(setting, problem))
+
+
+def _caution(setting: Setting, problem: LoopProblem) -> str:
+    """That the adaptation is unstable at the control rate, and at which it is not; nothing if it is stable."""
+    gains, rate = problem.gains, problem.control_rate
+    if problem.controller != "l1" or rate is None or gains is None or gains.adaptation_rate is None:
+        return ""
+    model = setting.model
+    names = (*model.states, *model.inputs)
+    at_start = [*setting.centre, *np.zeros(len(model.inputs))]
+    B = (
+        Tape([e for row in model.B for e in row], names)
+        .run_floats(at_start, ())
+        .reshape(-1, len(model.inputs))
+    )
+    own = gains.A_m(len(model.states)), B, gains.adaptation_rate
+    if growth(*own, 1 / rate) <= 1:
+        return ""
+    least = least_rate(*own, rate)
+    remedy = f": it needs {least:.4g} Hz" if math.isfinite(least) else ""
+    return f"the adaptation with Gamma = {gains.adaptation_rate:.4g} is unstable at {rate:g} Hz{remedy}"
 
 
 def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning:

@@ -40,13 +40,17 @@ class Grid(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """Everything that a compiled lane reads; `holds`: the computer holds the whole controller."""
+    """Everything that a compiled lane reads; `holds`: the computer holds the whole controller.
+
+    A lane is stopped where |x - x*| exceeds `limit`.
+    """
 
     field: Field
     force: Force
     fast: Fast
     computer: Computer | None
     holds: bool
+    limit: float
     grid: Grid
 
 
@@ -146,10 +150,11 @@ def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> N
                     return
                 _stage_state(work.vectors, end, stage, share, flows)
                 plan = grid.plan[s, side]
+                if not _near(at, plan, loop.limit):
+                    status = DIVERGED
+                    break
                 whole = stage == 0 or not holds
                 status, energy = evaluate(loop.field, loop.force, lane, t + share, at, plan, whole, point)
-                if not _near(at, plan):
-                    status = DIVERGED
                 if status != FOUND:
                     break
                 f, B, inputs, held = point.f, point.B, point.inputs, work.inputs[0]
@@ -167,11 +172,13 @@ def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> N
 
 
 @compiled
-def _near(x: Any, plan: Any) -> bool:
-    near = True  # not for nan
+def _near(x: Any, plan: Any, limit: float) -> bool:
+    """Whether the state is anywhere near the plan: not if it is beyond the limit, or not finite."""
+    near, square = True, 0.0
     for i in range(x.shape[0]):
-        near = near and abs(x[i] - plan[i]) <= _FAR * (1.0 + abs(plan[i]))
-    return near
+        near = near and abs(x[i] - plan[i]) <= _FAR * (1.0 + abs(plan[i]))  # not for nan
+        square += (x[i] - plan[i]) ** 2
+    return near and square <= limit * limit
 
 
 @compiled

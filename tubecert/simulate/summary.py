@@ -71,6 +71,8 @@ def _loop(loop: Loop) -> Data:
             "projection_radius": gains.projection_radius,
             "predictor_gain": predictor.tolist(),
         }
+    if loop.caution:
+        data["caution"] = loop.caution
     return data | {"covered": loop.promise is not None, "tested": loop.tested}
 
 
@@ -107,7 +109,9 @@ def _comparison(found: Comparison) -> Data:
         "runs": found.count,
         "left_the_tube": len(found.outside),
         "first_outside": list(found.outside[:20]),
+        "first_exit": None if found.first_exit is None else _run_at(*found.first_exit),
         "no_result": len(found.unreliable),
+        "unresolved": [_run_at(lane, t) for lane, t in found.unresolved[:20]],
         "stopped": [
             {"run": lane, "t": _finite(t), "reason": reason} for lane, t, reason in found.failures[:20]
         ],
@@ -126,6 +130,10 @@ def _comparison(found: Comparison) -> Data:
         "final_deviation": None if found.final is None else _finite(found.final),
         "error_estimate": found.error,
     }
+
+
+def _run_at(lane: int, t: float) -> Data:
+    return {"run": lane, "t": _finite(t)}
 
 
 def _use(use: Use) -> Mapping[str, Any]:
