@@ -1,0 +1,87 @@
+"""A result is the same, byte for byte, whatever kernels the processor makes BLAS, numpy and libm choose.
+
+Other processors are played by the variables with which these libraries let themselves be told what to use.
+"""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ("three_state", "two_state", "two_state_orbit", "state_dependent_input")
+
+_RUN = """
+import ctypes, hashlib, json, sys
+from pathlib import Path
+import numpy
+from tubecert import pipeline
+from tubecert.certificate import dump
+from tubecert.spec import load
+
+def kernel():
+    for path in Path(numpy.__file__).parent.parent.glob("numpy.libs/*openblas*"):
+        library = ctypes.CDLL(str(path))
+        for name in ("scipy_openblas_get_corename64_", "scipy_openblas_get_corename", "openblas_get_corename"):
+            if hasattr(library, name):
+                function = getattr(library, name)
+                function.restype = ctypes.c_char_p
+                return function().decode()
+
+def digest(path):
+    return hashlib.sha256(dump(pipeline.certify(load(path), pipeline.Options())).encode()).hexdigest()
+
+print(json.dumps([kernel(), [digest(path) for path in sys.argv[1:]]]))
+"""
+
+
+def dispatched():
+    """What numpy would use of this processor beyond its baseline."""
+    return " ".join(np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", []))
+
+
+PROCESSORS = {
+    "this one": {"OPENBLAS_NUM_THREADS": "2"},
+    "Haswell": {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
+    "oldest": {
+        "OPENBLAS_CORETYPE": "Prescott",
+        "OPENBLAS_NUM_THREADS": "1",
+        "NPY_DISABLE_CPU_FEATURES": dispatched(),
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
+    },
+}
+
+
+def certified_on(processor, folder):
+    """The kernels of BLAS, and the hashes of the shipped systems' results with an empty cache."""
+    paths = [str(ROOT / "configs" / f"{name}.yaml") for name in CONFIGS]
+    cache = {"XDG_CACHE_HOME": str(folder / processor), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", _RUN, *paths],
+        env={**os.environ, **cache, **PROCESSORS[processor]},
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    return certified_on("this one", tmp_path_factory.mktemp("caches"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("processor", [name for name in PROCESSORS if name != "this one"])
+def test_results_are_the_same_on_every_processor(processor, here, tmp_path):
+    kernel, hashes = certified_on(processor, tmp_path)
+    assert dict(zip(CONFIGS, hashes, strict=True)) == dict(zip(CONFIGS, here[1], strict=True))
+    if platform.machine() == "x86_64" and kernel is not None and processor == "oldest":
+        assert kernel != here[0], "the processor was not played"
