@@ -199,7 +199,7 @@ def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
     from fractions import Fraction
 
     where = setting("two_state", "0.4")
-    Ts = Fraction(repr(where.result["sampled"]["sample_time"]))
+    Ts = Fraction(repr(certified("two_state", "0.4")[1]["sampled"]["sample_time"]))
     use = {}
     for factor in (1, 20):
         loop = loop_of(where, "sampled", Choice(sample_time=factor * Ts))

@@ -13,12 +13,15 @@ from simulated import CONFIGS, FLAT, certified, setting
 
 from tubecert import certificate
 from tubecert.certificate import digest, dump, seal
+from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
 from tubecert.simulate.certified import adopted, plan_of, require_tube
 from tubecert.simulate.grid import computer
+from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
+from tubecert.spec.simulation import GAINS
 
 
 def refused(call, *arguments):
@@ -116,7 +119,8 @@ def test_the_plan_is_that_of_the_certificate():
 
 def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     where = setting("two_state", "0.4")
-    pair = where.result["distance"]["least_adaptation"]
+    _, result = certified("two_state", "0.4")
+    pair = result["distance"]["least_adaptation"]
     loop = loop_of(where, "l1", Choice())
     assert (loop.problem.gains.bandwidth, loop.problem.gains.adaptation_rate) == (
         pair["bandwidth"],
@@ -125,7 +129,7 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     assert loop.promise is not None
     assert "B distance" in loop.origin
     paper = loop_of(where, "l1", Choice(source="26"))
-    assert paper.problem.gains.adaptation_rate == where.result["conditions_26"]["adaptation_rate"]
+    assert paper.problem.gains.adaptation_rate == result["conditions_26"]["adaptation_rate"]
     for chosen in (
         loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000))),
         loop_of(where, "sampled", Choice(sample_time=Fraction(1, 10))),
@@ -140,7 +144,7 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
 
 def test_without_certified_gains_the_options_are_named():
     where = setting("flat")
-    bare = replace(where, result={**where.result, "proof": {}})
+    bare = replace(where, certified=replace(where.certified, sections={}))
     error, finding = refused(loop_of, bare, "l1", Choice())
     assert error.exit_code is ExitCode.INVALID
     assert "--bandwidth and --adaptation-rate" in finding.help
@@ -176,7 +180,7 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
 def test_a_certified_sample_time_is_cut_to_whole_control_periods():
     """`--controllers ccm,l1,sampled --control-rate 500`, the example of its own help, ended in a ValueError."""
     where = setting("flat")
-    Ts = where.result["sampled"]["sample_time"]
+    Ts = certified("flat")[1]["sampled"]["sample_time"]
     for rate in (Fraction(500), Fraction(70), 1 / Fraction(repr(Ts))):
         loop = loop_of(where, "sampled", Choice(), rate)
         cut = loop.problem.gains.sample_time
@@ -212,3 +216,70 @@ def test_a_control_period_longer_than_the_sample_time_is_located():
     assert loop_of(where, "sampled", Choice(), Fraction(least)).problem.gains.sample_time
     _, finding = refused(loop_of, where, "sampled", Choice(), Fraction(21, 10))
     assert finding.location is None
+
+
+# kinds of certificates
+
+
+def test_kinds_are_named_alike_everywhere():
+    assert set(KINDS) == {item.value for item in Source} == set(GAINS) == set(PREFERRED)
+    assert all(kind.key == key for key, kind in KINDS.items())
+    _, result = certified("two_state", "0.4")
+    assert {kind.section for kind in KINDS.values()} == set(result["proof"])
+
+
+@pytest.mark.parametrize(
+    ("controller", "wanted", "taken"),
+    [
+        ("l1", "26", "26"),
+        ("l1", "distance", "distance"),
+        ("l1", "sampled", "distance"),
+        ("sampled", "26", "sampled"),
+        ("sampled", "sampled", "sampled"),
+        ("reference", "26", "26"),
+        ("reference", "sampled", "sampled"),
+    ],
+)
+def test_a_loop_takes_the_gains_of_a_kind_that_is_about_it(controller, wanted, taken):
+    assert kind_for(controller, wanted).key == taken
+    where = setting("two_state", "0.4")
+    loop = loop_of(where, controller, Choice(source=wanted))
+    recipe = where.certified.sections[KINDS[taken].section].recipe
+    assert loop.problem.gains.bandwidth == recipe["bandwidth"]
+    assert loop.origin == f"certified by {KINDS[taken].title}"
+    assert (loop.promise is None) == (controller == "reference")
+
+
+@pytest.mark.parametrize(
+    ("part", "key"), [("tube", "rho"), ("metric", "lower"), ("constants", "h"), ("distance", "verdict")]
+)
+def test_an_incomplete_certificate_is_told(part, key):
+    spec, result = certified("flat")
+    broken = json.loads(json.dumps(result))
+    del broken[part][key]
+    if part == "distance":
+        assert setting_of(spec, broken).certified.proven("distance") is None
+        return
+    error, finding = refused(setting_of, spec, broken)
+    assert error.exit_code is ExitCode.INVALID
+    assert "is incomplete" in finding.message
+    assert key in finding.message
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda result: result["constants"]["h"].update(above=None),
+        lambda result: result["constants"].update(h=[1, 2]),
+        lambda result: result["tube"].update(rho="1/0"),
+        lambda result: result["metric"].update(lower=[]),
+        lambda result: result.update(proof=None),
+    ],
+)
+def test_a_certificate_of_other_types_is_told(change):
+    spec, result = certified("flat")
+    broken = json.loads(json.dumps(result))
+    change(broken)
+    error, finding = refused(setting_of, spec, broken)
+    assert error.exit_code is ExitCode.INVALID
+    assert finding.code == "TC601"

@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from simulated import Failure, Peak, certified, runs, setting
 
 from tubecert.errors import TubecertError
+from tubecert.simulate.certified import read_numbers
 from tubecert.simulate.compare import check_class, compare
-from tubecert.simulate.promise import Decay, promise
+from tubecert.simulate.promise import KINDS, Decay, promise
 from tubecert.spec import load_text
 
 T = np.linspace(0, 4, 81)
@@ -58,7 +59,7 @@ def test_decay_with_delay_waits_without_adaptation():
 @pytest.mark.parametrize("which", ["distance", "sampled"])
 def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
     _, result = certified("two_state", "0.4")
-    found = promise(result, which)
+    found = promise(read_numbers(result), KINDS[which])
     assert found is not None
     assert found.decay is not None
     section = result[which]
@@ -69,17 +70,17 @@ def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
 
 def test_only_certified_sections_promise():
     _, result = certified("flat")
-    assert promise(result, "distance") is not None
+    assert promise(read_numbers(result), KINDS["distance"]) is not None
     for change in ({"formulas": "as-printed"}, {"distance": None}, {"proof": {}}):
-        assert promise({**result, **change}, "distance") is None
+        assert promise(read_numbers({**result, **change}), KINDS["distance"]) is None
     refuted = copy.deepcopy(result)
     refuted["distance"]["verdict"] = "refuted"
-    assert promise(refuted, "distance") is None
+    assert promise(read_numbers(refuted), KINDS["distance"]) is None
 
 
 def test_what_keeps_every_promise_breaks_none():
     where = setting("flat")
-    promised = replace(promise(where.result, "distance"), decay=None)
+    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
     found = compare(where, quiet_runs(), promised)
     assert not found.violations
     assert not found.outside
@@ -91,12 +92,14 @@ def test_leaving_the_tube_is_noticed_with_and_without_a_promise():
     outside = quiet_runs(share=1.02)
     assert compare(where, outside, None).outside == (0, 1)
     assert not compare(where, outside, None).violations
-    assert {"tube", "deviation"} <= broken(compare(where, outside, promise(where.result, "distance")))
+    assert {"tube", "deviation"} <= broken(
+        compare(where, outside, promise(where.certified, KINDS["distance"]))
+    )
 
 
 def test_the_decaying_bound_is_checked_at_every_time():
     where = setting("flat")
-    promised = promise(where.result, "distance")
+    promised = promise(where.certified, KINDS["distance"])
     early = quiet_runs()
     early.distance[1, 0] = 0.9 * where.reach  # far below dbar, but more than D(0) = d0
     assert "D(t)" in broken(compare(where, early, promised))
@@ -104,14 +107,16 @@ def test_the_decaying_bound_is_checked_at_every_time():
 
 def test_half_widths_are_checked_per_state():
     where = setting("flat")
-    narrow = replace(promise(where.result, "distance"), half_widths=(1.0, 0.4 * where.rho), decay=None)
+    narrow = replace(
+        promise(where.certified, KINDS["distance"]), half_widths=(1.0, 0.4 * where.rho), decay=None
+    )
     assert broken(compare(where, quiet_runs(), narrow)) == {"half-width of v"}
 
 
 @pytest.mark.parametrize("name", ["k", "u", "xtilde", "sigma_error"])
 def test_every_other_bound_is_checked(name):
     where = setting("flat")
-    promised = replace(promise(where.result, "distance"), decay=None)
+    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
     bound = promised.bounds[name]
     for factor, expected in ((0.99, set()), (1.01, {name})):
         peak = Peak(value=np.array([0.0, factor * bound]), time=np.array([0.0, 1.5]))
@@ -124,7 +129,7 @@ def test_every_other_bound_is_checked(name):
 
 def test_a_bound_is_broken_only_beyond_the_error_of_the_run():
     where = setting("flat")
-    promised = replace(promise(where.result, "distance"), decay=None)
+    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
     slightly = replace(quiet_runs(share=1.004), error=np.full(2, 0.005 * where.rho))
     assert not compare(where, slightly, promised).outside
     surely = replace(quiet_runs(share=1.007), error=np.full(2, 0.005 * where.rho))
@@ -134,7 +139,7 @@ def test_a_bound_is_broken_only_beyond_the_error_of_the_run():
 def test_a_large_error_is_no_result():
     where = setting("flat")
     doubtful = replace(quiet_runs(share=3.0), error=np.array([0.0, 0.011 * where.rho]))
-    found = compare(where, doubtful, promise(where.result, "distance"))
+    found = compare(where, doubtful, promise(where.certified, KINDS["distance"]))
     assert found.unreliable == (1,)
     assert found.outside == (0,)
     assert all(item.lane == 0 for item in found.violations)
@@ -146,14 +151,14 @@ def test_a_run_that_diverges_has_left_the_tube():
     stopped = replace(
         far, error=np.array([0.0, np.inf]), failures=(Failure(lane=1, t=2.5, reason="the state diverges"),)
     )
-    found = compare(where, stopped, promise(where.result, "distance"))
+    found = compare(where, stopped, promise(where.certified, KINDS["distance"]))
     assert 1 in found.outside
     assert any((item.name, item.lane, item.time) == ("tube", 1, 2.5) for item in found.violations)
 
 
 def test_settling_is_measured():
     where = setting("flat")
-    promised = replace(promise(where.result, "distance"), ultimate=0.25 * where.rho)
+    promised = replace(promise(where.certified, KINDS["distance"]), ultimate=0.25 * where.rho)
     settled = compare(where, quiet_runs(), promised).settled
     assert settled is not None
     assert 0.5 * np.exp(-((settled - 2) ** 2)) <= 0.25 < 0.5 * np.exp(-((settled - 2 - 0.1) ** 2)) * 2

@@ -110,6 +110,12 @@ def test_a_state_that_is_no_number_is_not_followed():
 # what the user is told
 
 
+def thinner(where, factor):
+    """The setting with a tube that is thinner than it was certified."""
+    own = where.certified
+    return replace(where, certified=replace(own, rho=own.rho / factor, reach=own.reach / factor))
+
+
 def words_of(campaign):
     data = summary(campaign, "none")
     parts = [verdict_line(data), *report(data, folder="x", files=1, verbose=False)]
@@ -120,7 +126,7 @@ def words_of(campaign):
 
 def test_an_adaptation_that_is_unstable_at_its_rate_is_told_and_not_attacked():
     where = setting("flat")
-    thin = replace(where, rho=where.rho / 9, reach=where.reach / 9)
+    thin = thinner(where, 9)
     chosen = Choice(adaptation_rate=Fraction(66_000), bandwidth=Fraction(30))
     unstable = loop_of(thin, "l1", chosen, Fraction(100))
     assert "is unstable at 100 Hz: it needs 129.1 Hz" in unstable.caution
@@ -139,7 +145,7 @@ def test_an_adaptation_that_is_unstable_at_its_rate_is_told_and_not_attacked():
 
 def test_when_the_tube_is_left_is_told():
     where = setting("flat")
-    steep = replace(where, rho=where.rho / 50, reach=where.reach / 50)
+    steep = thinner(where, 50)
     drawn = loop_of(steep, "l1", Choice(bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1)))
     found = simulate(steep, [drawn], count=0, seed=0)
     lane, time = found.drawn[0].comparison.first_exit

@@ -101,11 +101,12 @@ def _controllers(text: str | None) -> tuple[str, ...]:
 def _wishes(
     given: Mapping[str, Any], numbers: Mapping[str, Any], chosen: tuple[str, ...], system: Spec
 ) -> Wishes:
+    from tubecert.simulate.promise import KINDS
     from tubecert.spec import Simulation
 
     default = system.simulation or Simulation()
     gains = (given["gains"] and str(given["gains"])) or default.gains or "distance"
-    adaptive = "sampled" if gains == "sampled" else "l1"
+    adaptive = KINDS[gains].controller
     values = dict(numbers)
     if values["control_rate"] is None:
         values["control_rate"] = default.control_rate

@@ -1,4 +1,4 @@
-"""A certificate, read back: whether it is one, whether it is about this specification, and its plan.
+"""A certificate, read back: whether it is about this specification, its plan, and the numbers that simulation needs.
 
 Nothing is believed that the hash does not cover; nothing is proven here either (that is `recheck`'s task).
 """
@@ -6,8 +6,9 @@ Nothing is believed that the hash does not cover; nothing is proven here either 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Final, cast
 
@@ -21,6 +22,51 @@ from tubecert.trajectory.pieces import piecewise_plan
 Result = Mapping[str, Any]
 
 _FREE: Final = ("name", "obstacles", "simulation", "expect", "conditions")  # no claim depends on them
+
+
+class Values(dict[str, float]):
+    """Numbers by their names in the certificate; one that is missing is told as `TubecertError`."""
+
+    def __missing__(self, name: str) -> float:
+        raise _incomplete(f"{name} is missing")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """What one kind of certificate states: whether it is certified, by which recipe, and the radius in the long run.
+
+    `recipe` are the numbers that it proves its claim with, by their names in `proof`.
+    """
+
+    certified: bool
+    recipe: Values
+    ultimate: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certified:
+    """What simulation reads of a certificate, as numbers: nothing else in this room reads its JSON.
+
+    `reach` is dbar = sqrt(a) rho; `rate` lambda in 1/s; `upper` the bound A of lmax(M), where there is one;
+    `constants` the safe sides, by their names in the certificate; `sections` by the names in `proof`.
+    """
+
+    rho: float
+    reach: float
+    rate: float
+    upper: float | None
+    half_widths: tuple[float, ...]
+    constants: Values
+    sections: Mapping[str, Section]
+
+    def __getitem__(self, name: str) -> float:
+        """The safe side of a constant."""
+        return self.constants[name]
+
+    def proven(self, section: str) -> Section | None:
+        """A section, if there is one and it is certified."""
+        found = self.sections.get(section)
+        return found if found is not None and found.certified else None
 
 
 def adopted(spec: Spec, result: Result) -> Spec:
@@ -89,11 +135,40 @@ def plan_of(spec: Spec, model: ControlAffineModel, result: Result) -> Plan:
     return piecewise_plan(model, exact, trajectory.horizon)
 
 
-def above(result: Result, name: str) -> float:
-    """The safe side of a constant."""
-    return float(result["constants"][name]["above"])
+def read_numbers(result: Result) -> Certified:
+    """What simulation reads of a certificate that has a tube; raises `TubecertError` if any of it is missing."""
+    try:
+        rho = _number(result["tube"]["rho"])
+        metric = result["metric"]
+        return Certified(
+            rho=rho,
+            reach=math.sqrt(metric["lower"][0]) * rho,
+            rate=_number(metric["rate"]),
+            upper=float(metric["upper"][1]) if "upper" in metric else None,
+            half_widths=tuple(float(width) for width in result["tube"]["half_widths"].values()),
+            constants=Values({name: float(item["above"]) for name, item in result["constants"].items()}),
+            sections={name: _section(result, name, recipe) for name, recipe in result["proof"].items()},
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
+        raise _incomplete(f"{type(error).__name__} {error}") from None
 
 
-def number(value: float | str) -> float:
+def _incomplete(why: str) -> TubecertError:
+    message = f"the certificate is incomplete: {why}"
+    help = "give the JSON file that certify has written"
+    return TubecertError([Finding(code="TC601", message=message, help=help)])
+
+
+def _section(result: Result, name: str, recipe: Mapping[str, Any]) -> Section:
+    found = result.get(name) or {}
+    ultimate = found.get("ultimate_radius")
+    return Section(
+        certified=result["formulas"] == "corrected" and found.get("verdict") == "certified" and bool(recipe),
+        recipe=Values({name: _number(value) for name, value in (recipe or {}).items() if value is not None}),
+        ultimate=None if ultimate is None else float(ultimate),
+    )
+
+
+def _number(value: float | str) -> float:
     """A number of a certificate: a decimal, or a text p/q."""
     return float(Fraction(value)) if isinstance(value, str) else float(value)

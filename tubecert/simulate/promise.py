@@ -1,4 +1,4 @@
-"""What a certificate promises about a loop, as numbers that a run can break.
+"""What a certificate promises about a loop, as numbers that a run can break; all that is known here of its kinds.
 
 Implements: theory 4 and 4b, the bounds D(t), |k| <= du dbar, |xtilde| <= Dxt/sqrt(Gamma), |sigma_hat - h| <= Dh + R_H.
 """
@@ -6,17 +6,15 @@ Implements: theory 4 and 4b, the bounds D(t), |k| <= du dbar, |xtilde| <= Dxt/sq
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.certified import Result, above, number
-
-SECTIONS: Final = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
-TITLES: Final = {"26": "A (26)", "distance": "B distance", "sampled": "C sampled"}
+from tubecert.simulate.certified import Certified, Values
+from tubecert.simulate.problem import Controller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,72 +63,137 @@ class Promise:
     decay: Decay | None
 
 
-def promise(result: Result, which: str) -> Promise | None:
-    """What certificate A, B or C (`26`, `distance`, `sampled`) promises; None if it certifies nothing."""
-    section = result.get(SECTIONS[which])
-    recipe = result["proof"].get(SECTIONS[which])
-    if result["formulas"] != "corrected" or not section or section["verdict"] != "certified" or not recipe:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """All that simulation needs to know of a kind of certificate.
+
+    `key` names it on the command line (`--gains`), `section` in certificates, `title` in reports; `controller` is the
+    loop that it is about. `prediction_error` is the bound of |xtilde| and `decay` D(t), from what is certified and
+    the recipe of the section; either is None where the kind proves none.
+    """
+
+    key: str
+    section: str
+    title: str
+    controller: Controller
+    prediction_error: Callable[[Certified, Values], float | None]
+    decay: Callable[[Certified, Values], Decay | None]
+
+
+def kind_for(controller: Controller, wanted: str) -> Kind:
+    """The kind whose gains a loop takes: the wanted one, but for a loop that it is not about the first that is."""
+    own = KINDS[wanted]
+    if controller == own.controller or all(controller != kind.controller for kind in KINDS.values()):
+        return own
+    return next(KINDS[key] for key in PREFERRED if KINDS[key].controller == controller)
+
+
+def promise(certified: Certified, kind: Kind) -> Promise | None:
+    """What a kind of certificate promises about its loop; None if it certifies nothing."""
+    section = certified.proven(kind.section)
+    if section is None:
         return None
-    proof = {name: number(value) for name, value in recipe.items() if value is not None}
-    tube = result["tube"]
-    rho = number(tube["rho"])
-    reach = math.sqrt(result["metric"]["lower"][0]) * rho
-    radius = proof["projection_radius"]
-    k = above(result, "feedback_gain") * reach
+    recipe = section.recipe
+    radius = recipe["projection_radius"]  # R_H
+    k = certified["feedback_gain"] * certified.reach  # (2.3) |k| <= du dbar
     bounds = {
-        "distance": reach,
-        "deviation": rho,
+        "distance": certified.reach,  # d(x*, x) < dbar
+        "deviation": certified.rho,  # 1.4 (i)
         "k": k,
-        "u": above(result, "u_star") + k + radius,
-        "sigma_error": above(result, "h") + radius,
+        "u": certified["u_star"] + k + radius,  # (0.4), |u_a| <= R_H
+        "sigma_error": certified["h"] + radius,  # (2.10)
     }
-    error = _prediction_error(result, which, proof)
+    error = kind.prediction_error(certified, recipe)
     if error is not None:
         bounds["xtilde"] = error
-    ultimate = section.get("ultimate_radius")
     return Promise(
-        title=TITLES[which],
-        rho=rho,
-        reach=reach,
-        half_widths=tuple(float(width) for width in tube["half_widths"].values()),
+        title=kind.title,
+        rho=certified.rho,
+        reach=certified.reach,
+        half_widths=certified.half_widths,
         bounds=bounds,
-        ultimate=None if ultimate is None else float(ultimate),
-        decay=_decay(result, which, proof),
+        ultimate=section.ultimate,
+        decay=kind.decay(certified, recipe),
     )
 
 
-def _prediction_error(result: Result, which: str, proof: Mapping[str, float]) -> float | None:
-    """Dxt/sqrt(Gamma); None where it is not proven for these gains."""
-    if which == "sampled":
-        return None
-    if which == "26":
-        return above(result, "prediction_error") / math.sqrt(proof["adaptation_rate"])
-    if "predictor_gain" not in proof:
-        return None
-    s1 = above(result, "h_t") + above(result, "h_x") * proof["speed"]
-    reach = above(result, "h") + proof["projection_radius"]
-    square = 2 * reach * s1 / (2 * proof["predictor_gain"]) + reach**2
-    return math.sqrt(square / proof["adaptation_rate"])
+def _nothing(certified: Certified, recipe: Values) -> None:
+    """The kind proves no such bound."""
 
 
-def _decay(result: Result, which: str, proof: Mapping[str, float]) -> Decay | None:
-    if which == "26":
-        return None  # A bounds the tube only
-    common: dict[str, Any] = {
-        "rate": number(result["metric"]["rate"]),
-        "bandwidth": proof["bandwidth"],
-        "start": above(result, "initial_distance"),
-        "beta": above(result, "metric_input_gain"),
-        "defect": above(result, "plan_defect_metric"),
+def _error_of_paper(certified: Certified, recipe: Values) -> float:
+    """Dxt/sqrt(Gamma), (2.11), with the certificate's own constant Dxt."""
+    return certified["prediction_error"] / math.sqrt(recipe["adaptation_rate"])
+
+
+def _error_of_speed(certified: Certified, recipe: Values) -> float | None:
+    """Dxt/sqrt(Gamma), (2.11), with s1 = Dht + Dhx Y and q = 2 g; None for an A_m that is not -g I."""
+    if "predictor_gain" not in recipe:
+        return None
+    s1 = certified["h_t"] + certified["h_x"] * recipe["speed"]
+    reach = certified["h"] + recipe["projection_radius"]
+    square = 2 * reach * s1 / (2 * recipe["predictor_gain"]) + reach**2
+    return math.sqrt(square / recipe["adaptation_rate"])
+
+
+def _decay_of_distance(certified: Certified, recipe: Values) -> Decay:
+    """(2.15) with H0, and S and e of the recipe."""
+    return Decay(
+        bandwidth=recipe["bandwidth"],
+        first=certified["h_initial"],
+        rest=recipe["uncertainty"] + recipe["prediction_error"],
+        **_common(certified),
+    )
+
+
+def _decay_of_sampled(certified: Certified, recipe: Values) -> Decay:
+    """Theorem C: (2.15) from the first sample on, with H1 and S_T of (4.8) in place of H0 and S."""
+    Ts, g, omega, Y = (recipe[name] for name in ("sample_time", "predictor_gain", "bandwidth", "speed"))
+    s1 = certified["h_t"] + certified["h_x"] * Y
+    turned = min(certified["B_pinv"] * certified["B_x"], certified["B_pinv_x"] * certified["B"])  # b/Dh
+    age = 1 / g - Ts / math.expm1(g * Ts) if g * Ts > 1e-6 else Ts / 2  # m of (4.6)
+    rest = s1 * Ts / -math.expm1(-omega * Ts) + age * (s1 + turned * certified["h"] * Y)  # S_T
+    first = min(certified["h"], certified["h_initial"] + s1 * Ts)  # H1
+    return Decay(bandwidth=omega, first=first, rest=rest, delay=Ts, **_common(certified))
+
+
+def _common(certified: Certified) -> dict[str, float]:
+    """What D(t) has of the metric and of the plan, whatever adapts."""
+    return {
+        "rate": certified.rate,
+        "start": certified["initial_distance"],
+        "beta": certified["metric_input_gain"],
+        "defect": certified["plan_defect_metric"],
     }
-    h0 = above(result, "h_initial")
-    if which == "distance":
-        return Decay(first=h0, rest=proof["uncertainty"] + proof["prediction_error"], **common)
-    Ts, g, omega = proof["sample_time"], proof["predictor_gain"], proof["bandwidth"]
-    s1 = above(result, "h_t") + above(result, "h_x") * proof["speed"]
-    turned = min(
-        above(result, "B_pinv") * above(result, "B_x"), above(result, "B_pinv_x") * above(result, "B")
+
+
+KINDS: Final[Mapping[str, Kind]] = {
+    kind.key: kind
+    for kind in (
+        Kind(
+            key="26",
+            section="conditions_26",
+            title="A (26)",
+            controller="l1",
+            prediction_error=_error_of_paper,
+            decay=_nothing,  # A bounds the tube only
+        ),
+        Kind(
+            key="distance",
+            section="distance",
+            title="B distance",
+            controller="l1",
+            prediction_error=_error_of_speed,
+            decay=_decay_of_distance,
+        ),
+        Kind(
+            key="sampled",
+            section="sampled",
+            title="C sampled",
+            controller="sampled",
+            prediction_error=_nothing,
+            decay=_decay_of_sampled,
+        ),
     )
-    age = 1 / g - Ts / math.expm1(g * Ts) if g * Ts > 1e-6 else Ts / 2
-    rest = s1 * Ts / -math.expm1(-omega * Ts) + age * (s1 + turned * above(result, "h") * proof["speed"])
-    return Decay(first=min(above(result, "h"), h0 + s1 * Ts), rest=rest, delay=Ts, **common)
+}
+PREFERRED: Final = ("distance", "sampled", "26")  # where the kind that was asked for is not about the loop

@@ -19,10 +19,10 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression
 from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulate.certified import Result, above, number, plan_of
+from tubecert.simulate.certified import Certified, Result, plan_of, read_numbers
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.problem import Controller, Gains, LoopProblem
-from tubecert.simulate.promise import SECTIONS, TITLES, Promise, promise
+from tubecert.simulate.promise import Kind, Promise, kind_for, promise
 from tubecert.simulate.uncertainty import Class, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
@@ -73,19 +73,27 @@ class Setting:
     """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0."""
 
     spec: Spec
-    result: Result
+    certified: Certified
     model: ControlAffineModel
     plan: Plan
     horizon: float
     times: Array
-    rho: float
-    reach: float
     x0: Array
     centre: Array
     within: float
     uncertainty: Class
     h: tuple[Expression, ...] | None
     layer: float
+
+    @property
+    def rho(self) -> float:
+        """The radius of the tube."""
+        return self.certified.rho
+
+    @property
+    def reach(self) -> float:
+        """dbar = sqrt(a) rho."""
+        return self.certified.reach
 
     @property
     def tolerance(self) -> float:
@@ -95,7 +103,7 @@ class Setting:
     @property
     def half_widths(self) -> Array:
         """Bounds of |x_i - x_i*| in the tube, (n,)."""
-        return np.array([float(width) for width in self.result["tube"]["half_widths"].values()])
+        return np.array(self.certified.half_widths)
 
 
 def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> Setting:
@@ -103,25 +111,21 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
     model = build(spec)
     plan = plan_of(spec, model, result)
     horizon = _horizon(spec, duration)
-    rho = number(result["tube"]["rho"])
-    kind = class_of(result, len(spec.states), len(spec.inputs))
-    reach = math.sqrt(result["metric"]["lower"][0]) * rho
+    certified = read_numbers(result)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
     return Setting(
         spec=spec,
-        result=result,
+        certified=certified,
         model=model,
         plan=plan,
         horizon=horizon,
         times=np.linspace(0.0, horizon, TIMES),
-        rho=rho,
-        reach=reach,
         x0=np.array([float(value) for value in spec.x0]),
         centre=Tape(plan.start, ()).run_floats([], ()),
         within=0.0 if spec.within is None else float(spec.within),
-        uncertainty=kind,
+        uncertainty=class_of(certified, len(spec.states), len(spec.inputs)),
         h=None if wanted is None else tuple(term.expression for term in wanted),
-        layer=_LAYER * above(result, "metric_input_gain") * reach,
+        layer=_LAYER * certified["metric_input_gain"] * certified.reach,
     )
 
 
@@ -139,13 +143,13 @@ def _horizon(spec: Spec, duration: Fraction | None) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Tuning:
-    """The gains of a loop, the certificate they belong to ("" if none), and whether they are those it proves.
+    """The gains of a loop, the kind of certificate they belong to, and whether they are those that it proves.
 
     `words` say where they come from.
     """
 
     gains: Gains | None
-    source: str
+    kind: Kind | None
     certified: bool
     words: str
 
@@ -168,7 +172,7 @@ def loop_of(
         control_rate=None if control_rate is None else float(control_rate),
         limit=_LIMIT * setting.rho,
     )
-    promised = promise(setting.result, tuning.source) if covered else None
+    promised = promise(setting.certified, tuning.kind) if covered and tuning.kind else None
     return Loop(problem=problem, origin=tuning.words, promise=promised, caution=_caution(setting, problem))
 
 
@@ -195,20 +199,19 @@ def _caution(setting: Setting, problem: LoopProblem) -> str:
 
 def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning:
     if controller in ("nominal", "ccm"):
-        return _Tuning(gains=None, source="", certified=False, words="no adaptation")
-    source = "sampled" if controller == "sampled" or choice.source == "sampled" else choice.source
-    if controller == "l1" and source == "sampled":
-        source = "distance"
+        return _Tuning(gains=None, kind=None, certified=False, words="no adaptation")
+    kind = kind_for(controller, choice.source)
     wanted: dict[str, Any] = {"bandwidth": choice.bandwidth}
     if controller == "sampled":
         wanted["sample_time"] = choice.sample_time
     if controller == "l1":
         wanted["adaptation_rate"] = choice.adaptation_rate
     replaced = {name: float(value) for name, value in wanted.items() if value is not None}
-    found = _certified(setting.result, source)
+    section = setting.certified.proven(kind.section)
+    found = {} if section is None else dict(section.recipe)
     missing = [name for name in wanted if name not in {**found, **replaced}]
     if missing:
-        raise TubecertError([_no_gains(setting, controller, source, missing)])
+        raise TubecertError([_no_gains(controller, kind, missing)])
     numbers = {**found, **replaced}
     gains = Gains(
         bandwidth=numbers["bandwidth"],
@@ -219,8 +222,8 @@ def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning
         sample_time=numbers.get("sample_time") if controller == "sampled" else None,
     )
     same = all(found.get(name) == value for name, value in replaced.items())
-    words = f"certified by {TITLES[source]}" if same else CHOSEN
-    return _Tuning(gains=gains, source=source, certified=same, words=words)
+    words = f"certified by {kind.title}" if same else CHOSEN
+    return _Tuning(gains=gains, kind=kind, certified=same, words=words)
 
 
 def _held(setting: Setting, tuning: _Tuning, choice: Choice, rate: Fraction) -> _Tuning:
@@ -283,17 +286,11 @@ def _place_of_rate(setting: Setting, rate: Fraction) -> Location | None:
     return setting.spec.location("simulation.control_rate")
 
 
-def _certified(result: Result, source: str) -> dict[str, float]:
-    """The gains that a section proves, by name; empty if it proves none."""
-    recipe = result["proof"].get(SECTIONS[source]) if promise(result, source) else None
-    return {name: number(value) for name, value in (recipe or {}).items() if value is not None}
-
-
-def _no_gains(setting: Setting, controller: Controller, source: str, missing: list[str]) -> Finding:
+def _no_gains(controller: Controller, kind: Kind, missing: list[str]) -> Finding:
     options = " and ".join(f"--{name.replace('_', '-')}" for name in missing)
     return Finding(
         code="TC705",
-        message=f"{TITLES[source]} certifies no gains for the controller {controller}",
+        message=f"{kind.title} certifies no gains for the controller {controller}",
         help=f"choose {options} (then nothing is covered by the certificate), or another --gains",
     )
 

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.certified import Result, above
+from tubecert.simulate.certified import Certified
 from tubecert.simulate.problem import Disturbance
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
@@ -57,15 +57,14 @@ class Member:
         return float(size.sum()), float(size @ slope), float(size @ np.abs(self.frequency))
 
 
-def class_of(result: Result, n: int, m: int) -> Class:
+def class_of(certified: Certified, n: int, m: int) -> Class:
     """The class that a certificate is about; pushes only where the metric and B are constant."""
-    constants = {name: above(result, name) for name in ("h", "h_x", "h_t", "h_initial")}
-    flat = above(result, "M_x") == 0 and above(result, "B_x") == 0
+    constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
+    flat = certified["M_x"] == 0 and certified["B_x"] == 0
     push = None
-    if flat and "upper" in result["metric"]:
-        slope = above(result, "B") * float(result["metric"]["upper"][1])
-        defect = above(result, "plan_defect")
-        push = slope, slope * (above(result, "drift_on_plan") + defect)
+    if flat and certified.upper is not None:
+        slope = certified["B"] * certified.upper
+        push = slope, slope * (certified["drift_on_plan"] + certified["plan_defect"])
     return Class(**constants, n=n, m=m, push=push)
 
 
