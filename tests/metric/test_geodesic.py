@@ -181,6 +181,22 @@ def test_half_plane_has_its_closed_form():
     assert found.slope.below <= L <= found.slope.above <= 2.1 * L
 
 
+@pytest.mark.parametrize(("system", "centre", "rho"), [(HALF_PLANE, (0, 1), 0.45), (CURVED, (0, 0, 0), 0.3)])
+def test_the_value_is_that_of_the_theorem(system, centre, rho):
+    """(5.1) in rational numbers: G rho + L rho^2/8, from the enclosures of G and L; here L counts."""
+    found = bounded(system, centre, rho)
+
+    def value(G, L):
+        return Fraction(G) * Fraction(rho) + Fraction(L) * Fraction(rho) ** 2 / 8
+
+    above, below = (
+        value(getattr(found.symbols, side), getattr(found.slope, side)) for side in ("above", "below")
+    )
+    assert above <= Fraction(found.value.above) <= above * (1 + Fraction(1, 10**12))
+    assert below * (1 - Fraction(1, 10**12)) <= Fraction(found.value.below) <= below
+    assert Fraction(found.slope.above) * Fraction(rho) ** 2 / 8 > above / 50
+
+
 def test_a_tube_beyond_the_cut_locus_fails():
     """Many minimisers join opposite points of a sphere; in these coordinates (1, 0) is opposite (-1, 0)."""
     assert not bounded(SPHERE, (1, 0), 2.0).holds
