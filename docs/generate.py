@@ -38,10 +38,33 @@ class Reference:
         while self.waiting:
             parts += self._section(*self.waiting.pop(0))
         types = [f"- **{name}**: {self.schema['$defs'][name]['description']}" for name in self._simple()]
+        for name in self._families():
+            parts += self._family(name)
         return "\n\n".join([*parts, "## Kinds of values", "\n".join(types)]) + "\n"
 
     def _simple(self) -> list[str]:
         return [name for name, value in self.schema.get("$defs", {}).items() if "properties" not in value]
+
+    def _families(self) -> list[str]:
+        return [
+            name
+            for name, value in self.schema.get("$defs", {}).items()
+            if _tag(*value.get("anyOf", ({},))[:1])
+        ]
+
+    def _family(self, name: str) -> Iterator[str]:
+        """The members of a family of records, each told apart by its id."""
+        family = self.schema["$defs"][name]
+        key, _ = _tag(family["anyOf"][0]) or ("id", "")
+        yield f"## {name}"
+        yield f"{family['description']} Told apart by `{key}`; the other members are parameters."
+        rows = [f"| `{key}` | parameters | meaning |", "|---|---|---|"]
+        for member in family["anyOf"]:
+            own, tag = _tag(member) or ("", "")
+            names = [other for other in member["properties"] if other != own]
+            parameters = ", ".join(f"`{other}`" for other in names)
+            rows.append(f"| `{tag}` | {parameters} | {self._meaning(member)} |")
+        yield "\n".join(rows)
 
     def _section(self, path: str, schema: dict[str, Any]) -> Iterator[str]:
         if path:
@@ -99,6 +122,12 @@ class Reference:
         if "examples" in value:
             words += " Example: " + ", ".join(f"`{json.dumps(item)}`" for item in value["examples"]) + "."
         return words.replace("|", "\\|").strip()
+
+
+def _tag(schema: dict[str, Any]) -> tuple[str, str] | None:
+    """The member that tells a record of a family apart, and what it is."""
+    found = [(key, value["const"]) for key, value in schema.get("properties", {}).items() if "const" in value]
+    return found[0] if found else None
 
 
 def codes() -> str:

@@ -22,7 +22,6 @@ _CONSTANTS = {
         "symbol": "a",
         "equation": "CCM_1",
         "unit": "1",
-        "meaning": "smallest eigenvalue of the metric M",
         "at": {"x": [0.01, -0.02]},
     },
     "h": {
@@ -31,10 +30,9 @@ _CONSTANTS = {
         "symbol": "Dh",
         "equation": "assumption 4",
         "unit": "u",
-        "meaning": "sup |h|",
         "at": {"t": 0.785398163, "x": [0.0, 0.0]},
     },
-    "zeta_1": {"below": 1.5, "above": 1.6, "symbol": "zeta1", "equation": "26a", "unit": "1", "meaning": ""},
+    "zeta_1": {"below": 1.5, "above": 1.6, "symbol": "zeta1", "equation": "26a", "unit": "1"},
 }
 
 _RESULT = {
@@ -44,15 +42,17 @@ _RESULT = {
     "overrides": {},
     "plan": {"kind": "equilibrium", "interpolation": "exact"},
     "safe_set": {"angle": [-0.5, 0.5], "speed": [-1.0, "4/3"]},
-    "assumptions": ["the controller acts in continuous time and exactly", "the claim is for all t >= 0"],
+    "assumptions": [{"id": "least_feedback"}, {"id": "for_all_time"}],
     "declared": {},
     "decided_by": ["conditions_26"],
     "reasons": [
         {
-            "claim": "conditions_26",
+            "claim": "gains_suffice",
+            "section": "conditions_26",
+            "binds": "26a",
+            "margins": {"26a": 0.000123, "26b": 0.63, "26c": 4.1e-5},
             "verdict": "certified",
-            "message": "(26a) sets the bandwidth; proven margins: 26a 0.0001, 26b 0.63, 26c 4e-05",
-            "relax": "the least Gamma would fall by about 19 % per 10 % less of Dh (sup |h|)",
+            "relax": [{"id": "halve_constant", "constant": "h", "factor": 0.37}],
         }
     ],
     "metric": {
@@ -121,11 +121,12 @@ def refuted_metric():
     """A result that stops at the metric, with a witness."""
     result = {key: value for key, value in certified().items() if key not in _TUBE_KEYS}
     reason = {
-        "claim": "metric, C2",
+        "claim": "metric_contraction",
+        "rate": 1.0,
+        "largest_rate": [0.99654, 0.99655],
         "verdict": "refuted",
-        "message": "C2 fails at rate 1: the largest rate that this metric supports is 0.99654",
         "at": {"x": [0.1, -0.25]},
-        "relax": "lower metric.rate to 0.99654, or give another dual metric",
+        "relax": [{"id": "lower_rate", "to": 0.99654}, {"id": "other_metric"}],
     }
     return result | {
         "verdict": "refuted",
@@ -149,9 +150,11 @@ def refuted_gains():
     }
     result["reasons"] = [
         {
-            "claim": "conditions_26: 26a",
+            "claim": "condition_holds",
+            "section": "conditions_26",
+            "condition": "26a",
+            "margin": [-0.5, -0.4],
             "verdict": "refuted",
-            "message": "(26a): its margin lies in [-0.5, -0.4]",
         }
     ]
     return result
@@ -160,6 +163,6 @@ def refuted_gains():
 def undecided():
     """A result whose metric could not be decided."""
     result = refuted_metric()
-    result["reasons"][0] |= {"verdict": "undecided", "message": "too close to tell"}
+    result["reasons"][0] |= {"verdict": "undecided"}
     del result["reasons"][0]["at"]
     return result | {"verdict": "undecided"}

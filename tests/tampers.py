@@ -55,8 +55,8 @@ def verified(old, new):
 
 HARMLESS = [
     # labels and prose: nothing reads them
-    (r"constants\.\w+\.(symbol|equation|unit|meaning|at)\b.*", anything),
-    (r"reasons\[\]\.(message|relax|at)\b.*", anything),
+    (r"constants\.\w+\.(symbol|equation|unit|at)\b.*", anything),
+    (r"reasons\[\]\.(binds|below_twice_rate|predictor_gain|relax|at)\b.*", anything),
     (r"reasons(\[\])?", anything),  # an explanation less
     (r"plan\.(curve|file|file_hash|samples)\b.*", anything),
     (r"spec\.file_hash", anything),  # compared with the file itself by --spec

@@ -39,7 +39,7 @@ def test_three_state_as_printed():
     result = search_26(problem)
     assert result.infimum == pytest.approx(48.92, rel=1e-4)
     assert result.verdict is Verdict.UNDECIDED
-    assert result.shortfalls[0].claim == "as-printed"
+    assert result.shortfalls[0].claim == "corrected_formulas"
     at_50 = search_26(problem, bandwidth=Fraction(50))
     assert gains(at_50.pair) == pytest.approx((50, 1.967e7), rel=1e-3)
     wrong = search_26(replace(problem, filter_factor=1), bandwidth=Fraction(50))
@@ -408,7 +408,7 @@ def test_an_initial_distance_beyond_the_tube_is_refuted_by_name():
     problem = alive(values={"initial_distance": 0.9})
     for result in (search_distance(problem), search_sampled(problem)):
         assert result.verdict is Verdict.REFUTED
-        assert [item.claim for item in result.shortfalls] == ["dbar <= d0"]
+        assert [item.claim for item in result.shortfalls] == ["initial_distance"]
         assert result.shortfalls[0].missing == pytest.approx(0.9 - np.sqrt(0.9) * 0.9)
     result = search_26(problem)
     assert result.verdict is Verdict.REFUTED
@@ -418,7 +418,7 @@ def test_an_initial_distance_beyond_the_tube_is_refuted_by_name():
 
 def test_a_plan_defect_beyond_the_tube_is_refuted_by_name():
     result = search_distance(alive(values={"plan_defect_metric": 1.3}))
-    assert [item.claim for item in result.shortfalls] == ["dbar <= delta/lambda"]
+    assert [item.claim for item in result.shortfalls] == ["plan_defect"]
     wide = alive(values={"plan_defect_metric": (0.1, 1.3)})
     assert search_distance(wide).verdict is Verdict.UNDECIDED
 
@@ -514,5 +514,5 @@ def test_a_constant_without_a_bound_is_named():
     problem = alive(values={"M_x": float("inf")})
     result = search_26(problem)
     assert result.verdict is Verdict.UNDECIDED
-    assert [item.claim for item in result.shortfalls] == ["unbounded: M_x"]
+    assert [(item.claim, item.constant) for item in result.shortfalls] == [("bounded", "M_x")]
     assert search_distance(problem).verdict is Verdict.CERTIFIED  # no M_x in B

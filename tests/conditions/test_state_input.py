@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tubecert.claims import MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.projected import ProjectedPencil
@@ -74,14 +75,15 @@ def test_the_largest_rate_is_the_closed_form(result):
 def test_a_violated_killing_condition_is_refuted_at_a_point(change):
     result = certify(spec(change), Options())
     assert result["verdict"] == "refuted"
-    assert result["reasons"][0]["claim"] == "metric, C3"
+    assert result["reasons"][0]["claim"] == "metric_killing"
     assert "at" in result["reasons"][0]
 
 
 def test_too_high_a_rate_is_refuted():
     result = certify(spec(("rate: 1.5", "rate: 1.77")), Options())
     assert result["verdict"] == "refuted"
-    assert "1.76" in result["reasons"][0]["message"]
+    below, above = result["reasons"][0]["largest_rate"]
+    assert 1.76 < below <= above < 1.77
 
 
 def test_finslers_lemma_agrees_with_the_moving_annihilator():
@@ -123,5 +125,5 @@ tube: {epsilon: 0.1, rho_a: 0.1}
     assert found.below <= -4 <= found.above
     assert found.above <= -4 + 2e-2
     # W does not follow B, so C3 fails: the metric is refused, whatever C2 says
-    assert verify_metric(model, chosen.safe_set, Effort()).condition == "C3"
+    assert isinstance(verify_metric(model, chosen.safe_set, Effort()).failed, MetricKilling)
     assert model.rate == Fraction(1)

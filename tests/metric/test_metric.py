@@ -23,10 +23,13 @@ from systems import (
     two_state,
 )
 
+from tubecert.claims import MetricContraction, MetricDefinite, MetricKilling, Reason
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import constant, substitute
 from tubecert.metric.verify import verify_metric
 from tubecert.model import ControlAffineModel
+from tubecert.verdict import Verdict
+from tubecert.words.claims import message
 
 EFFORT = Effort()
 
@@ -72,10 +75,15 @@ def has_a_positive_direction(m):
     return m[0][0] > 0 or m[1][1] > 0 or m[0][0] * m[1][1] - m[0][1] * m[1][0] < 0
 
 
+def why(proof):
+    """What a proof says that failed."""
+    return message(Reason(claim=proof.failed, verdict=Verdict(proof.verdict)))
+
+
 def assert_witness(model, proof, rate, box):
     """The refutation re-evaluated at its point in exact arithmetic."""
     assert proof.verdict == "refuted"
-    assert proof.condition == "C2"
+    assert isinstance(proof.failed, MetricContraction)
     x = [Fraction(v) for v in proof.at.x]
     assert all(lo <= v <= hi for v, (lo, hi) in zip(x, box, strict=True))
     assert has_a_positive_direction(restricted(model, x, rate))
@@ -98,7 +106,7 @@ def test_at_rate_one_it_is_refuted_with_a_witness_that_holds():
     model = three_state(rate="1")
     proof = verdict_of(model, BOX_THREE)
     assert_witness(model, proof, Fraction(1), BOX_THREE)
-    assert "0.999998" in proof.reason
+    assert "0.999998" in why(proof)
     assert proof.margin.above < 0
 
 
@@ -113,7 +121,7 @@ def test_metrics_as_printed_in_the_paper_are_refuted(model, box, largest):
     assert proof.largest_rate.below == pytest.approx(largest, abs=1e-5)
     assert proof.largest_rate.above == pytest.approx(largest, abs=1e-5)
     # and the rate that it names is supported
-    named = Fraction(proof.reason.split()[-1])
+    named = Fraction(why(proof).split()[-1])
     assert verdict_of(replace(model, rate=named), box).verdict == "certified"
 
 
@@ -283,8 +291,9 @@ def test_a_metric_that_depends_on_an_actuated_state_is_refused():
     W = polynomial_three()
     W[0][0] = "0.20365 + 1e-9*x3"
     proof = verdict_of(three_state(W), BOX_THREE)
-    assert (proof.verdict, proof.condition) == ("refuted", "C3")
-    assert "u" in proof.reason
+    assert proof.verdict == "refuted"
+    assert isinstance(proof.failed, MetricKilling)
+    assert proof.failed.input == "u"
 
 
 def test_a_killing_defect_that_vanishes_identically_is_no_defect():
@@ -298,7 +307,7 @@ def test_a_metric_that_is_not_positive_is_refused(entry):
     W = polynomial_three()
     W[2][2] = entry
     proof = verdict_of(three_state(W), BOX_THREE, Effort(budget=20_000))
-    assert proof.condition == "C1"
+    assert isinstance(proof.failed, MetricDefinite)
     assert proof.verdict == "refuted"
     x = [Fraction(v) for v in proof.at.x]
     numbers = [[float(exact(e, three_state(W), x)) for e in row] for row in three_state(W).W]
@@ -307,7 +316,7 @@ def test_a_metric_that_is_not_positive_is_refused(entry):
 
 def test_a_metric_that_vanishes_at_one_point_is_not_certified():
     proof = verdict_of(two_state([["1", "0"], ["0", "(x1 - 1/3)**2"]]), BOX_TWO, Effort(budget=20_000))
-    assert proof.condition == "C1"
+    assert isinstance(proof.failed, MetricDefinite)
     assert proof.verdict != "certified"
 
 
@@ -343,7 +352,7 @@ def test_a_drift_that_cannot_be_bounded_within_the_budget_is_no_crash():
     assert verdict_of(model, box, Effort(budget=1)).largest_rate.below == -np.inf
     proof = verdict_of(model, box)
     assert proof.verdict == "refuted"
-    assert "no positive rate" in proof.reason
+    assert "no positive rate" in why(proof)
 
 
 # -- invariance ----------------------------------------------------------------------------------------------
@@ -412,7 +421,8 @@ def test_an_input_that_depends_on_the_state_is_projected_out():
     assert proof.largest_rate.below == pytest.approx(2, abs=1e-2)
     assert proof.largest_rate.above >= 2
     refused = verdict_of(turned("2.01"), box)
-    assert (refused.verdict, refused.condition) == ("refuted", "C2")
+    assert refused.verdict == "refuted"
+    assert isinstance(refused.failed, MetricContraction)
 
 
 def test_finslers_lemma_agrees_with_the_moving_annihilator(monkeypatch):

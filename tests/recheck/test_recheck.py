@@ -112,7 +112,7 @@ def test_every_constant_that_is_understated_is_named(shipped):
 
 def test_a_change_without_the_hash_is_contradicted(shipped):
     document = shipped(THREE)
-    document["result"]["reasons"][0]["message"] = "trust me"
+    document["result"]["reasons"][0]["margins"]["26a"] = 0.5
     assert examine(document).failing.name == "the hash is that of the result"
 
 
@@ -201,23 +201,23 @@ def code_of(text):
     [
         ("", "TC600"),
         ("{", "TC600"),
-        ('{"format": "tubecert-certificate/1", "format": "x"}', "TC600"),
+        ('{"format": "tubecert-certificate/2", "format": "x"}', "TC600"),
         ('{"format": NaN}', "TC600"),
         ('{"x": 1e999}', "TC600"),
         ("[" * 100_000, "TC600"),
         ('{"x": ' + "9" * 10_000 + "}", "TC600"),
         ("{}", "TC601"),
         ("[]", "TC601"),
-        ('"tubecert-certificate/1"', "TC601"),
-        ('{"format": "tubecert-certificate/2"}', "TC602"),
+        ('"tubecert-certificate/2"', "TC601"),
+        ('{"format": "tubecert-certificate/1"}', "TC602"),
         ('{"format": "tubecert-certificate/999999999999999999999999"}', "TC602"),
-        ('{"format": "tubecert-certificate/1"}', "TC603"),
+        ('{"format": "tubecert-certificate/2"}', "TC603"),
         (
-            '{"format": "tubecert-certificate/1", "run": {}, "hash": "x", "result": {"verdict": "maybe"}}',
+            '{"format": "tubecert-certificate/2", "run": {}, "hash": "x", "result": {"verdict": "maybe"}}',
             "TC603",
         ),
         (
-            '{"format": "tubecert-certificate/1", "run": {}, "hash": "x", "result": {"verdict": "certified"}}',
+            '{"format": "tubecert-certificate/2", "run": {}, "hash": "x", "result": {"verdict": "certified"}}',
             "TC603",
         ),
     ],

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
+from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe, margins_26
 from tubecert.expression import to_text
@@ -28,6 +29,7 @@ from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
 from tubecert.report.figures_tube import Plane
 from tubecert.report.numbers import percent, up
 from tubecert.report.page_sections import page_of
+from tubecert.report.reasons import assumption_of
 from tubecert.spec import load, load_text
 
 ROOT = Path(__file__).parents[2]
@@ -174,9 +176,10 @@ def _planted(text):
     effective["uncertainty"] = {"h": [text]}
     effective["trajectory"]["at"] = [text, "0"]
     result["plan"]["samples"] = {"t": [0.0], "x": [[0.0, 0.0]]}
-    result["assumptions"] = [text, f"x {text}"]
-    result["reasons"][0] |= {"message": text, "relax": f"{text}!", "claim": text, "at": {"x": [0.1, 0.2]}}
-    result["constants"]["h"] |= {"symbol": text, "meaning": text, "unit": text, "equation": text}
+    result["declared"] = {f"x {text}": 1.0}
+    claim = {"claim": "tube_in_safe_set", "radius": 1.0, "state": text, "side": "upper", "excess": 0.0}
+    result["reasons"] = [claim | {"verdict": "refuted", "at": {"x": [0.1, 0.2]}}]
+    result["constants"]["h"] |= {"symbol": text, "unit": text, "equation": text}
     result["elasticities"] = {"conditions_26": {"h": 1.5, "lower": -2.0}, "distance": {}}
     result["metric"]["dual_metric"] = [[text, "0"], ["0", "1"]]
     return certificate.seal(result, {**RUN, "command": text, "versions": {text or "a": text}})
@@ -218,9 +221,9 @@ def test_every_constant_with_symbol_meaning_equation_value_and_place(orbit):
     text = parsed(orbit).text
     constants = orbit["result"]["constants"]
     assert len(constants) > 30
-    for item in constants.values():
-        for what in ("symbol", "meaning", "equation"):
-            assert item[what] in text
+    for name, item in constants.items():
+        for what in (item["symbol"], item["equation"], {**TABLE, **DERIVED}[name].words):
+            assert what in text
     at = constants["f"]["at"]
     assert f"at t = {at['t']:.6g} s, x1 = {at['x'][0]:.6g}" in text
 
@@ -247,7 +250,7 @@ def test_proven_declared_assumed_are_kept_apart(any_certificate):
     (section,) = (s for s in page_of(any_certificate).sections if s.key == "rests-on")
     proven, declared, assumed = section.blocks
     result = any_certificate["result"]
-    assert assumed.items == tuple(result["assumptions"])
+    assert assumed.items == tuple(map(assumption_of, result["assumptions"]))
     assert declared.items == ("nothing",)
     claims = [item for item in proven.items if item.startswith(("A (26)", "B distance", "C sampled"))]
     holding = [
@@ -508,7 +511,7 @@ def test_markdown_says_the_same(any_certificate):
     result = any_certificate["result"]
     assert text.startswith(f"# {markdown.escape(result['spec']['effective']['name'])}: {result['verdict']}\n")
     assert any_certificate["hash"] in plain
-    for item in result["assumptions"]:
+    for item in map(assumption_of, result["assumptions"]):
         assert item.replace("<=", "≤").replace(">=", "≥") in plain
     assert "<svg" not in text
 
@@ -630,14 +633,14 @@ def _tampered(change):
     [
         (_tampered(lambda d: d["result"]["tube"].update(rho=0.001)), "its hash is not that of its result"),
         (
-            _tampered(lambda d: d.update(format="tubecert-certificate/2")),
-            "has the format tubecert-certificate/2",
+            _tampered(lambda d: d.update(format="tubecert-certificate/1")),
+            "has the format tubecert-certificate/1",
         ),
         (_tampered(lambda d: d.pop("result")), "it has no result"),
         ("[]", "is not a certificate"),
         ("{", "it is not JSON (line 1"),
         ("", "it is not JSON"),
-        ('{"result": {"a": NaN}, "format": "tubecert-certificate/1"}', "it holds NaN"),
+        ('{"result": {"a": NaN}, "format": "tubecert-certificate/2"}', "it holds NaN"),
         ("[" * 100_000, "it is nested too deeply"),
         ("\x00", "it is not JSON"),
     ],

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
+from tubecert.claims import LowerDegree, NotProvenAsWritten, NotWritable, RankUnproven
 from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, scan, symbol
@@ -94,7 +95,7 @@ def test_the_rate_of_the_mode_itself_is_not_refuted():
     wanted = Synthesis(rate=Fraction(1), objective="condition", degree=0)
     found = pipeline.synthesise(load_text(small()), wanted, Options())
     assert found.verdict == "undecided"
-    assert "no metric has a rate above 1" in found.reason
+    assert found.reason.claim.failure.limit == 1
     found = pipeline.synthesise(load_text(small()), replace(wanted, rate=Fraction("1.0001")), Options())
     assert found.verdict == "refuted"
 
@@ -168,7 +169,8 @@ def test_a_lost_rank_is_named_with_its_point():
         load_text(text), Synthesis(rate=Fraction(1, 2), objective="condition"), Options()
     )
     assert found.verdict == "refuted"
-    assert "loses rank in the safe set at y = " in found.reason
+    assert isinstance(found.reason.claim.failure, RankUnproven)
+    assert found.reason.at is not None
 
 
 # -- written: read back and proven again, with the numbers that the file says
@@ -248,8 +250,8 @@ def test_a_metric_too_long_to_be_read_is_not_written(monkeypatch):
     found = pipeline.synthesise(spec, WISHES["condition"], Options())
     assert found.verdict == "undecided"
     assert found.file is None
-    assert "the metric cannot be written: the expression has" in found.reason
-    assert "lower degree" in found.relax
+    assert found.reason.claim.failure == NotWritable(code="TC102")
+    assert found.reason.relax == (LowerDegree(),)
 
 
 def test_what_reads_back_differently_is_proven_as_it_reads(monkeypatch):
@@ -265,7 +267,7 @@ def test_what_reads_back_differently_is_proven_as_it_reads(monkeypatch):
     found = pipeline.synthesise(load_text(small()), WISHES["condition"], Options())
     assert found.verdict == "undecided"
     assert found.file is None
-    assert "as written could not be proven" in found.reason
+    assert isinstance(found.reason.claim.failure, NotProvenAsWritten)
 
 
 def test_a_certificate_of_a_synthesised_metric_is_consistent(tmp_path):

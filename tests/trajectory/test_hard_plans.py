@@ -10,6 +10,7 @@ from math import prod
 import numpy as np
 import pytest
 
+from tubecert.claims import Reason
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.expression import constant, symbol
@@ -17,10 +18,12 @@ from tubecert.expression.matrix import determinant
 from tubecert.expression.parse import parse
 from tubecert.model import ControlAffineModel, rank_decision
 from tubecert.pipeline import Options, certify
+from tubecert.records import from_json
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import constant_plan
 from tubecert.tube import Tube, containment
+from tubecert.words.claims import message, title
 
 x, y, z = symbol("x"), symbol("y"), symbol("z")
 ZERO, ONE = constant(0), constant(1)
@@ -81,7 +84,8 @@ TUBE = "tube: {epsilon: 0.3, rho_a: 0.1}\n"
 def verdict(text: str):
     """The verdict and the claim that decided it."""
     result = certify(load_text(text, "spec.yaml"), Options())
-    return result["verdict"], result["reasons"][-1]["claim"], result["reasons"][-1]["message"]
+    reason = from_json(Reason, result["reasons"][-1], "reason")
+    return result["verdict"], title(reason.claim), message(reason)
 
 
 def test_a_start_beyond_all_squares_is_refuted():

@@ -390,8 +390,11 @@ def test_the_wrong_interpolation_costs_most_of_the_tube_and_is_named(tmp_path, p
     wrong = certify(as_file(tmp_path, planned, 4, ""), Options())
     assert wrong["constants"]["plan_defect"]["above"] == pytest.approx(0.91, abs=0.01)
     assert wrong["verdict"] == "refuted"
-    assert "by up to 0.909" in wrong["reasons"][-1]["relax"]
-    assert "83 % of the tube: with interpolation: hold it would be 0.0127" in wrong["reasons"][-1]["relax"]
+    (mend,) = wrong["reasons"][-1]["relax"]
+    assert mend["defect"] == pytest.approx(0.909, abs=1e-3)
+    assert mend["share"] == pytest.approx(0.83, abs=0.01)
+    assert mend["remedy"]["interpolation"] == "hold"
+    assert mend["remedy"]["defect"] == pytest.approx(0.0127, abs=1e-4)
 
 
 def test_certificates_of_plans_are_deterministic(planned):

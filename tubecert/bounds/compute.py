@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from tubecert.model import TIME
 from tubecert.tube import Containment, containment
 
 Box = tuple[tuple[Fraction, Fraction], ...]
+Obstacle = Literal["out_of_range", "metric_unbounded", "not_settled"]
 _ROUNDS = 60
 _CLOSE = 1 + Fraction(1, 10**4)
 _INFLATION = 1 + Fraction(1, 10**6)
@@ -28,14 +30,14 @@ class Radius:
     """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, an exact decimal.
 
     `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused. `obstacle`
-    says why the fixed point was not found, if it was not.
+    says why the fixed point was not found, if it was not (see `claims.TubeRadius`).
     """
 
     rho: Fraction
     lower: Constant | None
     upper: Constant | None
     contained: Containment
-    obstacle: str = ""
+    obstacle: Obstacle | None = None
 
 
 def least_radius(
@@ -64,7 +66,7 @@ def least_radius(
     def check(rho: Fraction) -> Containment:
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
-    beyond = "rho = sqrt(A/a)|x0* - x0| + eps + rho_a is beyond the range of numbers"
+    beyond: Obstacle = "out_of_range"
     nowhere = Containment(verdict="undecided")
     if declared is not None:
         given = needed(*declared)
@@ -81,16 +83,14 @@ def least_radius(
             return Radius(rho=rho, lower=None, upper=None, contained=contained)
         a, A = suprema.with_radius(rho).metric_bounds()
         if not (a.below > 0 and math.isfinite(A.above)):
-            obstacle = "the metric could not be bounded over the tube"
-            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=obstacle)
+            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle="metric_unbounded")
         right = needed(a, A)
         if right is None:
             return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=beyond)
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
         rho = decimal_above(right * _INFLATION) if right < rho * _CLOSE else right
-    obstacle = f"rho = sqrt(A/a)|x0* - x0| + eps + rho_a did not settle: it grows with the tube beyond {float(rho):.6g}"
-    return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=obstacle)
+    return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle="not_settled")
 
 
 def bound_constants(

@@ -6,6 +6,7 @@ Console, JSON and docs read names, symbols, equations and units from `TABLE` and
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Literal
 
 from tubecert.enclosure.constant import Constant, Witness
 
@@ -14,16 +15,22 @@ __all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "Witness"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Meaning:
-    """What a constant is: symbol of the paper or of docs/theory, equation tag, unit, and words."""
+    """What a constant is: symbol of the paper or of docs/theory, equation tag, unit, and words.
+
+    `side` is the one that the certificate uses: `below` for an infimum, `above` for a supremum.
+    """
 
     symbol: str
     equation: str
     unit: str
     words: str
+    side: Literal["below", "above"] = "above"
 
 
-def _of(symbol: str, equation: str, unit: str, words: str) -> dict[str, Meaning]:
-    return {"meaning": Meaning(symbol=symbol, equation=equation, unit=unit, words=words)}
+def _of(
+    symbol: str, equation: str, unit: str, words: str, side: Literal["below", "above"] = "above"
+) -> dict[str, Meaning]:
+    return {"meaning": Meaning(symbol=symbol, equation=equation, unit=unit, words=words, side=side)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +40,7 @@ class BoundConstants:
     The units are those of the states and inputs of the specification; "1" is dimensionless.
     """
 
-    lower: Constant = field(metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M"))
+    lower: Constant = field(metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M", "below"))
     upper: Constant = field(metadata=_of("A", "CCM_1", "1", "largest eigenvalue of the metric M"))
     f: Constant = field(metadata=_of("Df", "assumption 3", "x/s", "sup |f|"))
     f_x: Constant = field(metadata=_of("Dfx", "assumption 3", "1/s", "sup |df/dx|"))
@@ -66,7 +73,11 @@ class BoundConstants:
     )
     input_gain_least: Constant = field(
         metadata=_of(
-            "smin(Theta B)", "bounds:delta_u", "d/(u s)", "inf of the smallest singular value of Theta B"
+            "smin(Theta B)",
+            "bounds:delta_u",
+            "d/(u s)",
+            "inf of the smallest singular value of Theta B",
+            "below",
         )
     )
     contraction_excess: Constant = field(

@@ -12,6 +12,21 @@ from typing import Any
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Meaning, Witness
+from tubecert.claims import (
+    Assumption,
+    ExactGeodesics,
+    FirstOrderFilter,
+    ForAllTime,
+    HardProjection,
+    LeastFeedback,
+    PerfectState,
+    SmoothProjection,
+    StartAtRest,
+    StraightGeodesics,
+    UncertaintyAsDeclared,
+    UncertaintyAsGiven,
+    UpToHorizon,
+)
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
@@ -85,7 +100,7 @@ def plan_data(spec: Spec, plan: Plan) -> Result:
         "kind": trajectory.kind,
         **_samples(plan),
         "interpolation": knots.interpolation,
-        "curve": "between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*",
+        "curve": "hermite",  # between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*
         "knots": {
             "t": [number_text(t) for t in knots.t],
             **{
@@ -120,7 +135,6 @@ def constant_data(value: Constant, meaning: Meaning) -> Result:
         "symbol": meaning.symbol,
         "equation": meaning.equation,
         "unit": meaning.unit,
-        "meaning": meaning.words,
     }
     if value.at is not None:
         data["at"] = witness_data(value.at)
@@ -150,47 +164,27 @@ def decimal_data(value: Fraction | None) -> float | str | None:
     return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
 
 
-def floor_text(value: float) -> str:
-    """Six digits, rounded down."""
-    digits = 6
-    step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
-    return f"{math.floor(value / step) * step:.{digits}g}"
-
-
-def ceiling_text(value: float) -> str:
-    """Six digits, rounded up."""
-    return floor_text(-value).lstrip("-")
-
-
-def assumptions(spec: Spec, model: ControlAffineModel, geodesics: GeodesicTest | None = None) -> list[str]:
+def assumptions(
+    spec: Spec, model: ControlAffineModel, geodesics: GeodesicTest | None = None
+) -> tuple[Assumption, ...]:
     """Everything that is not proven here (docs/guarantee, "What is assumed").
 
     `geodesics` is the test for their uniqueness, once the tube is known.
     """
     flat = all(e.is_constant for row in model.W for e in row)
-    smooth = spec.adaptation.smooth
-    horizon = spec.trajectory.horizon
-    return [
-        "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
-        "controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
-        "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
-        "minimising geodesics are straight lines, which the constant metric makes unique"
-        if flat
-        else _geodesic_assumption(geodesics),
-        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
-        "the projection is hard"
-        if smooth is None
-        else f"the projection is smooth with layer {float(smooth):g}",
-        "the full state is measured without noise or delay, and inputs do not saturate",
-        "the filter is first order, C(s) = omega/(s + omega)",
-        f"the claim is for 0 <= t <= {float(horizon):g} s"
-        if horizon is not None
-        else "the claim is for all t >= 0",
-        "the uncertainty obeys its declared bounds on the tube"
+    smooth, horizon = spec.adaptation.smooth, spec.trajectory.horizon
+    return (
+        LeastFeedback(),
+        StraightGeodesics() if flat else _geodesic_assumption(geodesics),
+        StartAtRest(),
+        HardProjection() if smooth is None else SmoothProjection(layer=smooth),
+        PerfectState(),
+        FirstOrderFilter(),
+        ForAllTime() if horizon is None else UpToHorizon(horizon=horizon),
+        UncertaintyAsDeclared()
         if spec.uncertainty.h is None
-        else "the uncertainty is the expression of the specification"
-        + (", or any other within the bounds h, h_x, h_t of this certificate" if _any_start(spec) else ""),
-    ]
+        else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
+    )
 
 
 def _any_start(spec: Spec) -> bool:
@@ -199,14 +193,8 @@ def _any_start(spec: Spec) -> bool:
     return bounds is not None and bounds.h is not None
 
 
-def _geodesic_assumption(test: GeodesicTest | None) -> str:
+def _geodesic_assumption(test: GeodesicTest | None) -> ExactGeodesics:
     """What is assumed of geodesics of a metric that is not constant."""
-    exact = "the controller finds the minimising geodesic exactly"
     if test is None:
-        return f"{exact}, and it is unique in the tube (not proven here)"
-    if test.holds:
-        return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {ceiling_text(test.value.above)}"
-    size = f"reaches {floor_text(test.value.below)}"
-    if test.value.below < 1:
-        size = "could not be bounded by less than 1"
-    return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"
+        return ExactGeodesics(uniqueness="assumed")
+    return ExactGeodesics(uniqueness="proven" if test.holds else "assumed", value=test.value.printable())

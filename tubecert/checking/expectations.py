@@ -7,9 +7,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tubecert.claims import METRIC_CLAIMS, MetricFound, Reason
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
+from tubecert.records import from_json
 from tubecert.spec import Expectation, Spec
+from tubecert.words.advice import advice
+from tubecert.words.claims import message, title
+from tubecert.words.conditions import SECTIONS
 
 VERDICT_MISMATCH = "TC502"
 RANGE_MISMATCH = "TC503"
@@ -69,19 +74,21 @@ def _numbers(result: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
 def _claims(result: Mapping[str, Any]) -> Iterator[Claim]:
     """A claim per reason, and one per certificate that has no reason among them."""
     named = set()
-    for reason in result["reasons"]:
-        named.add(reason["claim"].split(":")[0])
+    reasons = [from_json(Reason, item, f"reasons[{i}]") for i, item in enumerate(result["reasons"])]
+    for reason in reasons:
+        named.add(getattr(reason.claim, "section", None))
         yield Claim(
-            name=reason["claim"],
-            verdict=reason["verdict"],
-            message=reason["message"],
-            relax=reason.get("relax", ""),
+            name=title(reason.claim),
+            verdict=reason.verdict,
+            message=message(reason),
+            relax=advice(reason.relax),
         )
-    if "verdict" in result.get("metric", {}) and not any(name.startswith("metric") for name in named):
+    of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in reasons)
+    if "verdict" in result.get("metric", {}) and not of_metric:
         yield Claim(name="metric", verdict=result["metric"]["verdict"])
-    for name in result.get("decided_by", ()):
-        if name in result and name not in named:
-            yield Claim(name=name, verdict=result[name]["verdict"])
+    for section in result.get("decided_by", ()):
+        if section in result and section not in named:
+            yield Claim(name=SECTIONS[section], verdict=result[section]["verdict"])
 
 
 def compared(spec: Spec, found: Outcome) -> list[Finding]:

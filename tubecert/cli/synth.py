@@ -56,7 +56,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         from tubecert.report.sweep import draw
 
         certificate.write_text(given["plot"], draw([row.data() for row in found.rows]))
-    _report(found, system.name, target, output)
+    _report(found, system, target, output)
     return certificate.exit_code({"verdict": found.verdict})
 
 
@@ -114,14 +114,14 @@ def _refuse(option: str, text: str, message: str) -> Never:
     raise SpecError([Finding(code="TC112", message=message, location=place)])
 
 
-def _report(found: Any, name: str, target: str, output: Output) -> None:
+def _report(found: Any, system: Spec, target: str, output: Output) -> None:
     """The report on stdout, or the metric file, with the verdict line on stderr."""
     from tubecert.report import synthesis
 
     present(
         output,
-        synthesis.verdict_line(found.data(), found.file, name),
-        lambda: synthesis.report(found.data(), found.file, name, target),
+        synthesis.verdict_line(found.data(), found.file, system.name),
+        lambda: synthesis.report(found.data(), found.file, system, target),
         certificate.dump(found.data() if found.file is None else found.file)
         if output.json or target == certificate.STDOUT
         else None,

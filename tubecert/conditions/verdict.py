@@ -4,32 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from tubecert.enclosure.interval import Interval
+from tubecert.verdict import Verdict
 
-
-class Verdict(StrEnum):
-    """Three values; undecided is never shown as either of the others."""
-
-    CERTIFIED = "certified"
-    REFUTED = "refuted"
-    UNDECIDED = "undecided"
+__all__ = ["NOTHING_FOUND", "UNKNOWN", "Shortfall", "Verdict", "unbounded", "verdict"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shortfall:
     """A claim that is not proven: its margin (relative to what is allowed), both sides where known.
 
-    `claim` is "26a", "26b", "26c", "distance", "sampled" at gains asked for; "26a", "dbar <= d0", "dbar <=
-    delta/lambda" where no gains can help; "unbounded: NAME" where a constant has no finite bound;
-    "as-printed" where the formulas themselves prove nothing; "nothing found" where the search failed.
+    `claim` is `26a`, `26b`, `26c`, `distance`, `sampled` at gains asked for; `26a`, `initial_distance`, `plan_defect`
+    where no gains can help; `bounded` where `constant` has no finite bound; `corrected_formulas` where the formulas
+    themselves prove nothing; `proven_gains` where the search failed (see `claims.ConditionHolds`).
     """
 
     claim: str
     margin: Interval
+    constant: str | None = None
     allowed: float | None = None
     needed: float | None = None
 
@@ -49,9 +44,9 @@ def verdict(margins: Iterable[Interval]) -> Verdict:
 
 UNKNOWN = Interval(-np.inf, np.inf)
 
-NOTHING_FOUND = (Shortfall(claim="nothing found", margin=UNKNOWN),)
+NOTHING_FOUND = (Shortfall(claim="proven_gains", margin=UNKNOWN),)
 
 
 def unbounded(names: Iterable[str]) -> tuple[Shortfall, ...]:
     """One reason per constant without a finite bound: nothing follows from it, either way."""
-    return tuple(Shortfall(claim=f"unbounded: {name}", margin=UNKNOWN) for name in names)
+    return tuple(Shortfall(claim="bounded", constant=name, margin=UNKNOWN) for name in names)

@@ -15,6 +15,7 @@ from math import isfinite
 
 import numpy as np
 
+from tubecert.claims import MetricContraction, MetricDefinite, MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, decide, supremum
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain
@@ -37,12 +38,11 @@ class MetricProof:
     """The outcome of C1-C3.
 
     `largest_rate` encloses the supremum of the rates that C2 supports; `margin` is it minus the rate asked for, in 1/s.
-    `condition` names what failed (C1, C2, C3), `at` is a point where that is proven.
+    `failed` is the condition that is not proven (C1, C2 or C3), `at` a point where it is refuted.
     """
 
     verdict: str
-    condition: str = ""
-    reason: str = ""
+    failed: MetricDefinite | MetricContraction | MetricKilling | None = None
     at: Witness | None = None
     lower_on_set: Constant | None = None
     upper_on_set: Constant | None = None
@@ -61,14 +61,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
 
     positive = decide(Definite(model.W), domain, 0.0, effort)
     if positive.verdict != "proven":
-        return MetricProof(
-            verdict=positive.verdict,
-            condition="C1",
-            reason="W is not positive definite"
-            if positive.verdict == "refuted"
-            else "W could not be proven positive",
-            at=place(positive.at),
-        )
+        return MetricProof(verdict=positive.verdict, failed=MetricDefinite(), at=place(positive.at))
     fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
     largest = supremum(Pencil(model.W, eye), domain, fine)
     upper = supremum(Pencil(eye, model.W), domain, fine)
@@ -79,8 +72,8 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         upper_on_set=Constant(below=upper.below, above=upper.above, at=place(upper.at)),
     )
     if (failed := _killing(model, domain)) is not None:
-        verdict, reason, at = failed
-        return replace(proof, verdict=verdict, condition="C3", reason=reason, at=place(at))
+        verdict, claim, at = failed
+        return replace(proof, verdict=verdict, failed=claim, at=place(at))
     if len(model.inputs) == len(model.states):
         return proof  # as many inputs as states: C2 is void
     found = _largest_rate(model, domain, effort)
@@ -93,12 +86,10 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     )
     if isfinite(below) and Fraction(below) > model.rate:
         return proof
+    slow = MetricContraction(rate=model.rate, largest_rate=Constant(below=below, above=above))
     if isfinite(above) and Fraction(above) < model.rate:
-        reason = f"C2 fails at rate {float(model.rate):g}: {_supported(below, above)}"
-        return replace(proof, verdict="refuted", condition="C2", reason=reason, at=place(found.at))
-    asked = float(model.rate)
-    reason = f"the largest rate lies in [{below:.10g}, {above:.10g}], too close to the rate {asked:g} to tell"
-    return replace(proof, verdict="undecided", condition="C2", reason=reason)
+        return replace(proof, verdict="refuted", failed=slow, at=place(found.at))
+    return replace(proof, verdict="undecided", failed=slow)
 
 
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
@@ -168,8 +159,10 @@ def _restrict(a: Matrix, basis: Matrix) -> Matrix:
     return multiply(transpose(basis), multiply(a, basis))
 
 
-def _killing(model: ControlAffineModel, domain: BoxDomain) -> tuple[str, str, dict[str, float]] | None:
-    """None if C3 is proven exactly, else (verdict, reason, point)."""
+def _killing(
+    model: ControlAffineModel, domain: BoxDomain
+) -> tuple[str, MetricKilling, dict[str, float]] | None:
+    """None if C3 is proven exactly, else (verdict, what fails, point)."""
     for j, name in enumerate(model.inputs):
         defect = model.killing_defect(j)
         entries = [e for row in defect for e in row if e is not ZERO]
@@ -186,23 +179,6 @@ def _killing(model: ControlAffineModel, domain: BoxDomain) -> tuple[str, str, di
             wrong = np.flatnonzero((value.lo > 0) | (value.hi < 0))
             if len(wrong):
                 at = dict(zip(function.variables, points[wrong[0]].tolist(), strict=True))
-                reason = f"C3 (the Killing condition) fails for input {name}: its residual is {value.mid[wrong[0]]:.3g}"
-                return "refuted", reason, at
-        return "undecided", f"C3 (the Killing condition) could not be proven exactly for input {name}", {}
+                return "refuted", MetricKilling(input=name, residual=float(value.mid[wrong[0]])), at
+        return "undecided", MetricKilling(input=name), {}
     return None
-
-
-def _supported(below: float, above: float) -> str:
-    if above <= 0:
-        return "this metric supports no positive rate"
-    return (
-        f"the largest rate that this metric supports is {_floor(below)}"
-        if below > 0
-        else "no rate could be proven"
-    )
-
-
-def _floor(rate: float) -> str:
-    """A rate rounded down to six digits, so that what is named is still supported."""
-    step = 10.0 ** (np.floor(np.log10(abs(rate))) - 5) if rate else 1.0
-    return f"{np.floor(rate / step) * step:.6g}"

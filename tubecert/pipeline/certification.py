@@ -14,21 +14,41 @@ from tubecert.bounds.constants import BoundConstants, Constant, Witness
 from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
-from tubecert.certificate.reasons import UNBOUNDED_RELAX, defect_advice, unbounded_text
 from tubecert.certificate.sections import (
     assumptions,
-    ceiling_text,
     constant_data,
     decimal_data,
     declared_data,
     declared_metric,
     declared_uncertainty,
-    floor_text,
     metric_data,
     pair_data,
     plan_data,
     safe_set_data,
-    witness_data,
+)
+from tubecert.claims import (
+    Claim,
+    ConstantBounded,
+    DeclareMetricBound,
+    DeclareUncertaintyBound,
+    EnlargeSafeSet,
+    LowerRate,
+    MendPlan,
+    MetricBound,
+    MetricContraction,
+    MetricKilling,
+    OtherMetric,
+    PlanBounded,
+    RaiseBudget,
+    RankOfB,
+    Reason,
+    ReduceInitialError,
+    ReduceRadii,
+    Relax,
+    Side,
+    TubeInSafeSet,
+    TubeRadius,
+    UncertaintyBound,
 )
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import NEEDED_BY_ALL, Drift, Formulas, TubeProblem
@@ -41,11 +61,14 @@ from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import TIME, ControlAffineModel, build, rank_decision
 from tubecert.pipeline.gains import gains
 from tubecert.pipeline.options import Options, Progress, Step, overrides_data
+from tubecert.pipeline.reasons import UNBOUNDED_RELAX
 from tubecert.pipeline.synthesised import Synthesised
+from tubecert.records import to_json
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import Room, plan_of, remedy
 from tubecert.tube import Tube
+from tubecert.verdict import Verdict
 
 Result = dict[str, Any]
 _NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
@@ -81,7 +104,7 @@ class Certification:
             "effort": {"gap": decimal_data(options.gap), "budget": options.budget},
             "plan": {"kind": spec.trajectory.kind},
             "safe_set": safe_set_data(spec),
-            "assumptions": assumptions(spec, self.model),
+            "assumptions": to_json(assumptions(spec, self.model)),
             "declared": declared_data(spec),
             "reasons": [],
             "proof": {},
@@ -103,28 +126,20 @@ class Certification:
         if decision.verdict == "proven":
             return True
         x = tuple(decision.at.get(name, 0.0) for name in self.model.states)
-        word = (
-            "loses rank in the safe set"
-            if decision.verdict == "refuted"
-            else "could not be proven of full rank"
-        )
-        return self._stop("rank of B", decision.verdict, f"B {word}", Witness(x=x))
+        return self._stop(RankOfB(), decision.verdict, Witness(x=x))
 
     def _metric(self) -> bool:
         if self.found is not None:
             self.result["synthesis"] = self.found.data()
         if self.spec.metric is None:
             assert self.found is not None
-            return self._stop(
-                "metric synthesis", self.found.verdict, self.found.reason, relax=self.found.relax
-            )
+            assert self.found.reason is not None
+            return self._give_up(self.found.reason)
         proof = verify_metric(self.model, self.spec.safe_set, self._effort("metric"))
         self.result["metric"] = metric_data(self.spec, proof)
-        if proof.verdict != "certified":
+        if proof.failed is not None:
             at = proof.at if proof.verdict == "refuted" else None
-            return self._stop(
-                f"metric, {proof.condition}", proof.verdict, proof.reason, at, self._relax_metric(proof)
-            )
+            return self._stop(proof.failed, proof.verdict, at, self._relax_metric(proof))
         self._lower = proof.lower_on_set
         return self._declared_metric(proof)
 
@@ -148,12 +163,12 @@ class Certification:
         assert self._lower is not None
         return Room(rho=tube.epsilon + tube.rho_a, lower=self._lower.below, effort=self.effort)
 
-    def _relax_metric(self, proof: MetricProof) -> str:
-        if proof.verdict == "undecided" and proof.condition != "C3":
-            return "raise --budget, or lower metric.rate"
-        if proof.largest_rate is None:
-            return "give another dual metric"
-        return f"lower metric.rate to {floor_text(proof.largest_rate.below)}, or give another dual metric"
+    def _relax_metric(self, proof: MetricProof) -> tuple[Relax, ...]:
+        if proof.verdict == "undecided" and not isinstance(proof.failed, MetricKilling):
+            return (RaiseBudget(), LowerRate())
+        if proof.largest_rate is None or not isinstance(proof.failed, MetricContraction):
+            return (OtherMetric(),)
+        return (LowerRate(to=proof.largest_rate.below), OtherMetric())
 
     def _declared_metric(self, proof: MetricProof) -> bool:
         """The bounds a, A that a specification may declare must hold on the safe set."""
@@ -161,25 +176,17 @@ class Certification:
         assert metric is not None
         assert proof.lower_on_set is not None
         assert proof.upper_on_set is not None
-        claim = "declared bounds of the metric"
-        if metric.lower is not None and Fraction(proof.lower_on_set.below) < metric.lower:
-            refuted = Fraction(proof.lower_on_set.above) < metric.lower
-            return self._stop(
-                claim,
-                "refuted" if refuted else "undecided",
-                f"metric.bounds.lower is {float(metric.lower):g}, but lmin(M) reaches {proof.lower_on_set.above:.8g}",
-                proof.lower_on_set.at,
-                f"declare lower: {floor_text(proof.lower_on_set.below)}",
-            )
-        if metric.upper is not None and Fraction(proof.upper_on_set.above) > metric.upper:
-            refuted = Fraction(proof.upper_on_set.below) > metric.upper
-            return self._stop(
-                claim,
-                "refuted" if refuted else "undecided",
-                f"metric.bounds.upper is {float(metric.upper):g}, but lmax(M) reaches {proof.upper_on_set.below:.8g}",
-                proof.upper_on_set.at,
-                f"declare upper: {ceiling_text(proof.upper_on_set.above)}",
-            )
+        least, most = proof.lower_on_set, proof.upper_on_set
+        if metric.lower is not None and Fraction(least.below) < metric.lower:
+            claim = MetricBound(side="lower", declared=metric.lower, reaches=_finite(least.above))
+            relax = DeclareMetricBound(side="lower", value=_finite(least.below))
+            refuted = Fraction(least.above) < metric.lower
+            return self._stop(claim, "refuted" if refuted else "undecided", least.at, (relax,))
+        if metric.upper is not None and Fraction(most.above) > metric.upper:
+            claim = MetricBound(side="upper", declared=metric.upper, reaches=_finite(most.below))
+            relax = DeclareMetricBound(side="upper", value=_finite(most.above))
+            refuted = Fraction(most.below) > metric.upper
+            return self._stop(claim, "refuted" if refuted else "undecided", most.at, (relax,))
         return True
 
     def _suprema(self) -> Suprema:
@@ -201,25 +208,20 @@ class Certification:
         width = tube.epsilon + tube.rho_a
         radius = least_radius(suprema, self.spec.safe_set, self.start.offset(suprema), width, declared)
         contained = radius.contained
-        if radius.obstacle:
-            remedy_text = "reduce the initial error, declare metric.bounds, or raise --budget"
-            self._stop("radius of the tube", "undecided", radius.obstacle, relax=remedy_text)
+        if radius.obstacle is not None:
+            claim = TubeRadius(obstacle=radius.obstacle, radius=radius.rho)
+            relax = (ReduceInitialError(), DeclareMetricBound(), RaiseBudget())
+            self._stop(claim, "undecided", relax=relax)
             return None
         if contained.verdict == "certified":
             return radius
         radii = {"epsilon": tube.epsilon, "rho_a": tube.rho_a, "rho": radius.rho}
         self.result["tube"] = {name: decimal_data(value) for name, value in radii.items()}
-        lies = "leaves" if contained.verdict == "refuted" else "could not be proven to stay in"
-        excess = f", by {contained.excess:.3g}" if contained.excess > 0 else ""
         self._stop(
-            "assumption 1: the tube lies in the safe set",
+            _containment(radius),
             contained.verdict,
-            f"the tube of radius {float(radius.rho):.6g} {lies} the safe set through the {contained.side} bound of "
-            f"{contained.state}, at t = {contained.t:.6g}{excess}"
-            if contained.state
-            else "the curve between the plan's knots could not be bounded: two of its times may nearly coincide",
             Witness(t=contained.t, x=contained.x),
-            "reduce epsilon, rho_a or the initial error, or enlarge the safe set",
+            (ReduceRadii(), EnlargeSafeSet()),
         )
         return None
 
@@ -241,15 +243,9 @@ class Certification:
 
     def _finite(self, constants: BoundConstants) -> bool:
         """Whether what every certificate needs is bounded; what only some of them need is for those to say."""
-        for name, value, meaning in constants.items():
+        for name, value, _ in constants.items():
             if name in NEEDED_BY_ALL and not math.isfinite(value.above):
-                return self._stop(
-                    f"bound of {name}",
-                    "undecided",
-                    unbounded_text(meaning),
-                    value.at,
-                    UNBOUNDED_RELAX,
-                )
+                return self._stop(ConstantBounded(constant=name), "undecided", value.at, UNBOUNDED_RELAX)
         return True
 
     def _declared_holds(self, suprema: Suprema, declared: Mapping[str, Constant]) -> bool:
@@ -259,14 +255,11 @@ class Certification:
         for name, derived in zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True):
             if name in declared and derived.above > declared[name].above:
                 broken = derived.below > declared[name].above
-                return self._stop(
-                    f"declared bound of {name}",
-                    "refuted" if broken else "undecided",
-                    f"uncertainty.bounds.{name} is {declared[name].above:g}, but the expression reaches "
-                    f"{derived.below:.8g} on the tube",
-                    derived.at,
-                    f"declare {name}: {ceiling_text(derived.above)}",
+                claim = UncertaintyBound(
+                    constant=name, declared=declared[name].above, reaches=_finite(derived.below)
                 )
+                relax = DeclareUncertaintyBound(constant=name, value=_finite(derived.above))
+                return self._stop(claim, "refuted" if broken else "undecided", derived.at, (relax,))
         return True
 
     def _problem(self, suprema: Suprema, radius: Radius, constants: BoundConstants) -> TubeProblem:
@@ -327,39 +320,44 @@ class Certification:
             "value": pair_data(test.value.printable()),
             "holds": test.holds,
         }
-        self.result["assumptions"] = assumptions(self.spec, self.model, test)
+        self.result["assumptions"] = to_json(assumptions(self.spec, self.model, test))
 
     def _search(self, problem: TubeProblem) -> None:
         """Gains of A, B and C, and the verdict."""
         found = gains(problem, self.options)
         self.result["constants"] |= found.pop("constants")
-        self.result["reasons"] += found.pop("reasons")
+        reasons = self._advised(problem, found.pop("reasons"))
+        self.result["reasons"] += to_json(reasons)
         self.result |= found
-        self._advise(problem)
 
-    def _advise(self, problem: TubeProblem) -> None:
-        """Where gains are missing and the plan's defect takes a part of the tube that matters, say so."""
-        failed = [reason for reason in self.result["reasons"] if reason["verdict"] != "certified"]
-        constants = problem.constants
+    def _advised(self, problem: TubeProblem, reasons: list[Reason]) -> list[Reason]:
+        """Where gains are missing and the plan's defect takes a part of the tube that matters, that is said too."""
+        certified = all(reason.verdict is Verdict.CERTIFIED for reason in reasons)
+        constants, defect = problem.constants, problem.constants.plan_defect
         reach = float(problem.rate) * math.sqrt(constants.lower.below) * float(problem.rho)
         share = constants.plan_defect_metric.above / reach
-        if not failed or share < _NOTABLE:
-            return
-        advice = defect_advice(constants.plan_defect, share, remedy(self.plan, self.model, self._room()))
-        for reason in failed:
-            reason["relax"] = "; ".join(filter(None, (reason.get("relax"), advice)))
+        if certified or share < _NOTABLE:
+            return reasons
+        mend = MendPlan(
+            defect=defect.above,
+            t=None if defect.at is None else defect.at.t,
+            share=share,
+            remedy=remedy(self.plan, self.model, self._room()),
+        )
+        return [
+            reason if reason.verdict is Verdict.CERTIFIED else replace(reason, relax=(*reason.relax, mend))
+            for reason in reasons
+        ]
 
     def _stop(
-        self, claim: str, verdict: str, message: str, at: Witness | None = None, relax: str = ""
+        self, claim: Claim, verdict: str, at: Witness | None = None, relax: tuple[Relax, ...] = ()
     ) -> bool:
         """Record a claim that is not proven, as the verdict."""
-        reason: Result = {"claim": claim, "verdict": verdict, "message": message}
-        if at is not None:
-            reason["at"] = witness_data(at)
-        if relax:
-            reason["relax"] = relax
-        self.result["reasons"].append(reason)
-        self.result["verdict"] = verdict
+        return self._give_up(Reason(claim=claim, verdict=Verdict(verdict), at=at, relax=relax))
+
+    def _give_up(self, reason: Reason) -> bool:
+        self.result["reasons"].append(to_json(reason))
+        self.result["verdict"] = str(reason.verdict)
         return False
 
     def _effort(self, name: str) -> Effort:
@@ -370,3 +368,16 @@ class Certification:
             self.effort,
             progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
         )
+
+
+def _containment(radius: Radius) -> Claim:
+    """What is claimed of a tube that is not proven to lie in the safe set."""
+    contained = radius.contained
+    if not contained.state:
+        return PlanBounded()
+    side: Side = "upper" if contained.side == "upper" else "lower"
+    return TubeInSafeSet(radius=radius.rho, state=contained.state, side=side, excess=contained.excess)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

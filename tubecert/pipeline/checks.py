@@ -34,26 +34,28 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
 
 def missing_parts(spec: Spec) -> list[Finding]:
     """What a certification needs and a specification may lack."""
-    missing = []
-    if spec.metric is None and spec.synthesis is None:
-        remedy = (
-            "give metric.dual_metric and metric.rate, or metric.synthesise, or certify with --metric FILE"
-        )
-        missing.append(("metric", remedy))
+    remedy = "give metric.dual_metric and metric.rate, or metric.synthesise, or certify with --metric FILE"
+    has_none = spec.metric is None and spec.synthesis is None
+    return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]
+
+
+def missing_radii(spec: Spec) -> list[Finding]:
+    """The radii of the tube, if they are not given."""
+    found = []
     if spec.tube.epsilon is None:
-        missing.append(("tube.epsilon", "give tube.epsilon, or --epsilon E"))
+        found.append(_missing(spec, "tube.epsilon", "give tube.epsilon, or --epsilon E"))
     if spec.tube.rho_a is None:
-        missing.append(("tube.rho_a", "give tube.rho_a, or --rho-a R"))
-    top = Location(file=spec.path, line=1, column=1)
-    return [
-        Finding(
-            code="TC105",
-            message=f"{key} is needed to certify",
-            location=spec.location(key) or top,
-            help=remedy,
-        )
-        for key, remedy in missing
-    ]
+        found.append(_missing(spec, "tube.rho_a", "give tube.rho_a, or --rho-a R"))
+    return found
+
+
+def _missing(spec: Spec, key: str, remedy: str) -> Finding:
+    return Finding(
+        code="TC105",
+        message=f"{key} is needed to certify",
+        location=spec.location(key) or Location(file=spec.path, line=1, column=1),
+        help=remedy,
+    )
 
 
 def time_of(spec: Spec) -> tuple[list[Finding], Range | None]:

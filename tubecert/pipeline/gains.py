@@ -6,11 +6,11 @@ from fractions import Fraction
 from typing import Any
 
 from tubecert.bounds.constants import DERIVED
-from tubecert.certificate.reasons import reasons_26, reasons_distance, reasons_sampled
 from tubecert.certificate.sections import constant_data
 from tubecert.conditions.problem import Formulas, TubeProblem
 from tubecert.conditions.rates import derived_constants
 from tubecert.pipeline.options import CONDITIONS, Options
+from tubecert.pipeline.reasons import reasons_26, reasons_distance, reasons_sampled
 from tubecert.search.distance import search_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.margins import margins_26_around, margins_distance_around

@@ -16,21 +16,44 @@ from math import sqrt
 from typing import Any
 
 from tubecert.certificate.sections import decimal_data, metric_data, safe_set_data
+from tubecert.claims import (
+    AskForRateBelow,
+    AskForRateUpTo,
+    ConditionNumber,
+    Failure,
+    GiveInput,
+    HigherDegree,
+    LowerDegree,
+    LowerRate,
+    MetricFound,
+    NothingFound,
+    NotProvenAsWritten,
+    NotWritable,
+    OtherVariables,
+    RaiseBudget,
+    RaiseConditionNumber,
+    RankUnproven,
+    Reason,
+    Relax,
+    ShrinkSafeSet,
+)
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
 from tubecert.metric.verify import MetricProof, verify_metric
-from tubecert.model import build, place, rank_decision
+from tubecert.model import build, rank_decision
 from tubecert.pipeline.options import Options, Progress, Step
 from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
-from tubecert.synthesis.family import suggested
+from tubecert.synthesis.family import FamilyError, suggested
 from tubecert.synthesis.ladder import Ladder, Request, digits_below
 from tubecert.synthesis.problem import Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.synthesis.routes import routes
+from tubecert.verdict import Verdict
 
 _RATES = 6  # of the first sweep
 _REFINED = 3  # times, about the best row
@@ -73,19 +96,19 @@ class SynthesisRun:
         """The metric that was asked for, or why there is none."""
         rank = rank_decision(self.model, self.spec.safe_set, self.effort)
         if rank.verdict != "proven":
-            reason = "B could not be proven to have full rank on the safe set"
-            if rank.verdict == "refuted":
-                reason = f"B loses rank in the safe set at {place(rank.at)}"
-            return self._failed(reason, "shrink the safe set", verdict=rank.verdict)
+            verdict = "refuted" if rank.verdict == "refuted" else "undecided"
+            at = Witness(x=tuple(rank.at.get(name, 0.0) for name in self.model.states)) if rank.at else None
+            return self._failed(RankUnproven(), ShrinkSafeSet(), verdict=verdict, at=at)
         rate = self.wanted.rate
         if rate is not None and (mode := self._limiting_mode(rate)) is not None:
-            lower = f"ask for a rate below {mode.bound:.6g}" if mode.bound > 0 else "give it an input"
+            lower = AskForRateBelow(rate=mode.limit) if mode.bound > 0 else GiveInput()
             verdict = "refuted" if mode.excludes(rate) else "undecided"
-            return self._failed(mode.words(self.spec.states), lower, verdict=verdict)
+            at = Witness(x=tuple(map(float, mode.at)))
+            return self._failed(mode.failure(), lower, verdict=verdict, at=at)
         try:
             best = self._best()
-        except ValueError as error:  # what C3 forbids
-            return self._failed(str(error), "choose other variables, or leave them to tubecert")
+        except FamilyError as error:  # what C3 forbids
+            return self._failed(error.failure, OtherVariables())
         if best is None:
             return self._explained()
         if sweep and not self.rows:
@@ -143,9 +166,9 @@ class SynthesisRun:
 
     def _certifiable(self) -> None:
         """Raises `SpecError` if the end cannot be judged: what `certify` needs is missing."""
-        from tubecert.pipeline.checks import missing_parts
+        from tubecert.pipeline.checks import missing_radii
 
-        missing = [item for item in missing_parts(self.spec) if not item.message.startswith("metric ")]
+        missing = missing_radii(self.spec)
         if missing:
             raise SpecError(missing)
 
@@ -213,17 +236,13 @@ class SynthesisRun:
         try:
             spec = self._with(metric)
         except SpecError as error:
-            return self._failed(
-                f"the metric cannot be written: {error.findings[0].message}", "ask for a lower degree"
-            )
+            return self._failed(NotWritable(code=error.findings[0].code), LowerDegree())
         model = build(spec)
         # expressions are equal if they are the same nodes: then they are the functions of the proof
         same = (metric.rate, metric.dual_metric) == (model.rate, model.W)
         proof = metric.proof if same else verify_metric(model, spec.safe_set, self.effort)
-        if proof.verdict != "certified":
-            return self._failed(
-                f"the metric as written could not be proven: {proof.reason}", "raise --budget"
-            )
+        if proof.failed is not None:
+            return self._failed(NotProvenAsWritten(condition=proof.failed), RaiseBudget())
         return Synthesised(
             verdict="certified",
             wanted=self.wanted,
@@ -233,12 +252,14 @@ class SynthesisRun:
             attempts=tuple(self.ladder.attempts),
         )
 
-    def _failed(self, reason: str, relax: str, verdict: str = "undecided") -> Synthesised:
+    def _failed(
+        self, failure: Failure, *relax: Relax, verdict: str = "undecided", at: Witness | None = None
+    ) -> Synthesised:
+        claim = MetricFound(failure=failure)
         return Synthesised(
             verdict=verdict,
             wanted=self.wanted,
-            reason=reason,
-            relax=relax,
+            reason=Reason(claim=claim, verdict=Verdict(verdict), at=at, relax=relax),
             rows=tuple(self.rows),
             attempts=tuple(self.ladder.attempts),
         )
@@ -251,42 +272,41 @@ class SynthesisRun:
             if found is not None and not self._allowed(found):
                 number = found.condition_number.above
                 return self._failed(
-                    f"the least condition number found at rate {float(rate):g} is {number:.5g}, above the limit",
-                    f"raise condition_number to {number:.4g}, or lower the rate",
+                    ConditionNumber(rate=rate, condition_number=number),
+                    RaiseConditionNumber(to=number),
+                    LowerRate(),
                 )
-        return self._failed(f"no metric was found{self._tried()}", self._remedies(rate))
+        return self._failed(self._tried(), *self._remedies(rate))
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""
         return uncontrollable_mode(self.model, self._equilibria(), rate)
 
-    def _tried(self) -> str:
+    def _tried(self) -> NothingFound:
         attempts = self.ladder.attempts
-        if not attempts:
-            return ""
-        degrees = sorted({a.degree for a in attempts})
-        names = sorted({a.route for a in attempts})
-        tried = f"{len(attempts)} attempts by {' and '.join(names)}, degree {', '.join(map(str, degrees))}"
-        return f": {tried}; the last: {attempts[-1].outcome}"
+        return NothingFound(
+            attempts=len(attempts),
+            routes=tuple(sorted({a.route for a in attempts})),
+            degrees=tuple(sorted({a.degree for a in attempts})),
+            last=attempts[-1].outcome if attempts else None,
+        )
 
-    def _remedies(self, rate: Fraction | None) -> str:
+    def _remedies(self, rate: Fraction | None) -> list[Relax]:
         if any(attempt.undecided for attempt in self.ladder.attempts):
-            return "raise --budget: a proof ran out of boxes"
-        remedies = []
+            return [RaiseBudget(proof=True)]
+        remedies: list[Relax] = []
         if self.wanted.degree is not None and suggested(self.model):
-            remedies.append(f"a degree above {self.wanted.degree}, or auto")
+            remedies.append(HigherDegree(degree=self.wanted.degree))
         if rate is not None:
             self._tell("looking for a rate that works")
             lower = self.ladder.lower_rate(rate)
             if lower is not None:
-                remedies.append(f"a rate up to {float(lower):g}, which works on this box")
+                remedies.append(AskForRateUpTo(rate=lower))
             self._tell("looking for a box that works")
             box = self.ladder.smaller_box(rate)
             if box is not None:
-                remedies.append(
-                    f"the safe set shrunk to {float(box):.3g} of its size about its centre, where {float(rate):g} works"
-                )
-        return "try " + "; or ".join(remedies) if remedies else "lower the rate, or shrink the safe set"
+                remedies.append(ShrinkSafeSet(factor=float(box), rate=rate))
+        return remedies or [LowerRate(), ShrinkSafeSet()]
 
     def _equilibria(self) -> list[tuple[Fraction, ...]]:
         """Rational points that may be equilibria: the plan's, its target, the centre of the box, the origin."""

@@ -12,8 +12,10 @@ from math import inf, isfinite
 from typing import Any
 
 from tubecert.certificate.sections import decimal_data, pair_data
+from tubecert.claims import Reason
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
+from tubecert.records import to_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT
 from tubecert.synthesis.ladder import Attempt
@@ -81,8 +83,7 @@ class Synthesised:
     wanted: Synthesis
     spec: Spec | None = None
     file: dict[str, Any] | None = None
-    reason: str = ""
-    relax: str = ""
+    reason: Reason | None = None
     rows: tuple[Row, ...] = ()
     attempts: tuple[Attempt, ...] = ()
 
@@ -98,7 +99,7 @@ class Synthesised:
                     "degree": a.degree,
                     "floor": a.floor,
                     "route": a.route,
-                    "outcome": a.outcome,
+                    "outcome": to_json(a.outcome),
                     **({} if a.condition_number is None else {"condition_number": a.condition_number}),
                 }
                 for a in self.attempts
@@ -110,8 +111,8 @@ class Synthesised:
             data["table"] = [row.data() for row in self.rows]
         if self.file is not None:
             data["solver"] = self.file["solver"]
-        if self.reason:
-            data |= {"reason": self.reason, "relax": self.relax}
+        if self.reason is not None:
+            data["reason"] = to_json(self.reason)
         return data
 
 

@@ -1,12 +1,11 @@
 """What the parts of a certificate say about one another, compared exactly: no arithmetic beyond equality.
 
-The statements of assumptions are part of the claim: they must be those of this format, word for word.
+What is assumed is part of the claim: the list must be that of this format, each with its parameters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 from typing import Any
 
@@ -126,64 +125,72 @@ def _verdict(result: Node) -> Iterator[tuple[bool, str]]:
         yield not section["shortfalls"].entries(), f"{_CLAIMS_ONLY} {name} lists shortfalls"
     for reason in result["reasons"].entries():
         yield reason["verdict"].text() == "certified", f"{_CLAIMS_ONLY} a reason says otherwise"
-        claim = reason["claim"].text()
-        yield claim in deciding, f"a reason names {claim!r}, which does not decide"
+        yield reason["claim"].text() == "gains_suffice", f"{_CLAIMS_ONLY} a reason is not that gains suffice"
+        named = reason["section"].text()
+        yield named in deciding, f"a reason names {named!r}, which does not decide"
+        own = {key: value.number() for key, value in reason["margins"].items()}
+        same = own == _margins(named, result[named])
+        yield same, f"a reason repeats the margins of {named} otherwise"
+
+
+def _margins(name: str, section: Node) -> dict[str, Fraction]:
+    """The proven side of every margin of a section, at the gains that decide."""
+    if name == "conditions_26":
+        return {key: pair.pair()[0].number() for key, pair in section["margins"].items()}
+    if name == "distance":
+        decisive = section.get("asked") or section.get("least_adaptation") or section["split"]
+        return {name: decisive["margin"].pair()[0].number()}
+    return {name: section["margin"].pair()[0].number()}
 
 
 def assumptions(result: Node, s: System) -> Outcome:
-    """The list of what is assumed is complete, in the words of the format."""
-    shown = result["assumptions"].texts()
-    geodesics = result["metric"].get("unique_geodesics")
-    for wanted in _assumed(s, geodesics):
-        if wanted not in shown:
-            return stated(False, f"the list lacks: {wanted}")
-    return stated(len(shown) == 8, "the list has other entries than this format knows")
+    """The list of what is assumed is that of this format, each with the parameters of the specification."""
+    shown = result["assumptions"].entries()
+    wanted = _assumed(s, result["metric"].get("unique_geodesics"))
+    for own, (name, parameters) in zip(shown, wanted, strict=False):
+        members = {key: node for key, node in own.items() if key != "id"}
+        same = own["id"].text() == name and members.keys() == parameters.keys()
+        if not (same and all(_says(node, parameters[key]) for key, node in members.items())):
+            return stated(False, f"{own.path} is not {name} as the specification has it")
+    return stated(len(shown) == len(wanted), "the list has fewer or more entries than this format knows")
 
 
-def _assumed(s: System, geodesics: Node | None) -> list[str]:
-    covers = "h" in s.declared
+Parameters = dict[str, "str | bool | Fraction | list[Fraction | None]"]
+
+
+def _assumed(s: System, geodesics: Node | None) -> list[tuple[str, Parameters]]:
     return [
-        "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
-        "controller acts in continuous time and exactly (certificate C: with sampled adaptation), evaluates "
-        "f(x*) + B(x*) u* itself and never the derivative of a stored plan",
+        ("least_feedback", {}),
         _geodesics(s, geodesics),
-        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
-        "the projection is hard"
-        if s.smooth is None
-        else f"the projection is smooth with layer {float(s.smooth):g}",
-        "the full state is measured without noise or delay, and inputs do not saturate",
-        "the filter is first order, C(s) = omega/(s + omega)",
-        "the claim is for all t >= 0"
-        if s.horizon is None
-        else f"the claim is for 0 <= t <= {float(s.horizon):g} s",
-        "the uncertainty obeys its declared bounds on the tube"
+        ("start_at_rest", {}),
+        ("hard_projection", {}) if s.smooth is None else ("smooth_projection", {"layer": s.smooth}),
+        ("perfect_state", {}),
+        ("first_order_filter", {}),
+        ("for_all_time", {}) if s.horizon is None else ("up_to_horizon", {"horizon": s.horizon}),
+        ("uncertainty_as_declared", {})
         if s.h is None
-        else "the uncertainty is the expression of the specification"
-        + (", or any other within the bounds h, h_x, h_t of this certificate" if covers else ""),
+        else ("uncertainty_as_given", {"any_within_bounds": "h" in s.declared}),
     ]
 
 
-def _geodesics(s: System, test: Node | None) -> str:
+def _geodesics(s: System, test: Node | None) -> tuple[str, Parameters]:
     if s.flat:
-        return "minimising geodesics are straight lines, which the constant metric makes unique"
-    exact = "the controller finds the minimising geodesic exactly"
+        return "straight_geodesics", {}
     if test is None:
-        return f"{exact}, and it is unique in the tube (not proven here)"
-    below, above = test["value"].pair()
-    if test["holds"].flag():
-        most = _six_digits(above.number(), ROUND_CEILING)
-        return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {most}"
-    reaches = below.number()
-    size = (
-        "could not be bounded by less than 1"
-        if reaches < 1
-        else f"reaches {_six_digits(reaches, ROUND_FLOOR)}"
-    )
-    return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"
+        return "exact_geodesics", {"uniqueness": "assumed"}
+    value = [None if end.value is None else end.number() for end in test["value"].pair()]
+    uniqueness = "proven" if test["holds"].flag() else "assumed"
+    return "exact_geodesics", {"uniqueness": uniqueness, "value": value}
 
 
-def _six_digits(value: Fraction, rounding: str) -> str:
-    return f"{float(Context(prec=6, rounding=rounding).divide(value.numerator, value.denominator)):.6g}"
+def _says(node: Node, wanted: object) -> bool:
+    if isinstance(wanted, bool):
+        return node.flag() is wanted
+    if isinstance(wanted, str):
+        return node.text() == wanted
+    if isinstance(wanted, list):
+        return [None if end.value is None else end.number() for end in node.pair()] == wanted
+    return node.number() == wanted
 
 
 def _first(statements: Iterator[tuple[bool, str]]) -> Outcome:

@@ -17,7 +17,7 @@ from tubecert.errors import TubecertError
 from tubecert.expression import ExpressionError, parse_number
 from tubecert.findings import Finding, Location
 
-FORMAT = "tubecert-certificate/1"
+FORMAT = "tubecert-certificate/2"
 MOST_BYTES = 64_000_000
 _VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
 _DEEPEST = 60
@@ -138,7 +138,7 @@ def read(text: str, file: str) -> Node:
             "TC601", f"{file} is not a certificate of tubecert", "give a file that `tubecert certify` wrote"
         )
     if known != FORMAT:
-        newer = int(match[1][:9]) > 1
+        newer = int(match[1][:9]) > int(FORMAT.rpartition("/")[2])
         remedy = "use a newer tubecert" if newer else "certify again"
         raise wrong("TC602", f"{file} has the format {known}; this version reads {FORMAT}", remedy)
     return Node(data, "certificate")

@@ -21,8 +21,7 @@ from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
-_SYNTHESIS = "metric synthesis"
-_DECLARED = "declared bounds of the metric"
+_AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")
 
 
 def of_others(case: Case) -> Iterator[Claim]:
@@ -43,18 +42,18 @@ def of_others(case: Case) -> Iterator[Claim]:
 
 
 def _refutation(case: Case, name: str, reason: Node) -> Outcome:
-    if name == _SYNTHESIS:
+    if name == "metric_found":
         return uncontrollable.excludes(case.effective)
     s, at = case.system, reason.get("at")
-    if (name.startswith("metric, ") or name == _DECLARED) and at is not None:
+    if name in _AT_A_POINT and at is not None:
         point = [exact(value) for value in at["x"].numbers()]
         if len(point) != len(s.states) or not _inside(case, point):
             return metric.stated(False, "the witness does not lie in the safe set")
-        if name == _DECLARED:
+        if name == "metric_bound":
             return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
-        if name == "metric, C1":
+        if name == "metric_definite":
             return _if(is_indefinite(_value(case, s.W, point)))
-        if name == "metric, C2":
+        if name == "metric_contraction":
             basis = metric.null_space(s, metric.on_set(s), case.budget)
             if isinstance(basis, Outcome):
                 return basis
@@ -62,10 +61,9 @@ def _refutation(case: Case, name: str, reason: Node) -> Outcome:
                 is_indefinite(_value(case, scaled(-1, times(turned(basis), times(s.F, basis))), point))
             )
         return _if(metric.killing(s).verdict == "contradicted")
-    if name.startswith("assumption 1") and at is not None:
+    if name == "tube_in_safe_set" and at is not None:
         return _leaves(case, at)
-    section = name.partition(":")[0]
-    if section in SECTIONS:
+    if name == "condition_holds" and (section := reason["section"].text()) in SECTIONS:
         return _gains_fail(case, case.result[section])
     return Outcome(verdict="undecided", why="refutations of this kind are not examined")
 

@@ -11,6 +11,8 @@ from tubecert.report import sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled
 from tubecert.report.numbers import up
+from tubecert.report.reasons import reason_of
+from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -65,7 +67,7 @@ def _because(result: Mapping[str, Any]) -> str:
     """The reason that decided: the first with the verdict's own word."""
     reasons = [item for item in result["reasons"] if item.get("verdict") == result["verdict"]]
     reason = (reasons or result["reasons"])[0]
-    return f"{sections.claim(reason)}: {sections.message(reason)}"
+    return sentence(reason_of(reason))
 
 
 def meaning(result: Mapping[str, Any]) -> Text:

@@ -13,7 +13,9 @@ from typing import Any
 
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
 from tubecert.report.page import Figure
-from tubecert.report.sections import claim, horizon, point
+from tubecert.report.reasons import reason_of
+from tubecert.report.sections import horizon, point
+from tubecert.words.claims import title as title_of
 
 _NEAR = 0.25  # places closer than this part of rho share a number
 _ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
@@ -108,7 +110,7 @@ def _over_time(result: Mapping[str, Any]) -> list[Figure]:
 def _tube(result: Mapping[str, Any], plane: Plane) -> Figure:
     title = f"{plane.names[0]}, {plane.names[1]}"
     witnesses = [
-        (plane.of(at["x"]), f"{claim(reason)}: {point(result, at)}")
+        (plane.of(at["x"]), f"{title_of(reason_of(reason).claim)}: {point(result, at)}")
         for reason in result["reasons"]
         if (at := reason.get("at")) and len(at.get("x", ())) > max(plane.index)
     ]

@@ -8,12 +8,9 @@ from math import inf
 from typing import Any
 
 from tubecert.report.numbers import Number, exact, percent
+from tubecert.words.conditions import SECTIONS
 
-NAMES = {
-    "conditions_26": "A (26)",
-    "distance": "B distance",
-    "sampled": "C sampled",
-}
+NAMES = SECTIONS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

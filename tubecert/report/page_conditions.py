@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tubecert.certificate.reasons import EXPLAINED
 from tubecert.report.gains import NAMES, rows
 from tubecert.report.numbers import UNKNOWN, down, up
 from tubecert.report.page import Block, Cell, Table, Words
+from tubecert.words.conditions import SAYS, condition_name, equation
 
 _MARGIN = (
     "A margin is (allowed - needed)/allowed: positive means that the condition holds. Its lower side is proven; the "
@@ -29,7 +29,7 @@ def conditions(result: Mapping[str, Any]) -> Iterator[Block]:
         for item in result.get(section, {}).get("shortfalls", ()):
             if item.get("needed") is not None and item.get("allowed") is not None:
                 told = f"{up(item['needed'])} is needed, {down(item['allowed'])} is allowed"
-                yield Words(text=f"{title}, {item['claim']}: {told}.")
+                yield Words(text=f"{title}, {condition_name(item['condition'])}: {told}.")
 
 
 def _rows(result: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
@@ -59,11 +59,11 @@ def _only(section: str) -> str:
 
 def _row(title: str, name: str, margin: Sequence[float | None] | None) -> tuple[Cell, ...]:
     low, high = margin or (None, None)
-    said = EXPLAINED.get(name, EXPLAINED["sampled" if name.endswith("sampled") else "distance"])
+    said = SAYS.get(name, SAYS["sampled" if name.endswith("sampled") else "distance"])
     return (
         Cell(text=title),
-        Cell(text=f"({name})" if name.startswith("26") else name),
-        Cell(text=said.removeprefix(f"({name}): ")),
+        Cell(text=equation(name)),
+        Cell(text=said),
         Cell(
             text=_percent(low, down),
             kind="number",

@@ -32,6 +32,9 @@ from tubecert.report.page import (
 from tubecert.report.page_conditions import conditions
 from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_trust import declared, proven
+from tubecert.report.reasons import assumption_of, reason_of
+from tubecert.words.advice import advice
+from tubecert.words.claims import message, title
 
 _TUBE = (
     "The tube projected on each plane: the state is within rho of the plan in the Euclidean norm, and each coordinate "
@@ -93,12 +96,12 @@ def _reasons(result: Mapping[str, Any], *, certified: bool) -> tuple[Block, ...]
     return tuple(
         Reason(
             verdict=reason.get("verdict", "undecided"),
-            claim=sections.claim(reason),
-            message=sections.message(reason),
+            claim=title(told.claim),
+            message=message(told),
             at=sections.point(result, reason["at"]) if reason.get("at") else "",
-            relax=reason.get("relax", ""),
+            relax=advice(told.relax),
         )
-        for reason in result["reasons"]
+        for reason, told in ((reason, reason_of(reason)) for reason in result["reasons"])
         if (reason.get("verdict") == "certified") is certified
     )
 
@@ -172,7 +175,7 @@ def _radii(result: Mapping[str, Any]) -> Iterator[tuple[str, Cell]]:
 def _rests_on(result: Mapping[str, Any]) -> Iterator[Block]:
     yield Items(title="Proven", items=tuple(proven(result)) or ("nothing that could be relied on",))
     yield Items(title="Declared, believed as given", items=tuple(declared(result)) or ("nothing",))
-    yield Items(title="Assumed, not proven", items=tuple(result["assumptions"]))
+    yield Items(title="Assumed, not proven", items=tuple(map(assumption_of, result["assumptions"])))
 
 
 def _metric(metric: Mapping[str, Any]) -> Iterator[Block]:
@@ -223,8 +226,8 @@ def _constant(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) -> 
     at = sections.point(result, item["at"]) if item.get("at") else ""
     return (
         Cell(text=item["symbol"], kind="code"),
-        Cell(text=item.get("meaning") or name.replace("_", " "), note=f"at {at}" if at else ""),
-        Cell(text=sections.proven(item), kind="number"),
+        Cell(text=sections.described(name), note=f"at {at}" if at else ""),
+        Cell(text=sections.proven(name, item), kind="number"),
         Cell(text=item["unit"] if item["unit"] != "1" else UNKNOWN),
         Cell(text=item["equation"]),
         Cell(text=sections.gap(item), kind="number"),

@@ -10,14 +10,19 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.report.gains import NAMES, rows
 from tubecert.report.layout import plain_table
 from tubecert.report.numbers import UNKNOWN, Number, down, exact, short, up
+from tubecert.report.reasons import assumption_of, reason_of
+from tubecert.words.advice import advice
+from tubecert.words.claims import message, title
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Section = tuple[str, list["RenderableType"]]
+MEANINGS = {**TABLE, **DERIVED}
 VERDICTS = {"certified": "green", "refuted": "red", "undecided": "yellow"}
 
 
@@ -57,29 +62,16 @@ def horizon(result: Mapping[str, Any]) -> Number | None:
 
 def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Group:
     verdict = reason.get("verdict", "undecided")
-    text = Text.assemble((f"{verdict} ", VERDICTS[verdict]), (claim(reason), "bold"), f": {message(reason)}")
+    told = reason_of(reason)
+    text = Text.assemble(
+        (f"{verdict} ", VERDICTS[verdict]), (title(told.claim), "bold"), f": {message(told)}"
+    )
     more = []
     if at := reason.get("at"):
         more.append(Text(f"at {point(result, at)}"))
-    if relax := reason.get("relax"):
+    if relax := advice(told.relax):
         more.append(Text.assemble(("help: ", "green"), relax))
     return Group(text, *(Padding(line, (0, 0, 0, 2)) for line in more))
-
-
-def claim(reason: Mapping[str, Any]) -> str:
-    """What a reason is about, in the words of the table of gains."""
-    section, _, rest = reason["claim"].partition(": ")
-    if section not in NAMES:
-        return str(reason["claim"])
-    if section == "conditions_26" and rest.startswith("26"):
-        return f"A ({rest})"
-    return f"{NAMES[section]}, {rest}" if rest not in ("", section) else NAMES[section]
-
-
-def message(reason: Mapping[str, Any]) -> str:
-    """The message on one line, without the condition's tag where the claim names it already."""
-    tag = reason["claim"].partition(": ")[2]
-    return " ".join(str(reason["message"]).removeprefix(f"({tag}): ").split())
 
 
 def point(result: Mapping[str, Any], at: Mapping[str, Any]) -> str:
@@ -178,20 +170,29 @@ def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[Rend
 def _constants(result: Mapping[str, Any]) -> Table:
     table = plain_table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
     for name, item in result["constants"].items():
-        table.add_row(item["symbol"], _described(result, name, item), proven(item), item["unit"], gap(item))
+        table.add_row(
+            item["symbol"], _described(result, name, item), proven(name, item), item["unit"], gap(item)
+        )
     return table
 
 
 def _described(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) -> Text:
-    text = Text(item.get("meaning") or name.replace("_", " "))
+    text = Text(described(name))
     if item.get("at") and (where := point(result, item["at"])):
         text.append(f"\nat {where}", style="dim")
     return text
 
 
-def proven(item: Mapping[str, Any]) -> str:
+def described(name: str) -> str:
+    """A constant in words, whatever its name."""
+    meaning = MEANINGS.get(name)
+    return name.replace("_", " ") if meaning is None else meaning.words
+
+
+def proven(name: str, item: Mapping[str, Any]) -> str:
     """The side that the certificate uses: from below for an infimum, from above for a supremum."""
-    if item.get("meaning", "").startswith(("inf", "smallest")):
+    meaning = MEANINGS.get(name)
+    if meaning is not None and meaning.side == "below":
         return f">= {down(item['below'], 6)}"
     return f"<= {up(item['above'], 6)}"
 
@@ -215,7 +216,7 @@ def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableTyp
     ]
     if verbose:
         table = Table.grid(padding=(0, 1, 0, 0))
-        for item in [*stated, *(believed if declared else [])]:
+        for item in [*map(assumption_of, stated), *(believed if declared else [])]:
             table.add_row("-", Text(item))
         return [table]
     proven = result.get("metric", {}).get("unique_geodesics", {}).get("holds", False)

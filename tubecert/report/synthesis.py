@@ -9,10 +9,15 @@ from rich.text import Text
 
 from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.report.reasons import outcome_of, place, reason_of
 from tubecert.report.sections import VERDICTS
+from tubecert.words.advice import advice
+from tubecert.words.claims import message, outcome
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
@@ -22,7 +27,7 @@ def verdict_line(data: Mapping[str, Any], file: Mapping[str, Any] | None, name: 
     """What came of it, on one line."""
     if file is None:
         line = Text.assemble((data["verdict"], f"bold {VERDICTS[data['verdict']]}"), (f" {name}: ", "bold"))
-        line.append(data["reason"])
+        line.append(message(reason_of(data["reason"])))
         return line
     line = Text.assemble(("metric proven", "bold green"), (f" {name}: ", "bold"))
     line.append(f"rate {exact(file['rate'])} 1/s, condition number {up(file['condition_number'][1])}")
@@ -32,24 +37,28 @@ def verdict_line(data: Mapping[str, Any], file: Mapping[str, Any] | None, name: 
 
 
 def report(
-    data: Mapping[str, Any], file: Mapping[str, Any] | None, name: str, target: str
+    data: Mapping[str, Any], file: Mapping[str, Any] | None, system: Spec, target: str
 ) -> list[RenderableType]:
     """The whole report as renderables; `target` is the metric file."""
+    name = system.name
     parts: list[RenderableType] = [verdict_line(data, file, name)]
     if file is not None:
         parts += map(indented, _proven(file))
     if rows := data.get("table"):
         parts += titled("Metrics compared", [_compared(rows)])
     if file is None:
-        return [*parts, *_failure(data)]
+        return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify SPEC --metric {target}"
     return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
 
 
-def _failure(data: Mapping[str, Any]) -> list[RenderableType]:
+def _failure(data: Mapping[str, Any], states: Sequence[str]) -> list[RenderableType]:
     """What would help, and what was tried."""
     parts: list[RenderableType] = []
-    if relax := data.get("relax"):
+    reason = reason_of(data["reason"])
+    if reason.at is not None:
+        parts.append(indented(Text(f"at {place(states, reason.at)}")))
+    if relax := advice(reason.relax):
         parts.append(indented(Text.assemble(("help: ", "green"), relax)))
     if attempts := data["attempts"]:
         parts += titled("Tried", _tried(attempts))
@@ -91,7 +100,8 @@ def _compared(rows: Sequence[Mapping[str, Any]]) -> RenderableType:
 
 def _tried(attempts: Sequence[Mapping[str, Any]]) -> list[Text]:
     lines = [
-        Text(f"rate {short(a['rate'], 6)}, degree {a['degree']}: {a['outcome']}") for a in attempts[-_SHOWN:]
+        Text(f"rate {short(a['rate'], 6)}, degree {a['degree']}: {outcome(outcome_of(a['outcome']))}")
+        for a in attempts[-_SHOWN:]
     ]
     left = len(attempts) - len(lines)
     return [*([Text(f"({left} attempts before these)", style="dim")] if left else []), *lines]

@@ -16,8 +16,8 @@ def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     safe, whole = problem.proven(), problem.enclosed()
     allowed = theorem_b.reach(safe), theorem_b.reach(whole)
     items = (
-        _obstacle("dbar <= d0", allowed, (safe.d0, whole.d0)),
-        _obstacle("dbar <= delta/lambda", allowed, (_residual(safe), _residual(whole))),
+        _obstacle("initial_distance", allowed, (safe.d0, whole.d0)),
+        _obstacle("plan_defect", allowed, (_residual(safe), _residual(whole))),
     )
     return tuple(item for item in items if item is not None)
 

@@ -265,6 +265,6 @@ def _finished(problem: TubeProblem, result: Conditions26) -> Conditions26:
             below_twice_rate=recipe.bandwidth < 2 * problem.rate,
         )
     if problem.as_printed:
-        proviso = Shortfall(claim="as-printed", margin=UNKNOWN)
+        proviso = Shortfall(claim="corrected_formulas", margin=UNKNOWN)
         result = replace(result, verdict=Verdict.UNDECIDED, shortfalls=(proviso, *result.shortfalls))
     return result

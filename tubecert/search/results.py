@@ -29,7 +29,8 @@ def margin_json(margin: Interval) -> list[float | None]:
 def shortfall_json(item: Shortfall) -> Json:
     """One reason as data."""
     return {
-        "claim": item.claim,
+        "condition": item.claim,
+        **({} if item.constant is None else {"constant": item.constant}),
         "margin": margin_json(item.margin),
         "allowed": item.allowed,
         "needed": item.needed,

@@ -12,12 +12,16 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Final, cast
 
+from tubecert.claims import Reason
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
+from tubecert.records import from_json
 from tubecert.spec import Interpolation, Knots, Spec, Tube, canonical, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.words.advice import advice
+from tubecert.words.claims import sentence
 
 Result = Mapping[str, Any]
 
@@ -107,14 +111,15 @@ def require_tube(result: Result) -> None:
     """Raises the reason why there is no tube to be compared with, if there is none."""
     if "rho_r" in result.get("tube", {}) and result.get("constants"):
         return
-    reason = next((item for item in result["reasons"] if item["verdict"] == result["verdict"]), None)
-    why = f"{reason['claim']}: {reason['message']}" if reason else "certification stopped"
+    reasons = [from_json(Reason, item, f"reasons[{i}]") for i, item in enumerate(result["reasons"])]
+    reason = next((item for item in reasons if item.verdict == result["verdict"]), None)
+    why = "certification stopped" if reason is None else sentence(reason)
     error = TubecertError(
         [
             Finding(
                 code="TC703",
                 message=f"there is no tube that a simulation could leave ({result['verdict']}: {why})",
-                help=(reason or {}).get("relax", "") or "tubecert certify tells more",
+                help=advice(reason.relax if reason else ()) or "tubecert certify tells more",
             )
         ]
     )

@@ -16,11 +16,13 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
+from tubecert import claims
 from tubecert.expression import Expression, constant, substitute
 from tubecert.expression.matrix import null_space
 from tubecert.model import ControlAffineModel
 
 Rows = list[list[Fraction]]
+_REAL = 1e-9  # imaginary parts below it are rounding errors
 _DIGITS = (12, 6, 4, 3, 2)  # of a bound that is tried: repeated modes are known to few
 
 
@@ -45,15 +47,11 @@ class UncontrollableMode:
         """Whether no metric has this rate; at the limit itself C2 may hold, with nothing to spare for a proof."""
         return rate > self.limit
 
-    def words(self, states: Sequence[str]) -> str:
-        """The reason, for a report."""
-        place = ", ".join(f"{name} = {float(q):.6g}" for name, q in zip(states, self.at, strict=True))
-        s = f"{self.mode.real:.6g}" + (
-            f" +- {abs(self.mode.imag):.6g}i" if abs(self.mode.imag) > 1e-9 else ""
-        )
-        return (
-            f"the linearisation at {place} has the uncontrollable mode {s}: no metric has a rate above "
-            f"{self.bound:.12g}"
+    def failure(self) -> claims.UncontrollableMode:
+        """It as the reason why there is no metric; six digits of the mode, which is known roughly."""
+        imaginary = abs(self.mode.imag) if abs(self.mode.imag) > _REAL else 0.0
+        return claims.UncontrollableMode(
+            mode=(float(f"{self.mode.real:.6g}"), float(f"{imaginary:.6g}")), limit=self.limit
         )
 
 

@@ -13,11 +13,20 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import combinations_with_replacement
 
+from tubecert.claims import Failure, NoFrame, VariableForbidden
 from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, sin, symbol, topological
 from tubecert.expression.matrix import Matrix, identity, multiply, null_space, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.frame import commuting_frame
 from tubecert.synthesis.pivot_frame import pivot_frame
+
+
+class FamilyError(ValueError):
+    """C3 leaves no family of the kind that was asked for."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.tag)
+        self.failure = failure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,13 +69,13 @@ def metric_family(
 ) -> MetricFamily:
     """The members of total degree <= `degree` in `variables` (default: all that C3 permits and the dynamics suggest).
 
-    Raises `ValueError` if C3 forbids that W depends on one of the variables, or no commuting frame was found.
+    Raises `FamilyError` if C3 forbids that W depends on one of the variables, or no commuting frame was found.
     """
     permitted = invariants(model)
     chosen = _chosen(model, permitted, variables) if degree else {}
     frame = _frame(model, safe_set)
     if frame is None:
-        raise ValueError("no frame of vector fields that commute with the columns of B was found")
+        raise FamilyError(NoFrame())
     generators = [g for form in chosen.values() for g in _generators(form, model)]
     return MetricFamily(
         states=model.states,
@@ -113,9 +122,7 @@ def _chosen(
         return suggested(model)
     for name in variables:
         if name not in permitted:
-            raise ValueError(
-                f"W cannot depend on {name}: C3 (the Killing condition) permits {', '.join(permitted) or 'nothing'}"
-            )
+            raise FamilyError(VariableForbidden(variable=name, permitted=tuple(permitted)))
     return {name: permitted[name] for name in variables}
 
 

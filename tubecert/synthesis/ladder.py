@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor, inf, isfinite, log10, sqrt
 
+from tubecert.claims import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily, metric_family
@@ -63,7 +64,7 @@ class Attempt:
     degree: int
     floor: Floor
     route: str
-    outcome: str
+    outcome: Outcome
     condition_number: float | None = None
     undecided: bool = False
     seconds: float
@@ -204,7 +205,7 @@ class Ladder:
                     degree=degree,
                     floor=floor,
                     route=proposal.route,
-                    outcome="proven" if isinstance(outcome, VerifiedMetric) else outcome.reason,
+                    outcome=Proven() if isinstance(outcome, VerifiedMetric) else outcome.outcome,
                     condition_number=outcome.condition_number.above
                     if isinstance(outcome, VerifiedMetric)
                     else None,
@@ -248,7 +249,7 @@ class Ladder:
         self.attempts.append(attempt)
         if self.request.progress:
             number = attempt.condition_number
-            words = attempt.outcome if number is None else f"proven, condition number {number:.4g}"
+            words = attempt.outcome.tag if number is None else f"proven, condition number {number:.4g}"
             self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
 
 

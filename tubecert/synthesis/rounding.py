@@ -12,6 +12,7 @@ from math import floor, isfinite, log10
 
 import numpy as np
 
+from tubecert.claims import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
@@ -22,6 +23,7 @@ from tubecert.synthesis.attack import Attack, Attacker
 from tubecert.synthesis.family import MetricFamily
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
+from tubecert.verdict import Verdict
 
 _DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
 _WORTH = 1.005  # a shorter metric may have a condition number larger by this factor
@@ -53,7 +55,7 @@ class Rejected:
     `undecided`: it may be one, but the proof ran out of boxes.
     """
 
-    reason: str
+    outcome: Outcome
     undecided: bool = False
 
 
@@ -63,15 +65,16 @@ def shortest_proven(
     """The proposal with few digits, proven at `rate`, of nearly the same condition number; or why it is not proven."""
     values = proposal.coefficients
     if values is None or not np.all(np.isfinite(values)) or not np.any(values):
-        return Rejected(reason=f"{proposal.route}: {proposal.status}")
+        return Rejected(outcome=NoProposal(route=proposal.route, status=proposal.status))
     n = len(problem.model.states)
     if values.shape != (len(problem.family.functions), n, n):
-        return Rejected(reason=f"{proposal.route} gave coefficients of a wrong shape")
-    outcome: VerifiedMetric | Rejected = Rejected(reason=f"{proposal.route}: nothing to prove")
-    for digits in _worth_proving(problem, values, rate):
-        outcome = _proven(problem, proposal, digits, rate, effort)
+        return Rejected(outcome=WrongShape(route=proposal.route))
+    first, *rest = _worth_proving(problem, values, rate)
+    outcome = _proven(problem, proposal, first, rate, effort)
+    for digits in rest:
         if isinstance(outcome, VerifiedMetric):
             break
+        outcome = _proven(problem, proposal, digits, rate, effort)
     return outcome
 
 
@@ -114,11 +117,12 @@ def _proven(
     assert proposal.coefficients is not None
     dual = problem.family.dual_metric(rounded(proposal.coefficients, digits))
     proof = verify_metric(with_metric(problem.model, dual, rate), problem.safe_set, effort)
-    if proof.verdict != "certified":
-        return Rejected(reason=f"{proposal.route}: {proof.reason}", undecided=proof.verdict == "undecided")
+    if proof.failed is not None:
+        failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
+        return Rejected(outcome=failed, undecided=failed.verdict is Verdict.UNDECIDED)
     condition = condition_number(proof)
     if not isfinite(condition.above):
-        return Rejected(reason=f"{proposal.route}: the condition number could not be bounded")
+        return Rejected(outcome=ConditionUnbounded(route=proposal.route))
     return VerifiedMetric(
         rate=rate,
         floor=problem.floor,

@@ -13,6 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 import tubecert
+from tubecert.claims import CorrectPlan, MoreKnots, OtherInterpolation, PlanRemedy
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.errors import SpecError
@@ -59,18 +60,18 @@ def plan_of(spec: Spec, model: ControlAffineModel, room: Room, report: Report | 
     return Plan(x, u, trajectory.horizon)
 
 
-def remedy(plan: Plan, model: ControlAffineModel, room: Room) -> str:
-    """What would lower a plan's defect, in words."""
+def remedy(plan: Plan, model: ControlAffineModel, room: Room) -> PlanRemedy:
+    """What would lower a plan's defect."""
     knots = plan.knots
     if knots is None:
-        return "correct x or u there"
+        return CorrectPlan()
     other: Interpolation = "linear" if knots.interpolation == "hold" else "hold"
     mended = piecewise_plan(model, replace(knots, interpolation=other), plan.horizon)
     rho, effort = fraction_bounds(room.rho)[1], replace(room.effort, gap=0.05)
     own, instead = (Defect.of(each, model, rho, effort).in_state().above for each in (plan, mended))
     if instead < 0.5 * own:
-        return f"with interpolation: {other} it would be {instead:.3g}"
-    return "give more knots, or integrate the dynamics between them"
+        return OtherInterpolation(interpolation=other, defect=instead)
+    return MoreKnots()
 
 
 def _planned(

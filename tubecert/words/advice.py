@@ -1,0 +1,134 @@
+"""What would help, as one sentence.
+
+What changes a number is told (`halving Dh ... would lower ...`), what can be done is asked for (`raise --budget, or
+lower metric.rate`), and what is wrong with the plan comes last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from tubecert.bounds.constants import TABLE
+from tubecert.claims import (
+    AskForRateBelow,
+    AskForRateUpTo,
+    CorrectPlan,
+    DeclareMetricBound,
+    DeclareUncertaintyBound,
+    EnlargeSafeSet,
+    GiveInput,
+    HalveConstant,
+    HigherDegree,
+    LowerDegree,
+    LowerRate,
+    MendPlan,
+    MoreKnots,
+    OtherInterpolation,
+    OtherMetric,
+    OtherVariables,
+    PlanRemedy,
+    RaiseBudget,
+    RaiseConditionNumber,
+    ReduceInitialError,
+    ReduceRadii,
+    Relax,
+    ShrinkSafeSet,
+    ShrinkTube,
+)
+from tubecert.words.digits import ceiling_text, floor_text
+
+
+def advice(items: Sequence[Relax]) -> str:
+    """What would help; empty if nothing is known to."""
+    halvings = ", ".join(_halving(item) for item in items if isinstance(item, HalveConstant))
+    plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
+    others = [item for item in items if not isinstance(item, (HalveConstant, MendPlan))]
+    return "; ".join(filter(None, (halvings, _alternatives(others), *plans)))
+
+
+def _alternatives(items: Sequence[Relax]) -> str:
+    tried = [item for item in items if isinstance(item, _TRIED) and _is_known(item)]
+    if tried:
+        return "try " + "; or ".join(map(_action, tried))
+    said = list(map(_action, items))
+    return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+
+
+_TRIED = (HigherDegree, AskForRateUpTo, ShrinkSafeSet)
+
+
+def _is_known(item: Relax) -> bool:
+    return not isinstance(item, ShrinkSafeSet) or item.factor is not None
+
+
+def _halving(item: HalveConstant) -> str:
+    meaning = TABLE[item.constant]
+    share = 100 * (1 - item.factor)
+    return f"halving {meaning.symbol} ({meaning.words}) would lower the least Gamma by {share:.0f} %"
+
+
+def _plan(item: MendPlan) -> str:
+    where = "" if item.t is None else f" (at t = {item.t:.4g} s)"
+    return (
+        f"the plan misses x' = f + B u by up to {item.defect:.3g}{where}, which alone takes {100 * item.share:.2g} % "
+        f"of the tube: {_remedy(item.remedy)}"
+    )
+
+
+def _remedy(item: PlanRemedy) -> str:
+    match item:
+        case CorrectPlan():
+            return "correct x or u there"
+        case OtherInterpolation():
+            return f"with interpolation: {item.interpolation} it would be {item.defect:.3g}"
+        case MoreKnots():
+            return "give more knots, or integrate the dynamics between them"
+    raise TypeError(item)
+
+
+def _action(item: Relax) -> str:
+    return _ACTIONS[type(item)](item)
+
+
+def _lower_rate(item: LowerRate) -> str:
+    return "lower the rate" if item.to is None else f"lower metric.rate to {floor_text(item.to)}"
+
+
+def _metric_bound(item: DeclareMetricBound) -> str:
+    if item.side is None or item.value is None:
+        return "declare metric.bounds"
+    rounded = floor_text if item.side == "lower" else ceiling_text
+    return f"declare {item.side}: {rounded(item.value)}"
+
+
+def _uncertainty_bound(item: DeclareUncertaintyBound) -> str:
+    return f"declare {item.constant}: {'-' if item.value is None else ceiling_text(item.value)}"
+
+
+def _smaller_set(item: ShrinkSafeSet) -> str:
+    if item.factor is None or item.rate is None:
+        return "shrink the safe set"
+    shrunk = f"the safe set shrunk to {item.factor:.3g} of its size about its centre"
+    return f"{shrunk}, where {float(item.rate):g} works"
+
+
+_ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
+    RaiseBudget: lambda item: "raise --budget" + (": a proof ran out of boxes" if item.proof else ""),
+    ShrinkTube: lambda item: "shrink the tube",
+    ReduceRadii: lambda item: "reduce epsilon, rho_a or the initial error",
+    ReduceInitialError: lambda item: "reduce the initial error",
+    EnlargeSafeSet: lambda item: "enlarge the safe set",
+    ShrinkSafeSet: _smaller_set,
+    LowerRate: _lower_rate,
+    OtherMetric: lambda item: "give another dual metric",
+    DeclareMetricBound: _metric_bound,
+    DeclareUncertaintyBound: _uncertainty_bound,
+    AskForRateBelow: lambda item: f"ask for a rate below {float(item.rate):.6g}",
+    AskForRateUpTo: lambda item: f"a rate up to {float(item.rate):g}, which works on this box",
+    GiveInput: lambda item: "give it an input",
+    OtherVariables: lambda item: "choose other variables, or leave them to tubecert",
+    LowerDegree: lambda item: "ask for a lower degree",
+    HigherDegree: lambda item: f"a degree above {item.degree}, or auto",
+    RaiseConditionNumber: lambda item: f"raise condition_number to {item.to:.4g}",
+}

@@ -1,0 +1,65 @@
+"""What is assumed, as sentences."""
+
+from __future__ import annotations
+
+from tubecert.claims import (
+    Assumption,
+    ExactGeodesics,
+    FirstOrderFilter,
+    ForAllTime,
+    HardProjection,
+    LeastFeedback,
+    PerfectState,
+    SmoothProjection,
+    StartAtRest,
+    StraightGeodesics,
+    UncertaintyAsDeclared,
+    UncertaintyAsGiven,
+    UpToHorizon,
+)
+from tubecert.words.digits import ceiling_text, floor_text
+
+_FIXED: dict[type[Assumption], str] = {
+    LeastFeedback: "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, "
+    "section 0); the controller acts in continuous time and exactly (certificate C: with sampled adaptation), "
+    "evaluates f(x*) + B(x*) u* itself and never the derivative of a stored plan",
+    StraightGeodesics: "minimising geodesics are straight lines, which the constant metric makes unique",
+    StartAtRest: "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's "
+    "ball",
+    HardProjection: "the projection is hard",
+    PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
+    FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
+    ForAllTime: "the claim is for all t >= 0",
+    UncertaintyAsDeclared: "the uncertainty obeys its declared bounds on the tube",
+}
+
+
+def assumed(item: Assumption) -> str:
+    """The sentence of an assumption."""
+    match item:
+        case ExactGeodesics():
+            return _geodesics(item)
+        case SmoothProjection():
+            return f"the projection is smooth with layer {float(item.layer):g}"
+        case UpToHorizon():
+            return f"the claim is for 0 <= t <= {float(item.horizon):g} s"
+        case UncertaintyAsGiven():
+            others = ", or any other within the bounds h, h_x, h_t of this certificate"
+            return "the uncertainty is the expression of the specification" + (
+                others if item.any_within_bounds else ""
+            )
+        case _:
+            return _FIXED[type(item)]
+
+
+def _geodesics(item: ExactGeodesics) -> str:
+    exact = "the controller finds the minimising geodesic exactly"
+    if item.value is None:
+        return f"{exact}, and it is unique in the tube (not proven here)"
+    if item.uniqueness == "proven":
+        most = ceiling_text(item.value.above)
+        return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {most}"
+    size = f"reaches {floor_text(item.value.below)}"
+    if item.value.below < 1:
+        size = "could not be bounded by less than 1"
+    return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"

@@ -1,0 +1,321 @@
+"""What a claim is called, and why it holds or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf
+from typing import Any
+
+from tubecert.bounds.constants import TABLE
+from tubecert.claims import (
+    Claim,
+    ConditionHolds,
+    ConditionNumber,
+    ConditionUnbounded,
+    ConstantBounded,
+    Failure,
+    GainsSuffice,
+    MetricBound,
+    MetricContraction,
+    MetricDefinite,
+    MetricFound,
+    MetricKilling,
+    NoFrame,
+    NoProposal,
+    NothingFound,
+    NotProven,
+    NotProvenAsWritten,
+    NotWritable,
+    Outcome,
+    PlanBounded,
+    RankOfB,
+    RankUnproven,
+    Reason,
+    TubeInSafeSet,
+    TubeRadius,
+    UncertaintyBound,
+    UncontrollableMode,
+    VariableForbidden,
+    WrongShape,
+)
+from tubecert.spec.codes import CODES
+from tubecert.verdict import Verdict
+from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation
+from tubecert.words.digits import floor_text
+
+_OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
+_WITHOUT_MARGIN = ("corrected_formulas", "proven_gains", "any_gains")
+
+
+def title(claim: Claim) -> str:
+    """What a claim is called, in the words of the table of gains."""
+    match claim:
+        case GainsSuffice():
+            return SECTIONS.get(claim.section, claim.section)
+        case ConditionHolds():
+            return _condition_name(claim)
+        case ConstantBounded():
+            return f"bound of {claim.constant}"
+        case UncertaintyBound():
+            return f"declared bound of {claim.constant}"
+        case _:
+            return _NAMES[type(claim)]
+
+
+_NAMES: Mapping[type[Claim], str] = {
+    RankOfB: "rank of B",
+    MetricFound: "metric synthesis",
+    MetricDefinite: "metric, C1",
+    MetricContraction: "metric, C2",
+    MetricKilling: "metric, C3",
+    MetricBound: "declared bounds of the metric",
+    TubeRadius: "radius of the tube",
+    PlanBounded: "assumption 1: the tube lies in the safe set",
+    TubeInSafeSet: "assumption 1: the tube lies in the safe set",
+}
+
+
+def _condition_name(claim: ConditionHolds) -> str:
+    section = SECTIONS.get(claim.section, claim.section)
+    if claim.condition == claim.section:
+        return section
+    if claim.condition.startswith("26"):
+        return f"A {equation(claim.condition)}"
+    if claim.condition == "bounded":
+        return f"{section}, unbounded: {claim.constant}"
+    return f"{section}, {condition_name(claim.condition)}"
+
+
+def message(reason: Reason) -> str:
+    """Why it holds or not, in one sentence."""
+    return _MESSAGES[type(reason.claim)](reason.claim, reason)
+
+
+def sentence(reason: Reason) -> str:
+    """The claim and why it holds or not."""
+    return f"{title(reason.claim)}: {message(reason)}"
+
+
+# -- before there are gains
+
+
+def _rank(claim: RankOfB | RankUnproven, reason: Reason) -> str:
+    if reason.verdict is Verdict.REFUTED:
+        return "B loses rank in the safe set"
+    return "B could not be proven of full rank"
+
+
+def _definite(claim: MetricDefinite, reason: Reason) -> str:
+    return (
+        "W is not positive definite"
+        if reason.verdict is Verdict.REFUTED
+        else "W could not be proven positive"
+    )
+
+
+def _killing(claim: MetricKilling, reason: Reason) -> str:
+    condition = "C3 (the Killing condition)"
+    if claim.residual is None:
+        return f"{condition} could not be proven exactly for input {claim.input}"
+    return f"{condition} fails for input {claim.input}: its residual is {claim.residual:.3g}"
+
+
+def _contraction(claim: MetricContraction, reason: Reason) -> str:
+    below, above = claim.largest_rate.below, claim.largest_rate.above
+    if reason.verdict is Verdict.REFUTED:
+        return f"C2 fails at rate {float(claim.rate):g}: {_supported(below, above)}"
+    lies = f"the largest rate lies in [{below:.10g}, {above:.10g}]"
+    return f"{lies}, too close to the rate {float(claim.rate):g} to tell"
+
+
+def _supported(below: float, above: float) -> str:
+    if above <= 0:
+        return "this metric supports no positive rate"
+    if below > 0:
+        return f"the largest rate that this metric supports is {floor_text(below)}"
+    return "no rate could be proven"
+
+
+def _metric_bound(claim: MetricBound, reason: Reason) -> str:
+    eigenvalue = "lmin(M)" if claim.side == "lower" else "lmax(M)"
+    reaches = _reached(claim.reaches)
+    return f"metric.bounds.{claim.side} is {float(claim.declared):g}, but {eigenvalue} reaches {reaches}"
+
+
+def _uncertainty_bound(claim: UncertaintyBound, reason: Reason) -> str:
+    reaches = _reached(claim.reaches)
+    declared = f"uncertainty.bounds.{claim.constant} is {claim.declared:g}"
+    return f"{declared}, but the expression reaches {reaches} on the tube"
+
+
+def _reached(value: float | None) -> str:
+    return "infinity" if value is None else f"{value:.8g}"
+
+
+def _radius(claim: TubeRadius, reason: Reason) -> str:
+    rho = "rho = sqrt(A/a)|x0* - x0| + eps + rho_a"
+    match claim.obstacle:
+        case "out_of_range":
+            return f"{rho} is beyond the range of numbers"
+        case "metric_unbounded":
+            return "the metric could not be bounded over the tube"
+        case "not_settled":
+            return f"{rho} did not settle: it grows with the tube beyond {float(claim.radius):.6g}"
+
+
+def _in_safe_set(claim: TubeInSafeSet, reason: Reason) -> str:
+    lies = "leaves" if reason.verdict is Verdict.REFUTED else "could not be proven to stay in"
+    when = "" if reason.at is None or reason.at.t is None else f", at t = {reason.at.t:.6g}"
+    excess = f", by {claim.excess:.3g}" if claim.excess > 0 else ""
+    return (
+        f"the tube of radius {float(claim.radius):.6g} {lies} the safe set through the {claim.side} bound of "
+        f"{claim.state}{when}{excess}"
+    )
+
+
+def _plan_bounded(claim: PlanBounded, reason: Reason) -> str:
+    return "the curve between the plan's knots could not be bounded: two of its times may nearly coincide"
+
+
+def unbounded(constant: str) -> str:
+    """That a constant has no finite bound."""
+    meaning = TABLE[constant]
+    return f"{meaning.words} ({meaning.symbol}) could not be bounded within the budget of boxes"
+
+
+# -- gains
+
+
+def _suffice(claim: GainsSuffice, reason: Reason) -> str:
+    if len(claim.margins) == 1:
+        (margin,) = claim.margins.values()
+        predictor = "" if claim.predictor_gain is None else f", with A_m = -{float(claim.predictor_gain):g} I"
+        return f"proven margin {margin:.2g} of dbar{predictor}"
+    margins = ", ".join(f"{condition} {margin:.2g}" for condition, margin in sorted(claim.margins.items()))
+    binds = "" if claim.binds is None else f"{equation(claim.binds)} sets the bandwidth; "
+    said = f"{binds}proven margins: {margins}"
+    if claim.below_twice_rate:
+        said += "; the bandwidth lies below twice the rate"
+    if claim.binds == "26b":
+        said += "; where (26b) binds the rate grows without bound, so 1 % of it is left"
+    return said
+
+
+def _condition(claim: ConditionHolds, reason: Reason) -> str:
+    if claim.condition == "bounded":
+        return unbounded(claim.constant or "")
+    said = SAYS[claim.condition]
+    if claim.needed is not None and claim.allowed is not None:
+        return f"{said}: {claim.needed:.4g} is needed, {claim.allowed:.4g} is allowed"
+    if claim.condition in _WITHOUT_MARGIN:
+        return said
+    return f"{said}: {_margin(claim)}{_predictor(claim)}"
+
+
+def _predictor(claim: ConditionHolds) -> str:
+    if claim.predictor_gain is None or claim.condition not in _OF_PREDICTOR:
+        return ""
+    return f" (with A_m = -{float(claim.predictor_gain):g} I)"
+
+
+def _margin(claim: ConditionHolds) -> str:
+    """The margin of a condition that is not proven, in words where it has no bound."""
+    if claim.blocked_by is not None:
+        return f"no adaptation rate can, where {equation(claim.blocked_by)} fails"
+    if claim.beyond:
+        return "it fails by more than can be computed"
+    low, high = (-inf, inf) if claim.margin is None else (claim.margin.below, claim.margin.above)
+    if low == -inf:
+        below = "its margin could not be bounded from below"
+        return below if high == inf else f"{below}; it is {high:.3g} at most"
+    if (shown := f"{low:.3g}") == f"{high:.3g}":
+        return f"its margin is {shown}"
+    return f"its margin lies in [{shown}, {high:.3g}]"
+
+
+# -- a metric that was looked for
+
+
+def _found(claim: MetricFound, reason: Reason) -> str:
+    return _FAILURES[type(claim.failure)](claim.failure, reason)
+
+
+def _mode(item: UncontrollableMode, reason: Reason) -> str:
+    real, imaginary = item.mode
+    pair = f" +- {abs(imaginary):.6g}i" if abs(imaginary) > 1e-9 else ""
+    return (
+        f"the linearisation at an equilibrium has the uncontrollable mode {real:.6g}{pair}: no metric has a rate above "
+        f"{float(item.limit):.12g}"
+    )
+
+
+def _forbidden(item: VariableForbidden, reason: Reason) -> str:
+    permitted = ", ".join(item.permitted) or "nothing"
+    return f"W cannot depend on {item.variable}: C3 (the Killing condition) permits {permitted}"
+
+
+def _not_writable(item: NotWritable, reason: Reason) -> str:
+    return f"the metric cannot be written: {CODES[item.code]}"
+
+
+def _nothing(item: NothingFound, reason: Reason) -> str:
+    if not item.attempts:
+        return "no metric was found"
+    degrees = ", ".join(map(str, item.degrees))
+    tried = f"{item.attempts} attempts by {' and '.join(item.routes)}, degree {degrees}"
+    return f"no metric was found: {tried}" + (
+        "" if item.last is None else f"; the last: {outcome(item.last)}"
+    )
+
+
+def outcome(item: Outcome) -> str:
+    """What became of an attempt to find a metric."""
+    match item:
+        case NoProposal():
+            return f"{item.route}: {item.status}"
+        case WrongShape():
+            return f"{item.route} gave coefficients of a wrong shape"
+        case NotProven():
+            return f"{item.route}: {message(Reason(claim=item.condition, verdict=item.verdict))}"
+        case ConditionUnbounded():
+            return f"{item.route}: the condition number could not be bounded"
+        case _:
+            return item.tag
+
+
+def _above_limit(item: ConditionNumber, reason: Reason) -> str:
+    number = f"{item.condition_number:.5g}"
+    return f"the least condition number found at rate {float(item.rate):g} is {number}, above the limit"
+
+
+def _as_written(item: NotProvenAsWritten, reason: Reason) -> str:
+    why = _MESSAGES[type(item.condition)](item.condition, reason)
+    return f"the metric as written could not be proven: {why}"
+
+
+_FAILURES: Mapping[type[Failure], Callable[[Any, Reason], str]] = {
+    RankUnproven: _rank,
+    UncontrollableMode: _mode,
+    VariableForbidden: _forbidden,
+    NoFrame: lambda item, reason: "no frame of vector fields that commute with the columns of B was found",
+    NotWritable: _not_writable,
+    NotProvenAsWritten: _as_written,
+    ConditionNumber: _above_limit,
+    NothingFound: _nothing,
+}
+
+_MESSAGES: Mapping[type[Claim], Callable[[Any, Reason], str]] = {
+    RankOfB: _rank,
+    MetricFound: _found,
+    MetricDefinite: _definite,
+    MetricKilling: _killing,
+    MetricContraction: _contraction,
+    MetricBound: _metric_bound,
+    TubeRadius: _radius,
+    PlanBounded: _plan_bounded,
+    TubeInSafeSet: _in_safe_set,
+    ConstantBounded: lambda claim, reason: unbounded(claim.constant),
+    UncertaintyBound: _uncertainty_bound,
+    GainsSuffice: _suffice,
+    ConditionHolds: _condition,
+}

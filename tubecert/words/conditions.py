@@ -1,0 +1,45 @@
+"""What the conditions of the certificates say, by their ids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+# what a certificate is called where its gains stand
+SECTIONS: Mapping[str, str] = {
+    "conditions_26": "A (26)",
+    "distance": "B distance",
+    "sampled": "C sampled",
+}
+
+# a condition as it is named beside a certificate
+NAMES: Mapping[str, str] = {
+    "initial_distance": "dbar <= d0",
+    "plan_defect": "dbar <= delta/lambda",
+    "corrected_formulas": "as-printed",
+    "proven_gains": "nothing found",
+    "any_gains": "nothing found",
+}
+
+SAYS: Mapping[str, str] = {
+    "26a": "the initial error and the filter's share must fit into rho_r",
+    "26b": "the metric's lower bound must exceed zeta_2 + zeta_3",
+    "26c": "the adaptation rate must make up for the estimation error",
+    "distance": "the distance bound sup D(t) must stay below dbar",
+    "sampled": "the distance bound with sampled adaptation must stay below dbar",
+    "initial_distance": "d0, the length of the segment to the start, must be below dbar = sqrt(a) rho",
+    "plan_defect": "the plan's defect alone must keep the distance below dbar",
+    "corrected_formulas": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
+    "proven_gains": "gains that seem to serve were found, but none could be proven to; the constants may be too wide "
+    "(lower --gap), or the margins too thin for the arithmetic",
+    "any_gains": "no gains were found that can be proven to serve",
+}
+
+
+def condition_name(condition: str) -> str:
+    """A condition as it is named beside a certificate."""
+    return NAMES.get(condition, condition)
+
+
+def equation(condition: str) -> str:
+    """The condition of an equation with its tag in parentheses, others as they are."""
+    return f"({condition})" if condition.startswith("26") else condition
