@@ -49,6 +49,12 @@ def read(path: str, kind: Kind) -> bytes:
     return _within(path, data, max(size, len(data)), kind)
 
 
+def read_regular(path: Path, most: int) -> bytes:
+    """The first bytes of a regular file; raises `OSError` for anything else."""
+    with _opened(path) as file:
+        return bytes(file.read(most))
+
+
 def read_stdin(kind: Kind) -> bytes:
     """What is on stdin, within the limit of its kind; raises `TargetError`."""
     try:

@@ -8,7 +8,8 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `problem`, `runs` | what is simulated, and what comes out |
 | `integrator` | steps are halved until the error estimate is small enough; lanes on all cores |
 | `grid` | the times of the steps, the plan at them, and the fast part's exact steps |
-| `program`, `compiled` | expressions as arrays for one compiled interpreter; compilation kept between runs |
+| `program` | expressions as arrays for one compiled interpreter |
+| `compiled`, `sealed` | compilation; machine code kept between runs, and run only under the user's own seal |
 | `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
 | `computer`, `held` | the controller as a computer: everything held between samples; whether that is stable |

@@ -1,4 +1,7 @@
-"""Compilation by numba, kept between runs where there is a folder for it. Imported by the kernels only, hence late."""
+"""Compilation by numba, kept between runs where there is a folder for it. Imported by the kernels only, hence late.
+
+What is kept is sealed (`sealed`): machine code that this user has not compiled from these files is never run.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,11 @@ from typing import Any
 if "numba" not in sys.modules:
     os.environ.setdefault("NUMBA_OPT", "1")  # compiles faster by a third, and the loops are as fast
 
+import llvmlite
 import numba
+from numba.core.caching import IndexDataCacheFile
+
+from tubecert.simulate.sealed import SealedFile
 
 _NAMES: list[str] = []  # of all kernels
 COMPILING = "compiling the loops, once per installation"
@@ -35,20 +42,21 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _kernel(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
-    """Numba keeps the machine code beside the package or in the user's cache.
+    """Numba finds a folder for the machine code: beside the package, or in the user's cache.
 
-    It forgets it when the function's own file changes. Kernels call each other across files, so what counts here is the
-    content of all of them.
+    It would trust every file there that is not older than the function's own source. Kernels call each other across
+    files, so what counts here is the content of all of them, and the seal.
     """
     _NAMES.append(function.__name__)
     compiler: Any = numba.njit
     try:
         kernel: Any = compiler(cache=True, error_model="numpy", **options)(function)
-    except RuntimeError:  # nowhere to write: compile in every process
+        folder, name = kernel._cache.cache_path, kernel._cache._impl.filename_base
+        if not isinstance(kernel._cache._cache_file, IndexDataCacheFile):
+            raise TypeError("this numba keeps its files in another way")
+        kernel._cache._cache_file = SealedFile(Path(folder) / f"{name}.kernel", _stamp())
+    except (RuntimeError, AttributeError, TypeError):  # nowhere to write: compile in every process
         kernel = compiler(error_model="numpy", **options)(function)
-    files: Any = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    if hasattr(files, "_source_stamp"):
-        files._source_stamp = _stamp()
     return kernel  # type: ignore[no-any-return]
 
 
@@ -78,8 +86,10 @@ def told(report: Callable[[str, int, int], None] | None) -> Iterator[None]:
 
 @cache
 def _stamp() -> str:
-    """A digest of every file that may hold a kernel."""
-    digest = hashlib.sha256()
+    """A digest of every file that may hold a kernel, and of what compiles them."""
+    digest = hashlib.sha256(
+        f"{sys.version} numba {numba.__version__} llvmlite {llvmlite.__version__}".encode()
+    )
     for name in KERNELS:
         digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
     return digest.hexdigest()
