@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import resource
 import statistics
 import subprocess
@@ -162,7 +163,26 @@ def grid(
     return seconds * total / len(batch), total
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """The parts that are named, or all; against another checkout if one is given."""
     parts = {"startup": startup, "certify": certify, "suprema": suprema, "growth": growth}
-    for part in sys.argv[1:] or parts:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(parts)}  [all]")
+    asked.add_argument(
+        "--against", type=Path, metavar="PATH", help="compare with another checkout, nothing else"
+    )
+    asked.add_argument("--runs", type=int, default=5, help="of each command, with --against  [5]")
+    given = asked.parse_args()
+    if unknown := set(given.parts) - set(parts):
+        asked.error(f"no such part: {', '.join(sorted(unknown))}")
+    if given.against:
+        from against import compare
+
+        compare(given.against.resolve(), given.runs)
+        return
+    for part in given.parts or parts:
         parts[part]()
+
+
+if __name__ == "__main__":
+    main()
