@@ -213,7 +213,7 @@ def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
     document["result"]["spec"]["effective_hash"] = digest(document["result"]["spec"]["effective"])
     document["hash"] = certificate.seal(document["result"], {})["hash"]
     (found,) = [item for item in examine(document).claims if not item.outcome.holds]
-    assert found.name == "refuted: metric synthesis"
+    assert found.name == "refuted: metric_found"
     assert found.outcome.verdict == "undecided"
 
 
