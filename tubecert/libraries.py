@@ -11,7 +11,17 @@ from typing import Final
 
 from tubecert import __version__
 
-DECIDING: Final = ("numpy", "scipy", "clarabel", "scs", "cvxpy", "pyyaml", "python-flint", "numba")
+DECIDING: Final = (
+    "numpy",
+    "scipy",
+    "clarabel",
+    "scs",
+    "cvxpy",
+    "pyyaml",
+    "python-flint",
+    "numba",
+    "llvmlite",
+)
 SHOWING: Final = ("typer", "rich", "jinja2", "matplotlib")
 
 

@@ -143,7 +143,7 @@ def test_a_solver_that_is_not_there_is_refused_with_those_that_are(solver, why, 
         app, ["synth", str(TWO), "--rate", "1.5", "--solver", solver, "-o", str(target)]
     )
     assert done.exit_code == 2
-    assert f"error TC112: the solver {solver} cannot be used: {solver[6:]} {why}" in done.stderr
+    assert f"error TC122: the solver {solver} cannot be used: {solver[6:]} {why}" in done.stderr
     assert "installed: cvxpy:CLARABEL, cvxpy:SCS; without cvxpy: clarabel, scs" in " ".join(
         done.stderr.split()
     )

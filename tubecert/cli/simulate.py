@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -35,6 +36,7 @@ _CODES: Final = {
 }
 RUNS: Final = 100
 SEED: Final = 0
+EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 
 Step = Callable[[str, int, int], None]
 
@@ -53,6 +55,7 @@ class Wishes:
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Simulate; `given` holds the options by the names of their parameters."""
+    _installed()
     numbers = _numbers(given)
     chosen = _controllers(given["controllers"])
     from tubecert import spec
@@ -73,6 +76,15 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         files = write(folder, campaign, certificate=sealed["hash"])
     _report(summary(campaign, sealed["hash"]), folder, len(files), output)
     return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
+
+
+def _installed() -> None:
+    """Raises `SpecError` without the libraries that no other command needs."""
+    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+    if missing:
+        message = f"simulate needs {' and '.join(missing)}"
+        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
 
 
 def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:

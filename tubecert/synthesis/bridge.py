@@ -48,7 +48,7 @@ def required(solver: str) -> None:
     raise SpecError(
         [
             Finding(
-                code="TC112",
+                code="TC122",
                 message=f"the solver {solver} cannot be used: {name} {why}",
                 help=f"installed: {shown}; without cvxpy: clarabel, scs",
             )

@@ -1,0 +1,57 @@
+"""What an installation without the extra `simulate` can do, and what it says of the rest."""
+
+import importlib.util
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tubecert.cli.app import app
+from tubecert.cli.simulate import EXTRA
+
+ROOT = Path(__file__).parents[2]
+ORBIT = ROOT / "configs" / "two_state_orbit.yaml"
+WITHOUT = f"import sys\nfor name in {EXTRA}: sys.modules[name] = None\nfrom tubecert.cli import main\nmain()"
+
+
+def test_the_extra_is_what_the_command_needs():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {line.split(">")[0] for line in project["optional-dependencies"]["simulate"]}
+    assert declared == set(EXTRA)
+
+
+@pytest.mark.parametrize("missing", [("numba",), ("matplotlib",), ("numba", "matplotlib")])
+def test_without_it_simulate_says_how_to_install_it(missing, monkeypatch, tmp_path):
+    honest = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *rest: None if name in missing else honest(name, *rest)
+    )
+    done = CliRunner().invoke(app, ["simulate", str(ORBIT), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert f"error TC122: simulate needs {' and '.join(missing)}" in done.stderr
+    assert "pip install 'tubecert[simulate]'" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_without_it_everything_else_works(tmp_path):
+    target, page = tmp_path / "orbit.json", tmp_path / "orbit.html"
+    for command in (
+        ["certify", ORBIT, "-q", "-o", target, "--report", page],
+        ["check", ORBIT, "--no-cache"],
+        ["recheck", target],
+        ["synth", ORBIT, "--rate", "1.7", "-q", "-o", tmp_path / "metric.json"],
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", WITHOUT, *map(str, command)],
+            capture_output=True,
+            text=True,
+            timeout=250,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert done.returncode == 0, (command, done.stderr)
+    assert page.exists()
