@@ -8,7 +8,20 @@ from typing import Any
 import numpy as np
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
+from tubecert.conditions import rates
+from tubecert.conditions.distance import DistanceRecipe, margin_distance_along
 from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.rates import RateRecipe, margins_26_along
+from tubecert.conditions.sampled import SampledRecipe, margin_sampled_along
+from tubecert.conditions.verdict import Verdict
+from tubecert.enclosure.interval import Interval
+from tubecert.kernel import judge
+from tubecert.kinds.distance import DistanceSection
+from tubecert.kinds.rates import RatesSection
+from tubecert.kinds.sampled import SampledSection
+from tubecert.kinds.table import kind_of
+from tubecert.search.proposers import PROPOSERS
 
 W_CONSTANT = np.array(
     [[0.20365, 0.00015, -0.00566], [0.00015, 0.21671, -0.00566], [-0.00566, -0.00566, 0.21607]]
@@ -121,3 +134,43 @@ def three_state(**options: Any) -> TubeProblem:
         "states": 3,
     }
     return TubeProblem(constants=constants(**values), **(defaults | options))
+
+
+def _judged(letter: str, problem: TubeProblem, asked: dict[str, Fraction]) -> Any:
+    kind = kind_of(letter)
+    return kind.section(problem, PROPOSERS[kind.theorem.recipe].propose(problem, Asked(**asked)))
+
+
+def judged_26(problem: TubeProblem, **asked: Fraction) -> RatesSection:
+    """What is proposed and decided for certificate A."""
+    return _judged("A", problem, asked)
+
+
+def judged_distance(problem: TubeProblem, **asked: Fraction) -> DistanceSection:
+    """What is proposed and decided for certificate B."""
+    return _judged("B", problem, asked)
+
+
+def judged_sampled(problem: TubeProblem, **asked: Fraction) -> SampledSection:
+    """What is proposed and decided for certificate C."""
+    return _judged("C", problem, asked)
+
+
+def verdict_at(problem: TubeProblem, recipe: RateRecipe) -> Verdict:
+    """What the kernel decides about one recipe."""
+    return judge(problem, rates.THEOREM, Proposal(decisive=recipe)).verdict
+
+
+def margins_26(problem: TubeProblem, recipe: RateRecipe) -> dict[str, Interval]:
+    """Margins of one recipe, scalars."""
+    return {claim: margin[0] for claim, margin in margins_26_along(problem, [recipe]).items()}
+
+
+def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
+    """The margin of one recipe."""
+    return margin_distance_along(problem, [recipe])[0]
+
+
+def margin_sampled(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
+    """The margin of one recipe."""
+    return margin_sampled_along(problem, [recipe])[0]

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from problems import judged_26, judged_distance, judged_sampled
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import exit_code, seal
@@ -15,11 +16,8 @@ from tubecert.claims import Reason
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.errors import SpecError
-from tubecert.pipeline import Options, certify, gains
+from tubecert.pipeline import Options, certification, certify, gains
 from tubecert.records import from_json
-from tubecert.search.distance import search_distance
-from tubecert.search.rates import search_26
-from tubecert.search.sampled import search_sampled
 from tubecert.spec import load_text
 from tubecert.words.claims import message
 
@@ -54,11 +52,11 @@ def captured_problem(text, monkeypatch, **options):
     """The `TubeProblem` that the pipeline builds."""
     seen = []
 
-    def keep(problem, **asked):
+    def keep(problem, options):
         seen.append(problem)
-        return search_26(problem, **asked)
+        return gains.gains(problem, options)
 
-    monkeypatch.setattr(gains, "search_26", keep)
+    monkeypatch.setattr(certification, "gains", keep)
     run(text, **options)
     return seen[0]
 
@@ -99,14 +97,14 @@ def test_gains_of_the_reference_rows(monkeypatch):
     problem = captured_problem(declared(THREE), monkeypatch)
     worst_start = dataclasses.replace(problem.constants, h_initial=problem.constants.h)
     row = dataclasses.replace(problem, constants=worst_start, kernel=Kernel.PAPER, drift=Drift.SUM)
-    a = search_26(row)
+    a = judged_26(row)
     assert float(a.pair.recipe.bandwidth) == pytest.approx(41.8, rel=0.03)
     assert float(a.pair.recipe.adaptation_rate) == pytest.approx(1.39e7, rel=0.1)
     best = dataclasses.replace(row, A_m=None)
-    b = search_distance(best).least_adaptation.recipe
+    b = judged_distance(best).least_adaptation.recipe
     assert float(b.bandwidth) == pytest.approx(10.8, rel=0.03)
     assert float(b.adaptation_rate) == pytest.approx(1.38e4, rel=0.1)
-    c = search_sampled(row)  # with g = 1 the mean age is Ts/2, as in the row
+    c = judged_sampled(row)  # with g = 1 the mean age is Ts/2, as in the row
     assert float(c.pair.recipe.bandwidth) == pytest.approx(11.0, rel=0.03)
     assert float(c.pair.recipe.sample_time) == pytest.approx(0.0906, rel=0.03)
     assert c.sample_time_limit == pytest.approx(0.1258, rel=0.03)

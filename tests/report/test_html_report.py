@@ -16,14 +16,15 @@ import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from problems import margins_26
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
 from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.cli.app import app
-from tubecert.conditions.rates import RateRecipe, margins_26
+from tubecert.conditions.rates import RateRecipe
 from tubecert.expression import to_text
-from tubecert.pipeline import Options, certify, gains
+from tubecert.pipeline import Options, certification, certify, gains
 from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
 from tubecert.report.figures_tube import Plane
@@ -69,14 +70,13 @@ def problems():
 @pytest.fixture(scope="module")
 def regulated(problems):
     """A real certificate of three states at an equilibrium."""
-    original = gains.margins_26_around
 
-    def keep(problem, pair):
+    def keep(problem, options):
         problems.append(problem)
-        return original(problem, pair)
+        return gains.gains(problem, options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gains, "margins_26_around", keep)
+        patch.setattr(certification, "gains", keep)
         result = certify(load(str(CONFIGS / "three_state.yaml")), Options())
     return json.loads(certificate.dump(sealed(result)))
 

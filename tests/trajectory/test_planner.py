@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from problems import judged_26, judged_distance, judged_sampled
 
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
@@ -17,12 +18,9 @@ from tubecert.enclosure.constant import Constant
 from tubecert.errors import ExitCode, SpecError
 from tubecert.files import kept_folder
 from tubecert.model import build
-from tubecert.pipeline import Options, certify, gains
+from tubecert.pipeline import Options, certification, certify, gains
 from tubecert.planner import cache, ilqr
 from tubecert.planner.rollout import Dynamics
-from tubecert.search.distance import search_distance
-from tubecert.search.rates import search_26
-from tubecert.search.sampled import search_sampled
 from tubecert.spec import load, load_text
 from tubecert.trajectory.make import Room, grid, plan_of, rounded
 
@@ -308,11 +306,11 @@ def first_problem(spec, options, monkeypatch):
     """The result, and the problem that the pipeline built for it."""
     seen = []
 
-    def keep(given, **asked):
+    def keep(given, options):
         seen.append(given)
-        return search_26(given, **asked)
+        return gains.gains(given, options)
 
-    monkeypatch.setattr(gains, "search_26", keep)
+    monkeypatch.setattr(certification, "gains", keep)
     return certify(spec, options), seen[0]
 
 
@@ -335,14 +333,14 @@ def test_the_published_cases_are_certified_and_the_reference_rows_met(case, monk
         drift=Drift.SUM,
     )
     a, split, least, sampled, limit = CASES[case]
-    found = search_26(row).pair.recipe
+    found = judged_26(row).pair.recipe
     assert (float(found.bandwidth), float(found.adaptation_rate)) == pytest.approx(a, rel=0.03)
-    best = search_distance(replace(row, A_m=None, drift=Drift.PLAN))
+    best = judged_distance(replace(row, A_m=None, drift=Drift.PLAN))
     assert float(best.split.recipe.bandwidth) == pytest.approx(split, rel=0.03)
     pair = best.least_adaptation.recipe
     assert float(pair.bandwidth) == pytest.approx(least[0], rel=0.03)
     assert float(pair.adaptation_rate) == pytest.approx(least[1], rel=0.1)
-    c = search_sampled(replace(row, drift=Drift.PLAN))
+    c = judged_sampled(replace(row, drift=Drift.PLAN))
     assert (float(c.pair.recipe.bandwidth), float(c.pair.recipe.sample_time)) == pytest.approx(
         sampled, rel=0.03
     )

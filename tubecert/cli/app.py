@@ -13,6 +13,7 @@ import typer
 from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
 from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
+from tubecert.kinds import NAMES
 
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
@@ -60,13 +61,9 @@ app = typer.Typer(
 )
 
 
-class Conditions(StrEnum):
-    """Which certificates must hold."""
-
-    PAPER = "26"
-    DISTANCE = "distance"
-    SAMPLED = "sampled"
-    ALL = "all"
+# which certificates must hold: one choice per kind
+Conditions = StrEnum("Conditions", [(n.key, n.option) for n in NAMES] + [("all", "all")])  # type: ignore[misc]
+_DECIDES = Conditions(NAMES[0].option)
 
 
 class Formulas(StrEnum):
@@ -101,7 +98,7 @@ def certify(
     ] = None,
     conditions: Annotated[
         Conditions, typer.Option(help="Which certificates decide the verdict; all are always computed.")
-    ] = Conditions.PAPER,
+    ] = _DECIDES,
     formulas: Annotated[
         Formulas, typer.Option(help="Corrected formulas, or the paper's own (proves nothing).")
     ] = Formulas.CORRECTED,

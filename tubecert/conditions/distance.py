@@ -19,8 +19,10 @@ import numpy as np
 from tubecert.conditions.arithmetic import Array, T, least_solution, maximum, minimum, quiet, sqrt, vector
 from tubecert.conditions.derived import prediction_error
 from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.predictor import Predictor, predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.theorem import Theorem
 from tubecert.enclosure.interval import Interval
 
 _RISES = 200  # iterations towards the least fixed point from below; any number of them is sound
@@ -46,11 +48,6 @@ class DistanceState(Generic[T]):
     Y: T
     e: T
     S: T
-
-
-def reach(n: Numbers[T]) -> T:
-    """The distance that cannot be reached inside the tube: dbar = sqrt(a) rho."""
-    return sqrt(n.a) * n.rho
 
 
 @quiet
@@ -92,11 +89,6 @@ def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
     return DistanceBound(
         d0=n.d0, beta=n.beta, H0=n.H0, S=S, e=e, delta=n.delta, lam=n.lam, omega=omega, horizon=n.horizon
     )
-
-
-def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
-    """The margin (dbar - sup D)/dbar of one recipe; its lower end is -inf if the recipe is invalid."""
-    return margin_distance_along(problem, [recipe])[0]
 
 
 @quiet
@@ -171,3 +163,21 @@ def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     n = problem.proven(recipe.projection_radius)
     S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
     return float((distance_bound(n, Interval.of(recipe.bandwidth), S, e).ultimate() / sqrt(n.a)).hi)
+
+
+def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
+    """Everything that theorem B compares, at some gains."""
+    one = np.asarray(1.0)
+    p = predictor(problem.A_m, one, one)
+    S = uncertainty(n, least_speed(n, one, one), one)
+    return filter_error(n, one, one, p), distance_bound(n, one, S, one).supremum() < reach(n)
+
+
+THEOREM = Theorem(
+    recipe=DistanceRecipe,
+    margins=lambda problem, recipes: {"distance": margin_distance_along(problem, recipes)},
+    ceilings=lambda problem, recipe: {"distance": distance_ceiling(problem, recipe)},
+    formula=_at_once,
+    obstacles=obstacles,
+    ultimate=ultimate_radius,
+)

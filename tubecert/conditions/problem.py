@@ -38,14 +38,6 @@ class Formulas(StrEnum):
     AS_PRINTED = "as-printed"
 
 
-class Certificate(StrEnum):
-    """The three certificates by the names of their conditions."""
-
-    RATES = "26"
-    DISTANCE = "distance"
-    SAMPLED = "sampled"
-
-
 class Drift(StrEnum):
     """How the known part of |xdot| is bounded: sup |f + B u*| or sup |f| + sup |B| sup |u*|."""
 
@@ -114,20 +106,6 @@ FIELDS = {
     "excess": "contraction_excess",
 }
 _INFIMA = {"a", "smin"}
-
-# what the formulas of each certificate contain (certificate A: and what its options choose)
-NEEDED_BY_ALL = frozenset(
-    {"lower", "B", "B_pinv", "h", "h_x", "h_t", "initial_distance", "plan_defect_metric"}
-)
-_IN_26 = NEEDED_BY_ALL | {"upper", "f_x", "B_x", "b_x", "B_pinv_x", "M_x", "u_star"}
-_IN_DISTANCE = NEEDED_BY_ALL | {
-    "B_pinv_x",
-    "h_initial",
-    "feedback_gain",
-    "metric_input_gain",
-    "drift_on_plan",
-}
-_IN_SAMPLED = _IN_DISTANCE | {"B_x"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,16 +180,6 @@ class TubeProblem:
         """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly."""
         layer = Fraction(0) if clips or self.smooth is None else self.smooth
         return R_H > 0 and (1 + layer) * Fraction(self.constants.h.above) ** 2 <= R_H**2
-
-    def unbounded(self, certificate: Certificate) -> tuple[str, ...]:
-        """The constants that a certificate needs and that have no finite bound, by field name."""
-        if certificate is Certificate.RATES:
-            drift = {"drift_on_plan"} if self.drift == Drift.PLAN else {"f"}
-            gain = {"input_gain_least", "contraction_excess"} if self.as_printed else {"feedback_gain"}
-            names = _IN_26 | drift | gain
-        else:
-            names = _IN_DISTANCE if certificate is Certificate.DISTANCE else _IN_SAMPLED
-        return tuple(sorted(x for x in names if not np.isfinite(getattr(self.constants, x).above)))
 
     def floats(self, R_H: Fraction | None = None) -> Numbers[Array]:
         """The safe side in floats, for the search."""

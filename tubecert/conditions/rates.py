@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant
-from tubecert.conditions.arithmetic import T, choose, number, quiet, sqrt, vector
+from tubecert.conditions.arithmetic import Array, T, choose, number, quiet, sqrt, vector
 from tubecert.conditions.derived import (
     RateTerms,
     filter_error,
@@ -24,6 +24,8 @@ from tubecert.conditions.derived import (
 )
 from tubecert.conditions.predictor import predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.verdict import UNKNOWN, Shortfall
 from tubecert.enclosure.interval import Interval
 
 Margins = dict[str, Interval]
@@ -37,12 +39,6 @@ class RateRecipe:
     adaptation_rate: Fraction
     predictor_gain: Fraction | None
     projection_radius: Fraction
-
-
-def margins_26(problem: TubeProblem, recipe: RateRecipe) -> Margins:
-    """Margins of (26a), (26b), (26c), scalars. Implements: (26a)-(26c)."""
-    many = margins_26_along(problem, [recipe])
-    return {claim: margin[0] for claim, margin in many.items()}
 
 
 @quiet
@@ -117,3 +113,44 @@ def _derived(
         "zeta_2": z.zeta2.sanitised(),
         "zeta_3": z.zeta3.sanitised(),
     }
+
+
+def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
+    """All of (26a)-(26c) at some gains."""
+    one = np.asarray(1.0)
+    return rate_margins(problem, n, one, one, one)
+
+
+def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """Why no bandwidth serves, if so: the initial error and the plan's defect alone need rho_r^2 <= E0/a + zeta_p."""
+    margins, needed = [], []
+    for n in (problem.proven(), problem.enclosed()):
+        terms = rate_terms(problem, n)
+        needed.append(terms.E0 / n.a + terms.zeta_p)
+        margins.append(1.0 - needed[-1] / n.rho_r**2)
+    low, high = margins
+    if low.lo > 0:
+        return ()
+    return (
+        Shortfall(
+            claim="26a",
+            margin=Interval(low.lo, np.maximum(low.lo, high.hi)),
+            allowed=float((problem.proven().rho_r ** 2).lo),
+            needed=float(needed[0].hi),
+        ),
+    )
+
+
+def _provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """Several of the paper's printed formulas are wrong: they prove nothing."""
+    return (Shortfall(claim="corrected_formulas", margin=UNKNOWN),) if problem.as_printed else ()
+
+
+THEOREM = Theorem(
+    recipe=RateRecipe,
+    margins=margins_26_along,
+    ceilings=lambda problem, recipe: {},  # a recipe is its gains: the upper ends hold for all there is
+    formula=_at_once,
+    obstacles=_obstacles,
+    provisos=_provisos,
+)

@@ -15,6 +15,7 @@ from typing import Generic
 import numpy as np
 
 from tubecert.conditions.arithmetic import (
+    Array,
     T,
     confined,
     decay_mean,
@@ -28,9 +29,11 @@ from tubecert.conditions.arithmetic import (
     sqrt,
     vector,
 )
-from tubecert.conditions.distance import drift_bound, least_from_below, reach
+from tubecert.conditions.distance import drift_bound, least_from_below
 from tubecert.conditions.kernels import DistanceBound
+from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.theorem import Theorem
 from tubecert.enclosure.interval import Interval
 
 
@@ -134,11 +137,6 @@ def _bound(n: Numbers[T], omega: T, s: SampledState[T]) -> DistanceBound[T]:
     )
 
 
-def margin_sampled(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
-    """The margin (dbar - max(d0, d1, sup D))/dbar of one recipe; its lower end is -inf if Y fails."""
-    return margin_sampled_along(problem, [recipe])[0]
-
-
 @quiet
 def margin_sampled_along(problem: TubeProblem, recipes: Sequence[SampledRecipe]) -> Interval:
     """Margins of many recipes at once, shape `(len(recipes),)`; recipes share the projection radius."""
@@ -176,3 +174,22 @@ def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float:
     Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
     s = sampled_state(n, Ts, ages(Ts, omega, Interval.of(recipe.predictor_gain)), Interval.of(recipe.speed))
     return float((_bound(n, omega, s).ultimate() / sqrt(n.a)).hi)
+
+
+def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
+    """Everything that theorem C compares, at some gains."""
+    del problem
+    one = np.asarray(1.0)
+    age = ages(one, one, one)
+    Y = least_speed(n, one, age)
+    return speed_needed(n, sampled_state(n, one, age, Y)), sampled_supremum(n, one, one, age, Y) < reach(n)
+
+
+THEOREM = Theorem(
+    recipe=SampledRecipe,
+    margins=lambda problem, recipes: {"sampled": margin_sampled_along(problem, recipes)},
+    ceilings=lambda problem, recipe: {"sampled": sampled_ceiling(problem, recipe)},
+    formula=_at_once,
+    obstacles=obstacles,
+    ultimate=ultimate_radius,
+)

@@ -34,14 +34,6 @@ class Shortfall:
         return None if self.allowed is None or self.needed is None else self.needed - self.allowed
 
 
-def verdict(margins: Iterable[Interval]) -> Verdict:
-    """Certified if every margin is proven positive, refuted if one is proven not to be, else undecided."""
-    values = list(margins)
-    if all(margin.lo > 0 for margin in values):
-        return Verdict.CERTIFIED
-    return Verdict.REFUTED if any(margin.hi <= 0 for margin in values) else Verdict.UNDECIDED
-
-
 UNKNOWN = Interval(-np.inf, np.inf)
 
 NOTHING_FOUND = (Shortfall(claim="proven_gains", margin=UNKNOWN),)

@@ -19,14 +19,13 @@ from tubecert.findings import Severity
 from tubecert.model import domain_findings
 from tubecert.pipeline.certification import Certification, Result
 from tubecert.pipeline.checks import inspect, missing_parts, time_of
-from tubecert.pipeline.options import CONDITIONS, Options, Progress, Step, overridden
+from tubecert.pipeline.options import Options, Progress, Step, overridden
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
 from tubecert.synthesis.bridge import required
 
 __all__ = [
-    "CONDITIONS",
     "Options",
     "Progress",
     "Result",

@@ -51,11 +51,12 @@ from tubecert.claims import (
     UncertaintyBound,
 )
 from tubecert.conditions.kernels import Kernel
-from tubecert.conditions.problem import NEEDED_BY_ALL, Drift, Formulas, TubeProblem
+from tubecert.conditions.problem import Drift, Formulas, TubeProblem
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import unique_geodesics
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import TIME, ControlAffineModel, build, rank_decision
@@ -235,16 +236,18 @@ class Certification:
         self.result["constants"] = {
             name: constant_data(value, meaning) for name, value, meaning in constants.items()
         }
-        if not (self._finite(constants) and self._declared_holds(suprema, declared)):
+        problem = self._problem(suprema, radius, constants)
+        if not (self._finite(problem) and self._declared_holds(suprema, declared)):
             return
         self._tube(suprema, radius)
         self._geodesics(suprema)
-        self._search(self._problem(suprema, radius, constants))
+        self._search(problem)
 
-    def _finite(self, constants: BoundConstants) -> bool:
+    def _finite(self, problem: TubeProblem) -> bool:
         """Whether what every certificate needs is bounded; what only some of them need is for those to say."""
-        for name, value, _ in constants.items():
-            if name in NEEDED_BY_ALL and not math.isfinite(value.above):
+        needed = needed_by_all(problem)
+        for name, value, _ in problem.constants.items():
+            if name in needed and not math.isfinite(value.above):
                 return self._stop(ConstantBounded(constant=name), "undecided", value.at, UNBOUNDED_RELAX)
         return True
 

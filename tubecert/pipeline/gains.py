@@ -1,82 +1,59 @@
-"""Gains of certificates A, B and C for one problem, with their proofs, what limits them, and the verdict."""
+"""Gains of every kind for one problem: searches propose, the kernel decides, the kinds write their sections."""
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 from tubecert.bounds.constants import DERIVED
 from tubecert.certificate.sections import constant_data
 from tubecert.conditions.problem import Formulas, TubeProblem
-from tubecert.conditions.rates import derived_constants
-from tubecert.pipeline.options import CONDITIONS, Options
-from tubecert.pipeline.reasons import reasons_26, reasons_distance, reasons_sampled
-from tubecert.search.distance import search_distance
-from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
-from tubecert.search.margins import margins_26_around, margins_distance_around
-from tubecert.search.rates import search_26
-from tubecert.search.results import recipe_json
-from tubecert.search.sampled import search_sampled
-
-_ORDER = ("refuted", "undecided", "certified")
+from tubecert.conditions.proposal import Asked
+from tubecert.conditions.verdict import Verdict
+from tubecert.kernel import overall
+from tubecert.kinds.kind import Kind, Section, recipe_json
+from tubecert.kinds.table import KINDS, kind_of
+from tubecert.pipeline.options import Options
+from tubecert.pipeline.reasons import reasons
+from tubecert.search.proposers import PROPOSERS, Explained
 
 
 def gains(problem: TubeProblem, options: Options) -> dict[str, Any]:
-    """Sections of the result; those conditions that were chosen decide its `verdict`.
+    """Sections of the result; those kinds that were chosen decide its `verdict`.
 
     `constants` holds the derived constants only, `reasons` those of the deciding sections.
     """
-    asked = {"bandwidth": options.bandwidth, "adaptation_rate": options.adaptation_rate}
-    rates = search_26(problem, **asked)
-    distance = search_distance(problem, **asked)
-    sampled = search_sampled(problem, bandwidth=options.bandwidth)
-    derived = {} if rates.pair is None else derived_constants(problem, rates.pair.recipe)
-    slopes = {
-        "conditions_26": elasticities_26(problem, rates),
-        "distance": elasticities_distance(problem, distance),
-    }
-    explained = {
-        "conditions_26": reasons_26(rates, halving(problem, slopes["conditions_26"], _least_26)),
-        "distance": reasons_distance(distance, halving(problem, slopes["distance"], _least_distance)),
-        "sampled": reasons_sampled(sampled),
-    }
-    sections: dict[str, Any] = {
-        "conditions_26": rates.to_dict(),
-        "distance": distance.to_dict(),
-        "sampled": sampled.to_dict(),
-    }
-    pairs = {"conditions_26": rates.pair, "distance": distance.decisive, "sampled": sampled.pair}
-    if rates.pair is not None:
-        sections["conditions_26"]["margins_around"] = margins_26_around(problem, rates.pair)
-    if distance.decisive is not None:
-        sections["distance"]["margins_around"] = margins_distance_around(problem, distance.decisive)
-    chosen = list(CONDITIONS.values()) if options.conditions == "all" else [CONDITIONS[options.conditions]]
-    verdicts = {sections[name]["verdict"] for name in chosen}
-    deciding = chosen
-    if options.formulas == Formulas.AS_PRINTED:
-        verdicts, deciding = {"undecided"}, list(dict.fromkeys(["conditions_26", *chosen]))
+    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
+    sections: dict[str, Section[Any]] = {}
+    explained: dict[str, Explained] = {}
+    for kind in KINDS:
+        proposer = PROPOSERS[kind.theorem.recipe]
+        proposal = proposer.propose(problem, asked)
+        sections[kind.key] = kind.section(problem, proposal)
+        explained[kind.key] = proposer.explain(problem, proposal)
+    chosen = [kind.key for kind in _deciding(options)]
+    printed = options.formulas == Formulas.AS_PRINTED
+    told = list(dict.fromkeys([KINDS[0].key, *chosen])) if printed else chosen
     return {
-        **sections,
+        **{key: section.to_json() for key, section in sections.items()},
         "constants": {
-            name: constant_data(value.printable(), DERIVED[name]) for name, value in derived.items()
+            name: constant_data(value.printable(), DERIVED[name])
+            for kind in KINDS
+            for name, value in kind.derived(sections[kind.key]).items()
         },
-        "elasticities": slopes,
+        "elasticities": {key: each.slopes for key, each in explained.items() if each.slopes is not None},
         "proof": {
-            name: recipe_json(pair.recipe)
-            for name, pair in pairs.items()
-            if pair is not None and sections[name]["verdict"] == "certified"
+            key: recipe_json(section.proof.recipe)
+            for key, section in sections.items()
+            if section.proof is not None
         },
         "decided_by": chosen,
-        "reasons": [reason for name in deciding for reason in explained[name]],
-        "verdict": next(word for word in _ORDER if word in verdicts),
+        "reasons": [
+            reason for key in told for reason in reasons(sections[key], explained[key].halved or {})
+        ],
+        "verdict": str(Verdict.UNDECIDED if printed else overall([sections[key].verdict for key in chosen])),
     }
 
 
-def _least_26(problem: TubeProblem) -> Fraction | None:
-    pair = search_26(problem).least_adaptation
-    return None if pair is None else pair.recipe.adaptation_rate
-
-
-def _least_distance(problem: TubeProblem) -> Fraction | None:
-    pair = search_distance(problem).least_adaptation
-    return None if pair is None else pair.recipe.adaptation_rate
+def _deciding(options: Options) -> tuple[Kind[Any], ...]:
+    """The kinds that the verdict is about."""
+    return KINDS if options.conditions == "all" else (kind_of(options.conditions),)

@@ -12,8 +12,6 @@ from typing import Any
 from tubecert.certificate.sections import decimal_data
 from tubecert.spec import Spec
 
-CONDITIONS = {"26": "conditions_26", "distance": "distance", "sampled": "sampled"}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:

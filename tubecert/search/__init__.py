@@ -1,6 +1,5 @@
-"""Search: `TubeProblem` -> the smallest gains, trade-off curves, what binds, and recipes.
+"""Search: `TubeProblem` -> proposals: the smallest gains, trade-off curves, recipes. The kernel decides about them.
 
-In: a problem and, possibly, gains asked for. Out: results whose every pair was verified by `conditions` at
-its printed decimals. Trusted: no, and it need not be. Implements: section "Closed form" of certificate A,
-"Search and proof" of B.
+In: a problem and, possibly, gains asked for. Out: proposals, and what explains a result. Trusted: no, and it need not
+be. Implements: section "Closed form" of certificate A, "Search and proof" of B.
 """

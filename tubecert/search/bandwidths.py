@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array, quiet
+from tubecert.conditions.decimals import round_up
 from tubecert.conditions.derived import RateTerms, rate_terms, zetas
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.search.scan import smallest
 from tubecert.search.windows import Window, intersection, windows
 
+_POINTS, _DIGITS = 41, 4  # of the bandwidths around one
+_BELOW, _ABOVE = 0.4, 6.0  # times that one
 _LOWEST = 1e-3  # the least bandwidth considered, in units of the rate
 
 
@@ -84,3 +88,9 @@ def bandwidths(s: RateSearch, share_left: float) -> list[Bandwidth]:
     # the condition whose own interval begins at the common lower end is the one that binds
     starts = {low for low, _ in second}
     return [Bandwidth(low=low, high=high, binds="26b" if low in starts else "26a") for low, high in common]
+
+
+def bandwidths_around(omega: Fraction) -> list[Fraction]:
+    """Printed bandwidths around one, which is among them; ascending, without repetitions."""
+    factors = np.geomspace(_BELOW, _ABOVE, _POINTS)
+    return sorted({omega, *(round_up(float(omega) * float(factor), _DIGITS) for factor in factors)})

@@ -16,13 +16,13 @@ from tubecert.conditions import distance as theorem_b
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.obstacles import reach
 from tubecert.conditions.predictor import Predictor, predictor
-from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
-from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
-from tubecert.enclosure.interval import Interval
-from tubecert.search.obstacles import obstacles
-from tubecert.search.results import DistancePair, DistanceResult
-from tubecert.search.scan import boundary, minimum_lanes, minimum_log, smallest
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.kernel import obstacles
+from tubecert.search.bandwidths import bandwidths_around
+from tubecert.search.scan import boundary, minimum_lanes, minimum_log, serves, smallest
 
 DIGITS = 4
 CURVE_POINTS = 25
@@ -54,11 +54,9 @@ def least_rate(
 
     def inside(e: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         Y = theorem_b.least_speed(n, omega, e)
-        return theorem_b.distance_bound(
-            n, omega, theorem_b.uncertainty(n, Y, omega), e
-        ).supremum() < theorem_b.reach(n)
+        return theorem_b.distance_bound(n, omega, theorem_b.uncertainty(n, Y, omega), e).supremum() < reach(n)
 
-    most = np.broadcast_to((theorem_b.reach(n) * n.lam - n.delta) / n.beta, omega.shape)
+    most = np.broadcast_to((reach(n) * n.lam - n.delta) / n.beta, omega.shape)
     zero = np.zeros_like(omega)
     feasible = (most > 0) & inside(zero)
     e_max = boundary(inside, zero, np.where(feasible, most, 0.0)) * (1 - _SLACK)
@@ -127,27 +125,24 @@ def recipes_at(
     ]
 
 
-def prove(
+def recipes_served(
     problem: TubeProblem,
     bandwidths: Sequence[Fraction],
     rates: Sequence[Fraction],
     gains: Sequence[Fraction | None],
-) -> list[DistancePair]:
-    """The best recipe found at each pair of gains, with its margin (-inf below if no recipe is valid)."""
+) -> list[DistanceRecipe]:
+    """The best recipes found at given pairs of gains; where they serve at all, their inequalities have room."""
     for inflation in (1e-9, 1e-6, 1e-3):
         recipes = recipes_at(problem, bandwidths, rates, gains, inflation)
         margin = theorem_b.margin_distance_along(problem, recipes)
         if np.all(margin.lo > -np.inf):
             break
-    return [DistancePair(recipe=recipe, margin=margin[i]) for i, recipe in enumerate(recipes)]
+    return recipes
 
 
-def judged(problem: TubeProblem, omega: Fraction, Gamma: Fraction, g: Fraction | None) -> DistancePair:
-    """One pair of gains: margin proven below by a recipe and bounded above for every recipe."""
-    pair = prove(problem, [omega], [Gamma], [g])[0]
-    ceiling = max(theorem_b.distance_ceiling(problem, pair.recipe), float(pair.margin.lo))
-    radius = theorem_b.ultimate_radius(problem, pair.recipe) if pair.margin.lo > 0 else None
-    return replace(pair, margin=Interval(pair.margin.lo, np.asarray(ceiling)), ultimate_radius=radius)
+def recipe_at(problem: TubeProblem, omega: Fraction, Gamma: Fraction, g: Fraction | None) -> DistanceRecipe:
+    """The best recipe found at one pair of gains."""
+    return recipes_served(problem, [omega], [Gamma], [g])[0]
 
 
 def printed_gain(problem: TubeProblem, n: Numbers[Array], omega: Fraction, e: float) -> Fraction | None:
@@ -176,8 +171,8 @@ def printed_rates(
     ]
 
 
-def proven_at(problem: TubeProblem, omega: Fraction) -> DistancePair | None:
-    """The pair of least Gamma at a printed bandwidth, or None if no Gamma serves there."""
+def least_at(problem: TubeProblem, omega: Fraction) -> DistanceRecipe | None:
+    """The recipe of least Gamma at a printed bandwidth, or None if no Gamma serves there."""
     for w, Gamma, g in printed_rates(problem, [omega]):
         # more than the least rate is needed only where rounding decides
         for rate in (
@@ -185,87 +180,84 @@ def proven_at(problem: TubeProblem, omega: Fraction) -> DistancePair | None:
             next_up(Gamma, DIGITS),
             *(round_up(x * float(Gamma), DIGITS) for x in (1.01, 2.0)),
         ):
-            if prove(problem, [w], [rate], [g])[0].margin.lo > 0:
-                return judged(problem, w, rate, g)
+            recipe = recipe_at(problem, w, rate, g)
+            if serves(problem, recipe):
+                return recipe
     return None
 
 
-def pair_from(problem: TubeProblem, omega: float, high: float = np.inf) -> DistancePair | None:
-    """The pair at the first printed bandwidth that is proven; more digits only if 4 overshoot `high`."""
+def recipe_from(problem: TubeProblem, omega: float, high: float = np.inf) -> DistanceRecipe | None:
+    """The recipe at the first printed bandwidth that serves; more digits only if 4 overshoot `high`."""
     if not np.isfinite(omega):
         return None
     for digits in (DIGITS, 5, 6, 8, 12):
         w = round_up(omega * (1 + _SLACK), digits)
-        if float(w) <= high and (pair := proven_at(problem, w)) is not None:
-            return pair
+        if float(w) <= high and (recipe := least_at(problem, w)) is not None:
+            return recipe
     return None
 
 
-def _curve(problem: TubeProblem, low: float) -> tuple[DistancePair, ...]:
+def _curve(problem: TubeProblem, low: float) -> tuple[DistanceRecipe, ...]:
     bandwidths = [round_up(w, DIGITS) for w in np.geomspace(1.02 * low, 20 * low, CURVE_POINTS)]
     points = printed_rates(problem, bandwidths)
     if not points:
         return ()
-    pairs = prove(problem, [w for w, _, _ in points], [G for _, G, _ in points], [g for _, _, g in points])
-    return tuple(pair for pair in pairs if pair.margin.lo > 0)
+    return tuple(recipes_served(problem, *map(list, zip(*points, strict=True))))
 
 
-def _asked(problem: TubeProblem, bandwidth: Fraction | None, rate: Fraction | None) -> DistancePair | None:
-    """The pair for gains asked for; what is not asked for is chosen as small as possible."""
+def _asked(problem: TubeProblem, asked: Asked) -> DistanceRecipe | None:
+    """The recipe at gains asked for; what is not asked for is chosen as small as possible."""
     n = problem.floats(problem.projection_radius)
+    bandwidth, rate = asked.bandwidth, asked.adaptation_rate
     if bandwidth is None and rate is not None:
-        low = smallest_bandwidth(n, theorem_b.reach(n))
+        low = smallest_bandwidth(n, reach(n))
         if not np.isfinite(low):
             return None
         best = minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low)
 
-        def serves(w: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        def enough(w: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
             return (least_rate(problem, n, w.ravel())[0] <= float(rate)).reshape(w.shape)
 
-        at = smallest(serves, low, best, 60)
+        at = smallest(enough, low, best, 60)
         bandwidth = round_up((at if np.isfinite(at) else best) * (1 + _SLACK), DIGITS)
-    assert bandwidth is not None
+    if bandwidth is None:
+        return None
     if rate is None:
-        return proven_at(problem, bandwidth)
+        return least_at(problem, bandwidth)
     e = least_rate(problem, n, np.array([float(bandwidth)]))[1]
-    return judged(problem, bandwidth, rate, printed_gain(problem, n, bandwidth, float(e[0])))
+    return recipe_at(problem, bandwidth, rate, printed_gain(problem, n, bandwidth, float(e[0])))
 
 
-def search_distance(
-    problem: TubeProblem, *, bandwidth: Fraction | None = None, adaptation_rate: Fraction | None = None
-) -> DistanceResult:
-    """Certificate B: proven pairs, the curve, and the verdict on the gains asked for, if any."""
-    blocked = unbounded(problem.unbounded(Certificate.DISTANCE)) or obstacles(problem)
-    if blocked:
-        return DistanceResult(verdict=verdict(item.margin for item in blocked), shortfalls=blocked)
+def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRecipe]:
+    """The pairs of least bandwidth and of least Gamma, the curve, and the gains asked for, which then decide."""
+    if obstacles(problem, theorem_b.THEOREM):
+        return Proposal()
     n = problem.floats(problem.projection_radius)
-    low = smallest_bandwidth(n, theorem_b.reach(n))
-    split = pair_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r))
+    low = smallest_bandwidth(n, reach(n))
     best = minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low) if np.isfinite(low) else np.inf
-    result = DistanceResult(
-        verdict=Verdict.UNDECIDED,
-        split=split,
-        least_adaptation=pair_from(problem, best),
-        curve=_curve(problem, low) if np.isfinite(low) else (),
-    )
-    if bandwidth is None and adaptation_rate is None:
-        found = result.decisive is not None
-        return (
-            replace(result, verdict=Verdict.CERTIFIED) if found else replace(result, shortfalls=NOTHING_FOUND)
-        )
-    asked = _asked(problem, bandwidth, adaptation_rate)
-    return _decided(problem, replace(result, asked=asked), bandwidth)
+    found = {
+        "least_adaptation": recipe_from(problem, best),
+        "split": recipe_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r)),
+    }
+    roles = {role: recipe for role, recipe in found.items() if recipe is not None}
+    whole = Proposal(beside=roles, curve=_curve(problem, low) if np.isfinite(low) else ())
+    if asked.bandwidth is None and asked.adaptation_rate is None:
+        role = next(iter(roles), "")
+        decisive = roles.pop(role, None)
+        return replace(whole, decisive=decisive, role=role, around=_around(problem, decisive))
+    decisive = _asked(problem, asked)
+    if decisive is not None:
+        return replace(whole, decisive=decisive, role="asked", around=_around(problem, decisive))
+    if asked.bandwidth is None:
+        return whole
+    g = asked.bandwidth if problem.A_m is None else problem.predictor_gain
+    return replace(whole, hopeless=recipe_at(problem, asked.bandwidth, _ENDLESS, g))
 
 
-def _decided(problem: TubeProblem, result: DistanceResult, bandwidth: Fraction | None) -> DistanceResult:
-    """The verdict on the pair asked for; without one, the ceiling of an arbitrarily large rate decides."""
-    asked = result.asked
-    if asked is None and bandwidth is not None:
-        g = bandwidth if problem.A_m is None else problem.predictor_gain
-        margin = judged(problem, bandwidth, _ENDLESS, g).margin
-        refuted = Verdict.REFUTED if margin.hi <= 0 else Verdict.UNDECIDED
-        return replace(result, verdict=refuted, shortfalls=(Shortfall(claim="distance", margin=margin),))
-    if asked is None:
-        return replace(result, shortfalls=NOTHING_FOUND)
-    short = () if asked.margin.lo > 0 else (Shortfall(claim="distance", margin=asked.margin),)
-    return replace(result, verdict=verdict([asked.margin]), shortfalls=short)
+def _around(problem: TubeProblem, recipe: DistanceRecipe | None) -> tuple[DistanceRecipe, ...]:
+    """The same rate and predictor at other bandwidths."""
+    if recipe is None:
+        return ()
+    omegas = bandwidths_around(recipe.bandwidth)
+    rates, gains = [recipe.adaptation_rate] * len(omegas), [recipe.predictor_gain] * len(omegas)
+    return tuple(recipes_served(problem, omegas, rates, gains))

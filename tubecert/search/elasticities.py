@@ -15,36 +15,36 @@ import numpy as np
 from tubecert.bounds.constants import Constant
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.derived import rate_terms
+from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
+from tubecert.conditions.rates import RateRecipe
 from tubecert.search.bandwidths import RateSearch
 from tubecert.search.distance import least_rate
 from tubecert.search.rates import gains_along, needed_rate
-from tubecert.search.results import Conditions26, DistanceResult
 
 _STEP = 1e-4
 _GIVEN = frozenset({"lower", "upper", "B", "B_x", "b_x", "B_pinv", "B_pinv_x", "metric_input_gain"})
 
 
-def elasticities_distance(problem: TubeProblem, result: DistanceResult) -> dict[str, float]:
-    """By constant, for certificate B's pair of least Gamma; empty if there is none."""
-    if result.least_adaptation is None:
+def elasticities_distance(problem: TubeProblem, least: DistanceRecipe | None) -> dict[str, float]:
+    """By constant, for certificate B's gains of least Gamma; empty if there are none."""
+    if least is None:
         return {}
     n, lanes = _perturbed(problem)
-    omega = np.full(lanes, float(result.least_adaptation.recipe.bandwidth))
+    omega = np.full(lanes, float(least.bandwidth))
     return _slopes(least_rate(problem, n, omega)[0])
 
 
-def elasticities_26(problem: TubeProblem, result: Conditions26) -> dict[str, float]:
-    """By constant, for certificate A's pair of least Gamma; empty if there is none.
+def elasticities_26(problem: TubeProblem, least: RateRecipe | None) -> dict[str, float]:
+    """By constant, for certificate A's gains of least Gamma; empty if there are none.
 
-    Where (26a) fixes the bandwidth of that pair, the constants in (26a) act through the bandwidth too: not
-    counted.
+    Where (26a) fixes the bandwidth of these gains, the constants in (26a) act through the bandwidth too: not counted.
     """
-    if result.least_adaptation is None:
+    if least is None:
         return {}
     n, lanes = _perturbed(problem)
     s = RateSearch(problem=problem, n=n, terms=rate_terms(problem, n))
-    omega = np.full(lanes, float(result.least_adaptation.recipe.bandwidth))
+    omega = np.full(lanes, float(least.bandwidth))
     return _slopes(needed_rate(s, omega, gains_along(s, omega)))
 
 

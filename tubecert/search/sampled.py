@@ -7,7 +7,6 @@ Implements: theory section 4b.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -15,14 +14,13 @@ import numpy as np
 from tubecert.conditions import sampled as theorem_c
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import round_down, round_up
-from tubecert.conditions.distance import reach
-from tubecert.conditions.problem import Certificate, Numbers, TubeProblem
+from tubecert.conditions.obstacles import reach
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.proposal import Asked, SampledProposal
 from tubecert.conditions.sampled import SampledRecipe
-from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded, verdict
-from tubecert.enclosure.interval import Interval
-from tubecert.search.obstacles import obstacles
-from tubecert.search.results import SampledPair, SampledResult
+from tubecert.kernel import obstacles
 from tubecert.search.scan import largest
+from tubecert.search.scan import serves as all_positive
 
 DIGITS = 4
 CURVE_POINTS = 25
@@ -80,26 +78,25 @@ def recipes_at(
     ]
 
 
-def prove(problem: TubeProblem, gains: Sequence[tuple[Fraction, Fraction, Fraction]]) -> list[SampledPair]:
-    """The best recipe found at each (Ts, omega, g), with its margin (-inf below if no recipe is valid)."""
+def recipes_served(
+    problem: TubeProblem, gains: Sequence[tuple[Fraction, Fraction, Fraction]]
+) -> list[SampledRecipe]:
+    """The best recipes found at (Ts, omega, g); where they serve at all, their inequalities have room."""
     for inflation in (1e-9, 1e-6, 1e-3):
         recipes = recipes_at(problem, gains, inflation)
         margin = theorem_c.margin_sampled_along(problem, recipes)
         if np.all(margin.lo > -np.inf):
             break
-    return [SampledPair(recipe=recipe, margin=margin[i]) for i, recipe in enumerate(recipes)]
+    return recipes
 
 
-def judged(problem: TubeProblem, Ts: Fraction, omega: Fraction, g: Fraction) -> SampledPair:
-    """One sample time: margin proven below by a recipe and bounded above for every recipe."""
-    pair = prove(problem, [(Ts, omega, g)])[0]
-    ceiling = max(theorem_c.sampled_ceiling(problem, pair.recipe), float(pair.margin.lo))
-    radius = theorem_c.ultimate_radius(problem, pair.recipe) if pair.margin.lo > 0 else None
-    return replace(pair, margin=Interval(pair.margin.lo, np.asarray(ceiling)), ultimate_radius=radius)
+def recipe_at(problem: TubeProblem, Ts: Fraction, omega: Fraction, g: Fraction) -> SampledRecipe:
+    """The best recipe found at one sample time."""
+    return recipes_served(problem, [(Ts, omega, g)])[0]
 
 
-def _pair(problem: TubeProblem, n: Numbers[Array], bandwidth: Fraction | None) -> SampledPair | None:
-    """The largest printed sample time that is proven, at the bandwidth given or at omega = 1/Ts."""
+def _longest(problem: TubeProblem, n: Numbers[Array], bandwidth: Fraction | None) -> SampledRecipe | None:
+    """The largest printed sample time that serves, at the bandwidth given or at omega = 1/Ts."""
     g = problem.predictor_gain
     gain = None if g is None else np.asarray(float(g))
     omega = None if bandwidth is None else np.array([float(bandwidth)])
@@ -109,14 +106,14 @@ def _pair(problem: TubeProblem, n: Numbers[Array], bandwidth: Fraction | None) -
     for attempt in range(4):
         Ts = round_down(found * (1 - _SLACK) * (1 - attempt * 2e-4), DIGITS)
         w = round_up(1 / Ts, DIGITS) if bandwidth is None else bandwidth
-        pair = judged(problem, Ts, w, w if g is None else g)
-        if pair.margin.lo > 0:
-            return pair
+        recipe = recipe_at(problem, Ts, w, w if g is None else g)
+        if all_positive(problem, recipe):
+            return recipe
     return None
 
 
-def _curve(problem: TubeProblem, n: Numbers[Array], center: float, g: Fraction) -> tuple[SampledPair, ...]:
-    """Ts(omega) at printed, proven triples, all at the predictor gain of the pair."""
+def _curve(problem: TubeProblem, n: Numbers[Array], center: float, g: Fraction) -> tuple[SampledRecipe, ...]:
+    """Ts(omega) at printed triples, all at the predictor gain of the pair."""
     bandwidths = [round_up(w, DIGITS) for w in np.geomspace(center / 4, 64 * center, CURVE_POINTS)]
     Ts = longest(n, np.array([float(w) for w in bandwidths]), np.asarray(float(g)))
     gains = [
@@ -124,41 +121,32 @@ def _curve(problem: TubeProblem, n: Numbers[Array], center: float, g: Fraction) 
         for T, w in zip(Ts, bandwidths, strict=True)
         if T > 0
     ]
-    return tuple(pair for pair in prove(problem, gains) if pair.margin.lo > 0) if gains else ()
+    return tuple(recipes_served(problem, gains)) if gains else ()
 
 
-def search_sampled(
-    problem: TubeProblem, *, bandwidth: Fraction | None = None, sample_time: Fraction | None = None
-) -> SampledResult:
-    """Certificate C: the largest proven sample time (at a bandwidth asked for), or the verdict on one."""
-    blocked = unbounded(problem.unbounded(Certificate.SAMPLED)) or obstacles(problem)
-    if blocked:
-        return SampledResult(verdict=verdict(item.margin for item in blocked), shortfalls=blocked)
+def propose_sampled(problem: TubeProblem, asked: Asked) -> SampledProposal[SampledRecipe]:
+    """The largest sample time (at a bandwidth asked for), or the one asked for."""
+    if obstacles(problem, theorem_c.THEOREM):
+        return SampledProposal()
     n = problem.floats(problem.clipping_radius)
-    if sample_time is not None:
-        w = bandwidth if bandwidth is not None else round_up(1 / sample_time, DIGITS)
-        asked = judged(problem, sample_time, w, problem.predictor_gain or w)
-        return _decided(asked, n, problem)
-    pair = _pair(problem, n, bandwidth)
-    if pair is None and bandwidth is not None:
-        # no sample time serves at this bandwidth: the ceiling for a very short one decides
-        short = round_down(_SHORTEST / float(problem.rate), DIGITS)
-        asked = judged(problem, short, bandwidth, problem.predictor_gain or bandwidth)
-        missing = (Shortfall(claim="sampled", margin=asked.margin),)
-        refuted = Verdict.REFUTED if asked.margin.hi <= 0 else Verdict.UNDECIDED
-        return SampledResult(verdict=refuted, shortfalls=missing)
-    if pair is None:
-        return SampledResult(verdict=Verdict.UNDECIDED, shortfalls=NOTHING_FOUND)
-    return _decided(pair, n, problem)
-
-
-def _decided(pair: SampledPair, n: Numbers[Array], problem: TubeProblem) -> SampledResult:
-    g = pair.recipe.predictor_gain
-    most = limit(n, float(g))
-    return SampledResult(
-        verdict=verdict([pair.margin]),
-        pair=pair,
-        sample_time_limit=float(round_down(most, DIGITS)) if most > 0 else None,
-        curve=_curve(problem, n, float(pair.recipe.bandwidth), g),
-        shortfalls=() if pair.margin.lo > 0 else (Shortfall(claim="sampled", margin=pair.margin),),
+    if asked.sample_time is not None:
+        w = asked.bandwidth if asked.bandwidth is not None else round_up(1 / asked.sample_time, DIGITS)
+        recipe: SampledRecipe | None = recipe_at(problem, asked.sample_time, w, problem.predictor_gain or w)
+    else:
+        recipe = _longest(problem, n, asked.bandwidth)
+    if recipe is not None:
+        g = recipe.predictor_gain
+        most = limit(n, float(g))
+        return SampledProposal(
+            decisive=recipe,
+            role="pair",
+            limit=float(round_down(most, DIGITS)) if most > 0 else None,
+            curve=_curve(problem, n, float(recipe.bandwidth), g),
+        )
+    if asked.bandwidth is None:
+        return SampledProposal()
+    # no sample time serves at this bandwidth: a very short one decides
+    short = round_down(_SHORTEST / float(problem.rate), DIGITS)
+    return SampledProposal(
+        hopeless=recipe_at(problem, short, asked.bandwidth, problem.predictor_gain or asked.bandwidth)
     )

@@ -10,6 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.theorem import R
+from tubecert.kernel import margins_along
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -79,3 +83,8 @@ def minimum_lanes(
         best = values[at, lanes], grid[at, lanes]
         low, high = grid[np.maximum(at - 1, 0), lanes], grid[np.minimum(at + 1, 32), lanes]
     return best
+
+
+def serves(problem: TubeProblem, recipe: R) -> bool:
+    """Whether all margins of a recipe are positive: worth proposing."""
+    return all(bool(margin.lo[0] > 0) for margin in margins_along(problem, [recipe]).values())

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from tubecert.conditions import distance as theorem_b
+from tubecert.conditions.arithmetic import T, sqrt
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.verdict import Shortfall
 from tubecert.enclosure.interval import Interval
 
 
+def reach(n: Numbers[T]) -> T:
+    """The distance that cannot be reached inside the tube: dbar = sqrt(a) rho."""
+    return sqrt(n.a) * n.rho
+
+
 def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
     safe, whole = problem.proven(), problem.enclosed()
-    allowed = theorem_b.reach(safe), theorem_b.reach(whole)
+    allowed = reach(safe), reach(whole)
     items = (
         _obstacle("initial_distance", allowed, (safe.d0, whole.d0)),
         _obstacle("plan_defect", allowed, (_residual(safe), _residual(whole))),

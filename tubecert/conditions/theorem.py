@@ -1,0 +1,89 @@
+"""A theorem as the kernel sees it: what its recipes are, and what has to be positive for a recipe to prove it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+import numpy as np
+
+from tubecert.conditions.arithmetic import Array
+from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
+from tubecert.conditions.verdict import Shortfall
+from tubecert.enclosure.interval import Interval
+
+Margins = Mapping[str, Interval]
+"""By condition, shape `(len(recipes),)`: (allowed - needed)/allowed, a proven lower end and what it can be at most."""
+
+
+class Recipe(Protocol):
+    """The gains that a claim is about, and the auxiliary numbers of its proof, as exact decimals."""
+
+    @property
+    def bandwidth(self) -> Fraction:
+        """omega, in rad/s."""
+
+    @property
+    def predictor_gain(self) -> Fraction | None:
+        """The g of A_m = -g I; None for another A_m."""
+
+    @property
+    def projection_radius(self) -> Fraction:
+        """R_H, in units of the input."""
+
+
+R = TypeVar("R", bound=Recipe)
+
+
+def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    del problem
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Theorem(Generic[R]):
+    """What is proven in docs/theory, as functions of a problem and a recipe.
+
+    `margins`: the theorem holds with a recipe if each is positive. `ceilings`: bounds from above that hold for every
+    recipe with the same gains, so that one that is not positive refutes the gains. `obstacles`: what no gains can
+    overcome. `provisos`: why the formulas that the problem asks for prove nothing, if so. `formula`: everything that
+    the margins contain, in floats at some gains, to record which constants it needs. `ultimate`: |x - x*| is at most
+    this in the long run, for a recipe that is proven.
+    """
+
+    recipe: type[R]
+    margins: Callable[[TubeProblem, Sequence[R]], Margins]
+    ceilings: Callable[[TubeProblem, R], Mapping[str, float]]
+    formula: Callable[[TubeProblem, Numbers[Array]], object]
+    obstacles: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
+    provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
+    ultimate: Callable[[TubeProblem, R], float] | None = None
+
+    def needs(self, problem: TubeProblem) -> frozenset[str]:
+        """The constants that the formulas contain with the options of the problem, by field name; recorded."""
+        recorder = _Recorder()
+        self.formula(problem, cast("Numbers[Array]", recorder))
+        return frozenset(FIELDS[symbol] for symbol in recorder.asked if symbol in FIELDS)
+
+    def unbounded(self, problem: TubeProblem) -> tuple[str, ...]:
+        """The constants that it needs and that have no finite bound, by field name."""
+        constants = problem.constants
+        if all(np.isfinite(getattr(constants, field).above) for field in FIELDS.values()):
+            return ()
+        return tuple(sorted(x for x in self.needs(problem) if not np.isfinite(getattr(constants, x).above)))
+
+
+class _Recorder:
+    """Stands for `Numbers`: every number is 1, and it is remembered which were asked for."""
+
+    def __init__(self) -> None:
+        self.asked: set[str] = set()
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in Numbers.__slots__:
+            raise AttributeError(name)
+        # R_H is chosen from sup |h|
+        self.asked.add("Dh" if name == "R" else name)
+        return None if name == "horizon" else np.asarray(1.0)

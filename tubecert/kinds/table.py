@@ -1,0 +1,25 @@
+"""The table of kinds: what every room iterates that computes with them."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from tubecert.conditions.problem import TubeProblem
+from tubecert.kinds import name_of
+from tubecert.kinds.distance import Distance
+from tubecert.kinds.kind import Kind
+from tubecert.kinds.rates import Rates
+from tubecert.kinds.sampled import Sampled
+
+KINDS: Final[tuple[Kind[Any], ...]] = (Rates(), Distance(), Sampled())
+
+
+def kind_of(word: str) -> Kind[Any]:
+    """The kind with this key, option or letter; `KeyError` if there is none."""
+    name = name_of(word)
+    return next(kind for kind in KINDS if kind.name == name)
+
+
+def needed_by_all(problem: TubeProblem) -> frozenset[str]:
+    """The constants without which no kind can say anything, by field name."""
+    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in KINDS))

@@ -1,0 +1,54 @@
+"""Who proposes gains for which theorem, and who explains them. One table: a new kind adds its line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Final
+
+from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.sampled import SampledRecipe
+from tubecert.search.distance import propose_distance
+from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
+from tubecert.search.rates import propose_rates
+from tubecert.search.sampled import propose_sampled
+
+_LEAST = "least_adaptation"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposer:
+    """`propose` gains; `slopes`: how the least adaptation rate reacts to each constant, if there is one."""
+
+    propose: Callable[[TubeProblem, Asked], Proposal[Any]]
+    slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
+
+    def explain(self, problem: TubeProblem, proposal: Proposal[Any]) -> Explained:
+        """What the least adaptation rate depends on, in numbers that no claim rests on."""
+        if self.slopes is None:
+            return Explained()
+        slopes = self.slopes(problem, proposal.at(_LEAST))
+        return Explained(slopes=slopes, halved=halving(problem, slopes, self._least))
+
+    def _least(self, problem: TubeProblem) -> Fraction | None:
+        recipe = self.propose(problem, Asked()).at(_LEAST)
+        return None if recipe is None else Fraction(recipe.adaptation_rate)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explained:
+    """`slopes`: d log(Gamma)/d log(constant); `halved`: what halving a constant makes of Gamma. None: no such rate."""
+
+    slopes: Mapping[str, float] | None = None
+    halved: Mapping[str, float] | None = None
+
+
+PROPOSERS: Final[Mapping[type, Proposer]] = {
+    RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
+    DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
+    SampledRecipe: Proposer(propose=propose_sampled),
+}
