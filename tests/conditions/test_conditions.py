@@ -9,6 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 from problems import (
+    ALIVE,
+    alive,
     constants,
     margin_distance,
     margin_sampled,
@@ -28,49 +30,6 @@ from tubecert.conditions.sampled import ages
 from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
 from tubecert.search import distance, sampled
-
-# every term of every formula is alive
-ALIVE = {
-    "lower": 0.9,
-    "upper": 1.7,
-    "f": 3.1,
-    "f_x": 2.3,
-    "B": 1.2,
-    "B_x": 0.15,
-    "b_x": 0.11,
-    "B_pinv": 1.1,
-    "B_pinv_x": 0.13,
-    "M_x": 0.21,
-    "u_star": 0.8,
-    "h": 0.35,
-    "h_x": 0.06,
-    "h_t": 0.9,
-    "h_initial": 0.3,
-    "feedback_gain": 1.3,
-    "metric_input_gain": 1.4,
-    "drift_on_plan": 2.9,
-    "initial_distance": 0.45,  # large enough for sup D to be an interior maximum
-    "plan_defect": 0.02,
-    "plan_defect_metric": 0.02,
-    "input_gain_least": 0.8,
-    "contraction_excess": 1.9,
-}
-
-
-def alive(**options) -> TubeProblem:
-    """A synthetic problem in which every constant matters."""
-    values = ALIVE | options.pop("values", {})
-    defaults = {
-        "rate": Fraction("1.3"),
-        "epsilon": Fraction("0.5"),
-        "rho_a": Fraction("0.2"),
-        "rho_r": Fraction("0.7"),
-        "rho": Fraction("0.9"),
-        "initial_offset": 0.15,
-        "A_m": scalar_predictor("3.5", 2),
-        "states": 2,
-    }
-    return TubeProblem(constants=constants(**values), **(defaults | options))
 
 
 def recipe(omega: str, Gamma: str, g: str | None = "3.5", R_H: str = "0.35") -> RateRecipe:

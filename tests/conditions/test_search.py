@@ -9,6 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from problems import (
+    ALIVE,
+    alive,
     judged_26,
     judged_distance,
     judged_sampled,
@@ -19,7 +21,7 @@ from problems import (
     two_state,
     verdict_at,
 )
-from test_conditions import ALIVE, alive, scaled
+from test_conditions import scaled
 
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions import sampled as theorem_c

@@ -20,15 +20,22 @@ from tubecert.files import kept_folder
 from tubecert.model import build
 from tubecert.pipeline import Options, certification, certify, gains
 from tubecert.planner import cache, ilqr
+from tubecert.planner.propose import course_of, grid, knots_of, rounded
 from tubecert.planner.rollout import Dynamics
 from tubecert.spec import load, load_text
-from tubecert.trajectory.make import Room, grid, plan_of, rounded
+from tubecert.trajectory.make import Room, plan_of
 
 CONFIG = Path(__file__).parents[2] / "configs" / "two_state.yaml"
 TEXT = CONFIG.read_text(encoding="utf-8")
 SPEC = load_text(TEXT, "spec.yaml")
 MODEL = build(SPEC)
 ROOM = Room(rho=Fraction(7, 10), lower=0.2008, effort=Effort())
+
+
+def laid(spec, model, room, report=None):
+    """The plan as the pipeline makes it."""
+    course = course_of(spec, spec.trajectory.task, model, report)
+    return plan_of(spec, model, knots_of(spec, course, model, room, report))
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +153,7 @@ def test_times_are_decimals_and_end_at_the_horizon():
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
     spec = edited(("  goal: true", f"  interpolation: {interpolation}\n  goal: true"))
-    plan = plan_of(spec, MODEL, ROOM)
+    plan = laid(spec, MODEL, ROOM)
     assert plan.knots.interpolation == interpolation
     assert len(plan.pieces) > 100
     from tubecert.trajectory.defect import Defect
@@ -160,12 +167,12 @@ def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
 
 def test_a_smaller_tube_asks_for_more_sub_knots():
     small = replace(ROOM, rho=Fraction(7, 1000))
-    assert len(plan_of(SPEC, MODEL, small).pieces) > len(plan_of(SPEC, MODEL, ROOM).pieces)
+    assert len(laid(SPEC, MODEL, small).pieces) > len(laid(SPEC, MODEL, ROOM).pieces)
 
 
 def test_the_planner_may_start_elsewhere_than_the_state():
     spec = edited(("  target: [0, 0]", "  target: [0, 0]\n  start: [3.3, -2.4]"))
-    plan = plan_of(spec, MODEL, ROOM)
+    plan = laid(spec, MODEL, ROOM)
     assert plan.knots.x[0] == (Fraction(33, 10), Fraction(-12, 5))
     assert spec.x0 == (Fraction(17, 5), Fraction(-12, 5))
 
@@ -181,10 +188,10 @@ metric: {rate: 0.5, dual_metric: [[1]]}
 tube: {epsilon: 0.5, rho_a: 0.1}
 trajectory: {kind: ilqr, start: [1], target: [1], horizon: 2, knots: 11}
 """
-    plan = plan_of(load_text(text), build(load_text(text)), ROOM)
+    plan = laid(load_text(text), build(load_text(text)), ROOM)
     assert [float(u) for (u,) in plan.knots.u] == pytest.approx([1.0] * 11)
     held = load_text(text.replace("target: [1],", "target: [1], goal: false, input: [0],"))
-    assert float(plan_of(held, build(held), ROOM).knots.u[0][0]) < 0.9
+    assert float(laid(held, build(held), ROOM).knots.u[0][0]) < 0.9
 
 
 @pytest.mark.parametrize(
@@ -206,10 +213,10 @@ trajectory: {{kind: ilqr, target: [0], {options}}}
 """
     spec = load_text(text, "spec.yaml")
     if code is None:
-        assert plan_of(spec, build(spec), ROOM).horizon == 1
+        assert laid(spec, build(spec), ROOM).horizon == 1
         return
     with pytest.raises(SpecError) as caught:
-        plan_of(spec, build(spec), ROOM)
+        laid(spec, build(spec), ROOM)
     (finding,) = caught.value.findings
     assert caught.value.exit_code is ExitCode.INVALID
     assert finding.code == code
@@ -228,7 +235,7 @@ trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 1, knots: 11}
 """
     spec = load_text(text, "spec.yaml")
     with pytest.raises(SpecError, match="misses the target by") as caught:
-        plan_of(spec, build(spec), ROOM)
+        laid(spec, build(spec), ROOM)
     assert caught.value.findings[0].code == "TC402"
     assert "goal: false" in caught.value.findings[0].help
 
@@ -236,6 +243,7 @@ trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 1, knots: 11}
 # -- the cache -------------------------------------------------------------------------------------------------
 
 SMALL = ("  knots: 101", "  knots: 21")
+FREE = ("  goal: true", "  goal: false")  # then nothing is planned a second time with finer steps
 
 
 def counted(monkeypatch):
@@ -254,11 +262,11 @@ def counted(monkeypatch):
 def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     calls = counted(monkeypatch)
-    spec = edited(SMALL)
-    one, two = (plan_of(spec, MODEL, ROOM) for _ in range(2))
+    spec = edited(SMALL, FREE)
+    one, two = (laid(spec, MODEL, ROOM) for _ in range(2))
     assert len(calls) == 1
     assert one.knots == two.knots
-    plan_of(edited(SMALL, ("  R: 1\n", "  R: 2\n")), MODEL, ROOM)
+    laid(edited(SMALL, FREE, ("  R: 1\n", "  R: 2\n")), MODEL, ROOM)
     assert len(calls) == 2
     assert len(list(kept_folder(cache.KIND).iterdir())) == 2
 
@@ -275,12 +283,12 @@ def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
 )
 def test_a_broken_cache_is_not_believed(tmp_path, monkeypatch, damage):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    spec = edited(SMALL)
-    before = plan_of(spec, MODEL, ROOM).knots
+    spec = edited(SMALL, FREE)
+    before = laid(spec, MODEL, ROOM).knots
     (path,) = kept_folder(cache.KIND).iterdir()
     path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
     calls = counted(monkeypatch)
-    assert plan_of(spec, MODEL, ROOM).knots == before
+    assert laid(spec, MODEL, ROOM).knots == before
     assert len(calls) == 1
 
 
@@ -289,7 +297,7 @@ def test_an_unwritable_cache_is_noted_and_does_no_harm(tmp_path, monkeypatch):
     blocked.write_text("", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     seen = []
-    plan_of(edited(SMALL), MODEL, ROOM, lambda name, count, unit: seen.append(name))
+    laid(edited(SMALL, FREE), MODEL, ROOM, lambda name, count, unit: seen.append(name))
     assert any("not kept" in name for name in seen)
 
 

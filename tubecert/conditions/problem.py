@@ -168,16 +168,22 @@ class TubeProblem:
     def projection_radius(self) -> Fraction:
         """R_H: a decimal >= sqrt(1 + nu) Dh, the least that the projection of A and B needs."""
         least = np.sqrt(float(1 + (self.smooth or 0))) * self.constants.h.above
+        if not np.isfinite(least):
+            return Fraction(1)  # serves nothing
         radius = round_up(max(least, _LEAST_RADIUS), RADIUS_DIGITS)
         return radius if self.radius_serves(radius) else next_up(radius, RADIUS_DIGITS)
 
     @property
     def clipping_radius(self) -> Fraction:
         """R_H of certificate C, which clips: a decimal >= Dh."""
+        if not np.isfinite(self.constants.h.above):
+            return Fraction(1)  # serves nothing
         return round_up(max(self.constants.h.above, _LEAST_RADIUS), RADIUS_DIGITS)
 
     def radius_serves(self, R_H: Fraction, *, clips: bool = False) -> bool:
         """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly."""
+        if not np.isfinite(self.constants.h.above):
+            return False
         layer = Fraction(0) if clips or self.smooth is None else self.smooth
         return R_H > 0 and (1 + layer) * Fraction(self.constants.h.above) ** 2 <= R_H**2
 

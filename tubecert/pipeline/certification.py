@@ -64,6 +64,7 @@ from tubecert.pipeline.gains import gains
 from tubecert.pipeline.options import Options, Progress, Step, overrides_data
 from tubecert.pipeline.reasons import UNBOUNDED_RELAX
 from tubecert.pipeline.synthesised import Synthesised
+from tubecert.planner.propose import course_of, knots_of
 from tubecert.records import to_json
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
@@ -153,7 +154,11 @@ class Certification:
             def report(name: str, count: int, unit: str) -> None:
                 show(Step(name=name, boxes=count, unit=unit))
 
-        self.plan = plan_of(self.spec, self.model, self._room(), report)
+        task, proposed = self.spec.trajectory.task, None
+        if task is not None:
+            course = course_of(self.spec, task, self.model, report)
+            proposed = knots_of(self.spec, course, self.model, self._room(), report)
+        self.plan = plan_of(self.spec, self.model, proposed)
         self.result["plan"] = plan_data(self.spec, self.plan)
 
     def _room(self) -> Room:

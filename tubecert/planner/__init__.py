@@ -6,5 +6,6 @@ In: a planning task and the dynamics. Out: knots.
 |---|---|
 | `rollout` | the dynamics in floats |
 | `ilqr` | inputs that lead to the target |
+| `propose` | task -> course -> knots, as many as the defect asks for |
 | `cache` | inputs kept between runs |
 """

@@ -17,7 +17,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.planner.rollout import Dynamics
 
 Report = Callable[[int, float], None]
-_SUBSTEPS = 4
+SUBSTEPS = 4  # of the integration between two knots
 _SHARES = 0.5 ** np.arange(14)
 _MOST_STEPS = 200
 _MOST_ROUNDS = 15
@@ -35,7 +35,10 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """What to plan: times of K knots, start and target (n,), reference input (m,), weights, goal, interpolation."""
+    """What to plan: times of K knots, start and target (n,), reference input (m,), weights, goal, interpolation.
+
+    `substeps`: of the integration between two knots.
+    """
 
     t: Array
     start: Array
@@ -45,6 +48,7 @@ class Problem:
     R: Array
     goal: bool
     held: bool
+    substeps: int = SUBSTEPS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +94,7 @@ class _System:
         """The next states for columns of states and controls."""
         n = self.dynamics.n
         left = w if self.problem.held else z[n:]
-        x = self.dynamics.step(z[:n], left, w, self.dt[k], _SUBSTEPS)
+        x = self.dynamics.step(z[:n], left, w, self.dt[k], self.problem.substeps)
         return x if self.problem.held else np.concatenate([x, w])
 
     def slopes(self, curve: _Curve) -> tuple[Array, Array]:
@@ -100,7 +104,7 @@ class _System:
         left = curve.w.T if self.problem.held else curve.z[:-1, n:].T
         count = len(self.dt)
         scaled = np.ones(count) * self.dt
-        D = _by_step(self.dynamics, x, left, curve.w.T, scaled)
+        D = _by_step(self.dynamics, (x, left, curve.w.T), scaled, self.problem.substeps)
         if self.problem.held:
             return D[:, :, :n], D[:, :, n : n + m] + D[:, :, n + m :]
         fz, fw = np.zeros((count, n + m, n + m)), np.zeros((count, n + m, m))
@@ -119,14 +123,13 @@ class _System:
         return np.asarray(own + 0.5 * np.einsum("k,kia,ij,kja->a", self.dt, dw, self.S, dw))
 
 
-def _by_step(dynamics: Dynamics, x: Array, left: Array, right: Array, dt: Array) -> Array:
+def _by_step(dynamics: Dynamics, at: tuple[Array, Array, Array], dt: Array, substeps: int) -> Array:
     """Derivatives of one step for every knot; equal lengths of steps are done together."""
+    x, left, right = at
     found = np.empty((len(dt), dynamics.n, dynamics.n + 2 * dynamics.m))
     for length in np.unique(dt):
         same = dt == length
-        found[same] = dynamics.step_slopes(
-            x[:, same], left[:, same], right[:, same], float(length), _SUBSTEPS
-        )
+        found[same] = dynamics.step_slopes(x[:, same], left[:, same], right[:, same], float(length), substeps)
     return found
 
 

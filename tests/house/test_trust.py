@@ -1,0 +1,96 @@
+"""Who may say "certified": trusted modules, what they import, and where the verdict is made."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import tubecert
+
+PACKAGE = Path(tubecert.__file__).parent
+
+# What a certificate rests on. Everything else proposes, composes, shows or falsifies.
+TRUSTED_ROOMS = {
+    "errors",
+    "findings",
+    "files",
+    "expression",
+    "spec",
+    "enclosure",
+    "model",
+    "metric",
+    "trajectory",
+    "tube",
+    "bounds",
+    "conditions",
+    "kernel",
+    "kinds",
+    "certificate",
+    "recheck",
+}
+SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
+
+
+def name_of(path: Path) -> str:
+    return str(path.relative_to(PACKAGE))
+
+
+def room_of(name: str) -> str:
+    return (
+        name.split(".")[1]
+        if name.startswith("tubecert.")
+        else name.split("/", maxsplit=1)[0].removesuffix(".py")
+    )
+
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+TRUSTED = [path for path in MODULES if room_of(name_of(path)) in TRUSTED_ROOMS]
+
+
+@pytest.mark.parametrize("path", TRUSTED, ids=name_of)
+def test_what_is_trusted_imports_only_what_is_trusted(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names = []
+        if isinstance(node, ast.ImportFrom):
+            names = [node.module or ""]
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        for name in names:
+            if name.startswith("tubecert."):
+                assert room_of(name) in TRUSTED_ROOMS, f"line {node.lineno} imports {name}"
+
+
+def compared(tree: ast.AST) -> set[ast.AST]:
+    """Nodes that are only compared with."""
+    return {
+        side
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Compare)
+        for side in (node.left, *node.comparators)
+    }
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_gains_become_certified_in_one_module_only(path):
+    """`Verdict.CERTIFIED` may be compared with anywhere; it is made in the kernel alone."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    asked = compared(tree)
+    made = [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and node.attr == "CERTIFIED" and node not in asked
+        if isinstance(node.value, ast.Name) and node.value.id == "Verdict"
+    ]
+    assert not made or name_of(path) == SAYS_CERTIFIED, made
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_proofs_are_made_by_the_kernel_alone(path):
+    """Nobody else calls `Proof`, nor goes round its constructor."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    called = {
+        node.func.id
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    assert "Proof" not in called or name_of(path) == SAYS_CERTIFIED
