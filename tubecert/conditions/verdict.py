@@ -10,7 +10,7 @@ import numpy as np
 from tubecert.enclosure.interval import Interval
 from tubecert.verdict import Verdict
 
-__all__ = ["NOTHING_FOUND", "UNKNOWN", "Shortfall", "Verdict", "unbounded", "verdict"]
+__all__ = ["NOTHING_FOUND", "UNKNOWN", "Shortfall", "Verdict", "unbounded"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,9 +47,7 @@ def gains(problem: TubeProblem, options: Options) -> dict[str, Any]:
             if section.proof is not None
         },
         "decided_by": chosen,
-        "reasons": [
-            reason for key in told for reason in reasons(sections[key], explained[key].halved or {})
-        ],
+        "reasons": [reason for key in told for reason in reasons(sections[key], explained[key].halved or {})],
         "verdict": str(Verdict.UNDECIDED if printed else overall([sections[key].verdict for key in chosen])),
     }
 
