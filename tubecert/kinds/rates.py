@@ -67,7 +67,7 @@ class RatesSection(Section[RateRecipe]):
 
     def claim(self) -> GainsSuffice:
         """That the gains suffice, and which condition sets the bandwidth."""
-        return replace(super().claim(), binds=self.binds, below_twice_rate=self.below_twice_rate)
+        return replace(Section.claim(self), binds=self.binds, below_twice_rate=self.below_twice_rate)
 
     def to_json(self) -> Json:
         """The section `conditions_26` of the certificate."""

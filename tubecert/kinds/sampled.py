@@ -35,7 +35,7 @@ class SampledSection(Section[SampledRecipe]):
     def claim(self) -> GainsSuffice:
         """That the sample time suffices, with its predictor."""
         gain = None if self.pair is None else self.pair.recipe.predictor_gain
-        return replace(super().claim(), predictor_gain=gain)
+        return replace(Section.claim(self), predictor_gain=gain)
 
     def to_json(self) -> Json:
         """The section `sampled` of the certificate."""
