@@ -13,6 +13,10 @@ PACKAGE = Path(tubecert.__file__).parent
 TRUSTED_ROOMS = {
     "errors",
     "findings",
+    "claims",
+    "records",
+    "verdict",
+    "printable",
     "files",
     "expression",
     "spec",
