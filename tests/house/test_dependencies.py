@@ -4,6 +4,7 @@ import ast
 import json
 import sys
 import tomllib
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from test_architecture import MODULES, ROOT, imported, room_of
 from typer.testing import CliRunner
 
 from tubecert import libraries
-from tubecert.checking import cache
+from tubecert.checking import cache as kept
 from tubecert.cli.app import app
 from tubecert.spec import load
 
@@ -31,10 +32,10 @@ def needed():
     )
 
 
-def users(module: str) -> list[Path]:
-    """The files of the package that import a library."""
-    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in MODULES}
-    return [path for path, tree in trees.items() if module in {name.split(".")[0] for name in imported(tree)}]
+@cache
+def libraries_of(path: Path) -> frozenset[str]:
+    """The modules that a file of the package imports."""
+    return frozenset(name.split(".")[0] for name in imported(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 def test_every_dependency_is_said_to_decide_or_to_show():
@@ -43,11 +44,7 @@ def test_every_dependency_is_said_to_decide_or_to_show():
 
 
 def test_dependencies_are_what_is_imported():
-    found = {
-        name.split(".")[0]
-        for path in MODULES
-        for name in imported(ast.parse(path.read_text(encoding="utf-8")))
-    }
+    found = frozenset().union(*map(libraries_of, MODULES))
     foreign = found - set(sys.stdlib_module_names) - {"tubecert"}
     assert foreign == {MODULE_OF.get(name, name) for name in needed()}
 
@@ -55,7 +52,9 @@ def test_dependencies_are_what_is_imported():
 @pytest.mark.parametrize("name", libraries.SHOWING)
 def test_what_only_shows_is_used_where_things_are_shown(name):
     figures = {path for path in MODULES if path.name.startswith("figures")}
-    assert all(room_of(path) in ("cli", "report") or path in figures for path in users(name))
+    users = {path for path in MODULES if name in libraries_of(path)}
+    assert users
+    assert all(room_of(path) in ("cli", "report") or path in figures for path in users)
 
 
 def test_versions_are_shown():
@@ -67,15 +66,15 @@ def test_versions_are_shown():
 @pytest.mark.parametrize("name", libraries.DECIDING)
 def test_what_is_kept_belongs_to_the_versions_that_made_it(name, monkeypatch):
     spec = load(str(ROOT / "configs" / "three_state.yaml"))
-    cache._program.cache_clear()
-    before = cache.key_of_text("lint", spec)
+    kept._program.cache_clear()
+    before = kept.key_of_text("lint", spec)
     honest = metadata.version
     monkeypatch.setattr(metadata, "version", lambda asked: "99" if asked == name else honest(asked))
-    cache._program.cache_clear()
+    kept._program.cache_clear()
     try:
-        assert cache.key_of_text("lint", spec) != before
+        assert kept.key_of_text("lint", spec) != before
     finally:
-        cache._program.cache_clear()
+        kept._program.cache_clear()
 
 
 def test_constraints_pin_every_dependency_by_name_and_version():
