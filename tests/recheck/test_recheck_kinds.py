@@ -6,6 +6,7 @@ from fractions import Fraction
 from functools import cache
 
 import pytest
+from proven import proven
 from systems import SMALL
 from typer.testing import CliRunner
 
@@ -77,12 +78,8 @@ KINDS = {
 }
 
 
-def certified(text, path="small.yaml", **options):
-    options = {"conditions": "all", **options}
-    system = spec.load_text(text, str(path))
-    return json.loads(
-        certificate.dump(certificate.seal(pipeline.certify(system, pipeline.Options(**options)), {}))
-    )
+def certified(text, **options):
+    return proven(text, **{"conditions": "all", **options})
 
 
 def examine(document, budget=20_000):
@@ -249,7 +246,7 @@ def files(tmp_path):
     def write(text, **options):
         path, target = tmp_path / "small.yaml", tmp_path / "small.certificate.json"
         path.write_text(text, encoding="utf-8")
-        target.write_text(json.dumps(certified(text, path, **options)), encoding="utf-8")
+        target.write_text(json.dumps(certified(text, **options)), encoding="utf-8")
         return path, target
 
     return write
