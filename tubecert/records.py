@@ -2,13 +2,14 @@
 
 In: dataclasses whose annotations say what a field holds. Out: JSON values; and from JSON values the same dataclasses.
 A field that equals its default is left out; a field without a default is always written, None as null. An exact number
-(`Fraction`) is a JSON number where one of at most 17 digits is exact, else a text `p/q`.
+(`Fraction`) is a JSON number where one of at most 17 digits is exact, else a text: a decimal, or `p/q`.
 Trusted: yes.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -18,9 +19,16 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, Literal, TypeVar, Union, cast
 
+from tubecert.expression import number_text
+
 T = TypeVar("T")
 Json = Any  # what `json` reads and writes
 INLINE: Mapping[str, bool] = {"inline": True}  # metadata: the members stand beside those of the record
+
+
+def keyed(kinds: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Metadata of a mapping whose members stand beside those of the record: the names that it may have, with types."""
+    return {"keyed": kinds}
 
 
 class FormError(ValueError):
@@ -54,22 +62,23 @@ class Tagged:
 
 
 def exact_json(value: Fraction) -> float | str:
-    """An exact number: a JSON number whose shortest decimal is it, else a text `p/q`."""
+    """An exact number: a JSON number whose shortest decimal is it, else a text."""
     try:
         near = float(value)
     except OverflowError:
-        return f"{value.numerator}/{value.denominator}"
-    return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
+        return number_text(value)
+    return near if Fraction(repr(near)) == value else number_text(value)
+
+
+_DECIMAL = re.compile(r"-?\d{1,1500}(\.\d{1,1500})?(e[+-]?\d{1,3})?")
+_QUOTIENT = re.compile(r"-?\d{1,1500}/0*[1-9]\d{0,1500}")
 
 
 def _exact(value: Json, path: str) -> Fraction:
-    try:
-        if isinstance(value, str) and len(value) < 5000:
-            return Fraction(value)
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return Fraction(repr(value))
-    except (ValueError, ZeroDivisionError):
-        pass
+    if isinstance(value, str) and (_DECIMAL.fullmatch(value) or _QUOTIENT.fullmatch(value)):
+        return Fraction(value)
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        return Fraction(repr(value))
     raise FormError(path, "is not a number")
 
 
@@ -110,7 +119,7 @@ def _record_json(record: Any) -> dict[str, Json]:
     data: dict[str, Json] = {record.key: record.tag} if isinstance(record, Tagged) else {}
     for item in fields(record):
         value = getattr(record, item.name)
-        if item.metadata.get("inline"):
+        if item.metadata.get("inline") or item.metadata.get("keyed"):
             data |= to_json(value)
         elif _required(item) or value != _default(item):
             data[item.name] = to_json(value)
@@ -218,6 +227,11 @@ def _record(kind: Any, data: dict[str, Json], path: str) -> Any:
         if item.metadata.get("inline"):
             names = _names(hint, left, path)
             values[item.name] = _read(hint, {name: left.pop(name) for name in names if name in left}, path)
+        elif kinds := item.metadata.get("keyed"):
+            own = {name: each for name, each in kinds().items() if name in left}
+            values[item.name] = {
+                name: _read(each, left.pop(name), f"{path}.{name}") for name, each in own.items()
+            }
         elif item.name in left:
             values[item.name] = _read(hint, left.pop(item.name), f"{path}.{item.name}")
         elif _required(item):
@@ -293,8 +307,11 @@ def _record_schema(kind: Any) -> Json:
 
 
 def _own_schema(kind: Any) -> dict[str, Json]:
-    own = [(item, hint) for item, hint in members(kind) if not item.metadata.get("inline")]
+    own = [(item, hint) for item, hint in members(kind) if not item.metadata]
     properties = {item.name: schema(_written(item, hint)) for item, hint in own}
+    for item in fields(kind):
+        if kinds := item.metadata.get("keyed"):
+            properties |= {name: schema(each) for name, each in kinds().items()}
     required = [item.name for item, _ in own if _required(item)]
     if issubclass(kind, Tagged):
         properties, required = {kind.key: {"const": kind.tag}, **properties}, [kind.key, *required]

@@ -5,22 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from math import isfinite
 from typing import ClassVar, Generic
 
 from tubecert.claims import GainsSuffice
-from tubecert.conditions.decimals import printed
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
-from tubecert.conditions.theorem import R, Recipe, Theorem
+from tubecert.conditions.theorem import R, Theorem
 from tubecert.conditions.verdict import Shortfall, Verdict
-from tubecert.enclosure.constant import Constant, printable_below
-from tubecert.enclosure.interval import Interval
+from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked, Judgement, Proof
 from tubecert.kinds import Name
-
-Json = dict[str, object]
+from tubecert.kinds.data import SectionData
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,15 +58,16 @@ class Section(ABC, Generic[R]):
         )
 
     @abstractmethod
-    def to_json(self) -> Json:
+    def data(self) -> SectionData:
         """The section, as the certificate holds it."""
 
 
 class Kind(ABC, Generic[R]):
-    """One kind of certificate."""
+    """One kind of certificate; `form` is how its section is read."""
 
     name: ClassVar[Name]
     theorem: Theorem[R]
+    form: type[SectionData]
 
     @property
     def key(self) -> str:
@@ -86,57 +82,3 @@ class Kind(ABC, Generic[R]):
         """Constants at the decisive gains that the certificate lists beside those of the tube."""
         del section
         return {}
-
-
-# -- numbers as JSON
-
-
-def finite(value: float) -> float | None:
-    """A number for JSON: None where it is infinite or unknown."""
-    return float(value) if isfinite(value) and abs(value) < 1e300 else None
-
-
-def margin_json(margin: Interval) -> list[float | None]:
-    """[below, above]; null where there is no bound."""
-    return [finite(float(margin.lo)), finite(float(margin.hi))]
-
-
-def gain_json(value: Fraction | None) -> float | str | None:
-    """An exact gain."""
-    return None if value is None else printed(value)
-
-
-def shortfall_json(item: Shortfall) -> Json:
-    """One reason as data."""
-    return {
-        "condition": item.claim,
-        **({} if item.constant is None else {"constant": item.constant}),
-        "margin": margin_json(item.margin),
-        "allowed": item.allowed,
-        "needed": item.needed,
-        "missing": item.missing,
-    }
-
-
-def recipe_json(recipe: Recipe) -> Json:
-    """Every number of a proof as a decimal."""
-    return {name: gain_json(getattr(recipe, name)) for name in recipe.__slots__}  # type: ignore[attr-defined]
-
-
-def gains_json(recipe: Recipe, *names: str) -> Json:
-    """Some numbers of a recipe as decimals."""
-    return {name: gain_json(getattr(recipe, name)) for name in names}
-
-
-def around_json(judgement: Judgement[R]) -> Json:
-    """Margins against the bandwidth, at the rate and the predictor of the decisive gains; bounds from below."""
-    recipes = judgement.around_at
-    margins = {
-        claim: [printable_below(float(value)) if isfinite(value) else None for value in low]
-        for claim, low in judgement.around.items()
-    }
-    return {
-        "bandwidth": [gain_json(recipe.bandwidth) for recipe in recipes],
-        **gains_json(recipes[0], "adaptation_rate", "predictor_gain"),
-        **margins,
-    }

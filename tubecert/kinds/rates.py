@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from tubecert.claims import GainsSuffice
@@ -13,18 +13,105 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal, RateProposal
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.constant import Constant
-from tubecert.kernel import Checked, judge
+from tubecert.kernel import Checked, Judgement, judge
 from tubecert.kinds import RATES
-from tubecert.kinds.kind import (
-    Json,
-    Kind,
-    Section,
-    around_json,
-    gain_json,
-    gains_json,
-    margin_json,
-    shortfall_json,
+from tubecert.kinds.data import (
+    Around,
+    GainPoint,
+    Pair,
+    SectionData,
+    margin_data,
+    missing_data,
+    proven_data,
 )
+from tubecert.kinds.kind import Kind, Section
+from tubecert.records import keyed
+
+CONDITIONS = ("26a", "26b", "26c")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatePair:
+    """Gains of certificate A with the margins of its conditions."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+    projection_radius: Fraction
+    margins: Mapping[str, Constant]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatesAround:
+    """Proven margins against the bandwidth, by condition."""
+
+    bandwidth: tuple[Fraction, ...]
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+    margins: Mapping[str, tuple[float | None, ...]] = field(
+        metadata=keyed(lambda: dict.fromkeys(CONDITIONS, tuple[float | None, ...]))
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatesData(SectionData):
+    """Certificate A: the gains of least bandwidth, or asked for; those of least adaptation rate; the curve.
+
+    `A_m`, `P`, `Q` are the predictor's, (n, n); `bandwidth_infimum` is where (26a) and (26b) begin to hold, `binds` the
+    condition that sets the bandwidth.
+    """
+
+    name = RATES
+    bandwidth: Fraction | None
+    adaptation_rate: Fraction | None
+    A_m: tuple[tuple[Fraction, ...], ...] | None
+    P: tuple[tuple[float, ...], ...] | None
+    Q: tuple[tuple[Fraction, ...], ...] | None
+    projection_radius: Fraction | None
+    margins: Mapping[str, Constant] | None
+    least_adaptation: RatePair | None
+    curve: tuple[GainPoint, ...]
+    bandwidth_infimum: float | None
+    binds: str | None
+    below_twice_rate: bool
+    margins_around: RatesAround | None = None
+
+    def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
+        """The gains of least bandwidth, or asked for; and where none were, those of least adaptation rate."""
+        found = []
+        if self.bandwidth is not None:
+            found.append(
+                Pair(
+                    role="asked" if asked else "least_bandwidth",
+                    bandwidth=self.bandwidth,
+                    adaptation_rate=self.adaptation_rate,
+                    margins=self.margins or {},
+                )
+            )
+        least = self.least_adaptation
+        if least is not None and not asked:
+            found.append(
+                Pair(
+                    role="least_adaptation",
+                    bandwidth=least.bandwidth,
+                    adaptation_rate=least.adaptation_rate,
+                    margins=least.margins,
+                )
+            )
+        return tuple(found)
+
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Bandwidth and adaptation rate."""
+        return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in self.curve)
+
+    def margins_along(self) -> Around | None:
+        """The margins against the bandwidth."""
+        around = self.margins_around
+        if around is None:
+            return None
+        return Around(
+            bandwidth=around.bandwidth, adaptation_rate=around.adaptation_rate, margins=around.margins
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,38 +156,57 @@ class RatesSection(Section[RateRecipe]):
         """That the gains suffice, and which condition sets the bandwidth."""
         return replace(Section.claim(self), binds=self.binds, below_twice_rate=self.below_twice_rate)
 
-    def to_json(self) -> Json:
+    def data(self) -> RatesData:
         """The section `conditions_26` of the certificate."""
-        A_m, pair, least = self.A_m, self.pair, self.least_adaptation
-        at = None if pair is None else _pair_json(pair)
+        A_m, at, judgement = self.A_m, _pair_data(self.pair), self.judgement
         n = range(0 if A_m is None else len(A_m))
-        data: Json = {
-            "verdict": str(self.verdict),
-            "bandwidth": at and at["bandwidth"],
-            "adaptation_rate": at and at["adaptation_rate"],
-            "A_m": None if A_m is None else [[gain_json(x) for x in row] for row in A_m],
-            "P": None if A_m is None else [[float(i == j) for j in n] for i in n],
+        return RatesData(
+            verdict=self.verdict,
+            bandwidth=None if at is None else at.bandwidth,
+            adaptation_rate=None if at is None else at.adaptation_rate,
+            A_m=A_m,
+            P=None if A_m is None else tuple(tuple(float(i == j) for j in n) for i in n),
             # the Lyapunov equation with P = I
-            "Q": None if A_m is None else [[gain_json(-(A_m[i][j] + A_m[j][i])) for j in n] for i in n],
-            "projection_radius": at and at["projection_radius"],
-            "margins": at and at["margins"],
-            "ultimate_radius": self.judgement.ultimate_radius,
-            "least_adaptation": None if least is None else _pair_json(least),
-            "curve": [gains_json(r, "bandwidth", "adaptation_rate", "predictor_gain") for r in self.curve],
-            "bandwidth_infimum": self.infimum,
-            "binds": self.binds,
-            "below_twice_rate": self.below_twice_rate,
-            "shortfalls": [shortfall_json(item) for item in self.shortfalls],
-        }
-        return data | {"margins_around": around_json(self.judgement)} if self.judgement.around_at else data
+            Q=None if A_m is None else tuple(tuple(-(A_m[i][j] + A_m[j][i]) for j in n) for i in n),
+            projection_radius=None if at is None else at.projection_radius,
+            margins=None if at is None else at.margins,
+            ultimate_radius=judgement.ultimate_radius,
+            least_adaptation=_pair_data(self.least_adaptation),
+            curve=tuple(
+                GainPoint(
+                    bandwidth=r.bandwidth, adaptation_rate=r.adaptation_rate, predictor_gain=r.predictor_gain
+                )
+                for r in self.curve
+            ),
+            bandwidth_infimum=self.infimum,
+            binds=self.binds,
+            below_twice_rate=self.below_twice_rate,
+            shortfalls=missing_data(self.shortfalls),
+            margins_around=_around_data(judgement) if judgement.around_at else None,
+        )
 
 
-def _pair_json(pair: Checked[RateRecipe]) -> Json:
-    names = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
-    return {
-        **gains_json(pair.recipe, *names),
-        "margins": {claim: margin_json(margin) for claim, margin in pair.margins.items()},
-    }
+def _pair_data(pair: Checked[RateRecipe] | None) -> RatePair | None:
+    if pair is None:
+        return None
+    recipe = pair.recipe
+    return RatePair(
+        bandwidth=recipe.bandwidth,
+        adaptation_rate=recipe.adaptation_rate,
+        predictor_gain=recipe.predictor_gain,
+        projection_radius=recipe.projection_radius,
+        margins={condition: margin_data(margin) for condition, margin in pair.margins.items()},
+    )
+
+
+def _around_data(judgement: Judgement[RateRecipe]) -> RatesAround:
+    recipes = judgement.around_at
+    return RatesAround(
+        bandwidth=tuple(recipe.bandwidth for recipe in recipes),
+        adaptation_rate=recipes[0].adaptation_rate,
+        predictor_gain=recipes[0].predictor_gain,
+        margins={condition: proven_data(low) for condition, low in judgement.around.items()},
+    )
 
 
 class Rates(Kind[RateRecipe]):
@@ -108,6 +214,7 @@ class Rates(Kind[RateRecipe]):
 
     name = RATES
     theorem = rates.THEOREM
+    form = RatesData
 
     def section(self, problem: TubeProblem, proposal: Proposal[RateRecipe]) -> RatesSection:
         """The section about a proposal."""

@@ -3,17 +3,55 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from tubecert.claims import GainsSuffice
 from tubecert.conditions import sampled
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal, SampledProposal
 from tubecert.conditions.sampled import SampledRecipe
+from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked, judge
 from tubecert.kinds import SAMPLED
-from tubecert.kinds.kind import Json, Kind, Section, gains_json, margin_json, shortfall_json
+from tubecert.kinds.data import Pair, Role, SectionData, margin_data, missing_data
+from tubecert.kinds.kind import Kind, Section
 
-_GAINS = ("sample_time", "bandwidth", "predictor_gain", "projection_radius")
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SamplePoint:
+    """A proven point of a curve: the sample time that a bandwidth allows."""
+
+    bandwidth: Fraction
+    sample_time: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledData(SectionData):
+    """Certificate C: the longest sample time, or the one asked for; the curve.
+
+    `sample_time_limit` is approached as the bandwidth grows, and never attained.
+    """
+
+    name = SAMPLED
+    sample_time: Fraction | None
+    bandwidth: Fraction | None
+    predictor_gain: Fraction | None
+    projection_radius: Fraction | None
+    margin: Constant | None
+    sample_time_limit: float | None
+    curve: tuple[SamplePoint, ...]
+
+    def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
+        """The one set of gains."""
+        if self.sample_time is None or self.bandwidth is None:
+            return ()
+        margins = {} if self.margin is None else {SAMPLED.key: self.margin}
+        role: Role = "asked" if asked else "longest_sample"
+        return (Pair(role=role, bandwidth=self.bandwidth, sample_time=self.sample_time, margins=margins),)
+
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Bandwidth and sample time."""
+        return tuple((float(p.bandwidth), float(p.sample_time)) for p in self.curve)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,18 +75,22 @@ class SampledSection(Section[SampledRecipe]):
         gain = None if self.pair is None else self.pair.recipe.predictor_gain
         return replace(Section.claim(self), predictor_gain=gain)
 
-    def to_json(self) -> Json:
+    def data(self) -> SampledData:
         """The section `sampled` of the certificate."""
         pair = self.pair
-        return {
-            "verdict": str(self.verdict),
-            **(dict.fromkeys(_GAINS) if pair is None else gains_json(pair.recipe, *_GAINS)),
-            "margin": None if pair is None else margin_json(pair.margins["sampled"]),
-            "ultimate_radius": self.judgement.ultimate_radius,
-            "sample_time_limit": self.sample_time_limit,
-            "curve": [gains_json(r, "bandwidth", "sample_time") for r in self.curve],
-            "shortfalls": [shortfall_json(item) for item in self.shortfalls],
-        }
+        recipe = None if pair is None else pair.recipe
+        return SampledData(
+            verdict=self.verdict,
+            sample_time=None if recipe is None else recipe.sample_time,
+            bandwidth=None if recipe is None else recipe.bandwidth,
+            predictor_gain=None if recipe is None else recipe.predictor_gain,
+            projection_radius=None if recipe is None else recipe.projection_radius,
+            margin=None if pair is None else margin_data(pair.margins["sampled"]),
+            ultimate_radius=self.judgement.ultimate_radius,
+            sample_time_limit=self.sample_time_limit,
+            curve=tuple(SamplePoint(bandwidth=r.bandwidth, sample_time=r.sample_time) for r in self.curve),
+            shortfalls=missing_data(self.shortfalls),
+        )
 
 
 class Sampled(Kind[SampledRecipe]):
@@ -56,6 +98,7 @@ class Sampled(Kind[SampledRecipe]):
 
     name = SAMPLED
     theorem = sampled.THEOREM
+    form = SampledData
 
     def section(self, problem: TubeProblem, proposal: Proposal[SampledRecipe]) -> SampledSection:
         """The section about a proposal."""

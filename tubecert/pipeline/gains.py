@@ -10,10 +10,11 @@ from tubecert.conditions.problem import Formulas, TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.conditions.verdict import Verdict
 from tubecert.kernel import overall
-from tubecert.kinds.kind import Kind, Section, recipe_json
+from tubecert.kinds.kind import Kind, Section
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.pipeline.options import Options
 from tubecert.pipeline.reasons import reasons
+from tubecert.records import to_json
 from tubecert.search.proposers import PROPOSERS, Explained
 
 
@@ -34,7 +35,7 @@ def gains(problem: TubeProblem, options: Options) -> dict[str, Any]:
     printed = options.formulas == Formulas.AS_PRINTED
     told = list(dict.fromkeys([KINDS[0].key, *chosen])) if printed else chosen
     return {
-        **{key: section.to_json() for key, section in sections.items()},
+        **{key: to_json(section.data()) for key, section in sections.items()},
         "constants": {
             name: constant_data(value.printable(), DERIVED[name])
             for kind in KINDS
@@ -42,7 +43,7 @@ def gains(problem: TubeProblem, options: Options) -> dict[str, Any]:
         },
         "elasticities": {key: each.slopes for key, each in explained.items() if each.slopes is not None},
         "proof": {
-            key: recipe_json(section.proof.recipe)
+            key: to_json(section.proof.recipe)
             for key, section in sections.items()
             if section.proof is not None
         },

@@ -1,0 +1,122 @@
+"""Sections of a certificate as data: what each kind writes and reads, and the one view that all of them offer.
+
+A kind's own section is a record whose fields are the keys of the JSON. What a reader needs whatever the kind - its
+gains with their margins, its curve, what is missing - is told by `pairs`, `decisive` and `points`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from math import inf, isfinite
+from typing import ClassVar, Literal
+
+from tubecert.conditions.verdict import Shortfall
+from tubecert.enclosure.constant import Constant, printable_below
+from tubecert.enclosure.interval import Interval
+from tubecert.kinds import Name
+from tubecert.verdict import Verdict
+
+Role = Literal["asked", "least_bandwidth", "least_adaptation", "longest_sample"]
+_BEYOND = 1e300  # larger margins are not told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """One set of gains with its own margins, by condition; rows of different sets never mix."""
+
+    role: Role
+    bandwidth: Fraction
+    margins: Mapping[str, Constant]
+    adaptation_rate: Fraction | None = None
+    sample_time: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainPoint:
+    """A proven point of a curve: the adaptation rate that a bandwidth needs."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Around:
+    """Proven margins against the bandwidth, by condition, at the rate of the decisive gains; None where unknown."""
+
+    bandwidth: tuple[Fraction, ...]
+    adaptation_rate: Fraction
+    margins: Mapping[str, tuple[float | None, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Missing:
+    """A condition that is not proven, see `claims.ConditionHolds`; `missing` is what is needed beyond the allowed."""
+
+    condition: str
+    constant: str | None = None
+    margin: Constant
+    allowed: float | None
+    needed: float | None
+    missing: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SectionData(ABC):
+    """The section of one kind; `ultimate_radius` bounds |x - x*| in the long run."""
+
+    name: ClassVar[Name]
+    verdict: Verdict
+    ultimate_radius: float | None
+    shortfalls: tuple[Missing, ...]
+
+    @abstractmethod
+    def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
+        """Every set of gains that the section holds; the one that the verdict is about comes first."""
+
+    @abstractmethod
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """The proven curve: bandwidth, and what it is drawn against."""
+
+    def decisive(self, *, asked: bool) -> Pair | None:
+        """The gains that the verdict is about."""
+        return next(iter(self.pairs(asked=asked)), None)
+
+    def margins_along(self) -> Around | None:
+        """Margins against the bandwidth, if the section has them."""
+        return None
+
+
+# -- from what was proven
+
+
+def margin_data(margin: Interval) -> Constant:
+    """A margin as it is written: no bound where it is beyond all use."""
+    low, high = float(margin.lo), float(margin.hi)
+    return Constant(
+        below=low if abs(low) < _BEYOND else -inf,
+        above=high if abs(high) < _BEYOND else inf,
+    )
+
+
+def missing_data(shortfalls: Iterable[Shortfall]) -> tuple[Missing, ...]:
+    """What is missing, as it is written."""
+    return tuple(
+        Missing(
+            condition=item.claim,
+            constant=item.constant,
+            margin=margin_data(item.margin),
+            allowed=item.allowed,
+            needed=item.needed,
+            missing=item.missing,
+        )
+        for item in shortfalls
+    )
+
+
+def proven_data(values: Iterable[float]) -> tuple[float | None, ...]:
+    """Bounds from below as they can be printed; None where nothing is proven."""
+    return tuple(printable_below(float(value)) if isfinite(value) else None for value in values)
