@@ -8,6 +8,7 @@ as absent: it only costs time.
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -101,9 +102,12 @@ def _name(mode: int) -> str:
 def replace(path: Path, data: bytes) -> None:
     """Write to a temporary name beside it and rename: an interruption leaves the old file or the new one.
 
-    A link keeps pointing where it points. Raises `OSError`.
+    A link keeps pointing where it points. What is no regular file (a device, a pipe) is never replaced by one. Raises
+    `OSError`.
     """
     path = path.resolve()
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EEXIST, f"it is {_name(path.stat().st_mode)}, not a regular file")
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:

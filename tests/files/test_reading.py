@@ -6,6 +6,7 @@ import json
 import os
 import resource
 import socket
+import stat
 import time
 from pathlib import Path
 
@@ -237,3 +238,15 @@ def test_a_finding_is_small_and_its_caret_is_right():
     text, caret = place.excerpt().splitlines()
     assert text[caret.index("^") : caret.rindex("^") + 1] == "HERE"
     assert len(Finding(code="TC100", message="x" * 10**6).message) < 3_000
+
+
+@pytest.mark.parametrize("through_a_link", [False, True])
+def test_what_is_no_regular_file_is_never_replaced_by_one(through_a_link, tmp_path):
+    """As root, a link to a device would otherwise be the end of the device."""
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    with pytest.raises(OSError, match="it is a pipe, not a regular file"):
+        files.replace(link if through_a_link else pipe, b"x")
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name.endswith(".part")) == []

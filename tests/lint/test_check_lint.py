@@ -149,7 +149,7 @@ def test_the_rate_that_a_point_allows_is_named():
     assert re.search(r"supports 0\.5 at most", finding.message)
 
 
-@pytest.mark.parametrize("value", ["1e300", "1e-300", "-1e300", "1e200/3", "1e300*1e300"])
+@pytest.mark.parametrize("value", ["1e300", "1e-300", "-1e300", "1e200/3", "1e150*1e150"])
 @pytest.mark.parametrize(
     "place", ["k: 2", "rate: 0.4", "at: [0, 0]", "epsilon: 0.1", "[-2, 2]", "[0], [1]", 't)"]']
 )
