@@ -23,7 +23,9 @@ class ExitCode(IntEnum):
     INVALID = 2
     INTERNAL = 3
     UNDECIDED = 4
+    HUNG_UP = 129
     INTERRUPTED = 130
+    TERMINATED = 143
 
 
 class TubecertError(Exception):

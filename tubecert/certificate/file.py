@@ -93,6 +93,8 @@ def parse(data: bytes, name: str) -> dict[str, Any]:
         raise TargetError([Finding(code="TC602", message=message, help="certify again")])
     if not isinstance(certificate.get("result"), dict):
         raise incomplete(name, "it has no result")
+    if not _prints(certificate):
+        raise foreign(name, "holds a character that does not print, and tubecert writes none")
     return cast(dict[str, Any], certificate)
 
 
@@ -106,6 +108,20 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) != len(pairs):
         raise ValueError("a key occurs twice in one object")
     return found
+
+
+def _prints(data: Any) -> bool:
+    """Whether every text and key consists of characters that print: none can pass for a line of a report."""
+    waiting = [data]
+    while waiting:
+        item = waiting.pop()
+        if isinstance(item, str) and not item.isprintable():
+            return False
+        if isinstance(item, dict):
+            waiting += [*item, *item.values()]
+        elif isinstance(item, list):
+            waiting += item
+    return True
 
 
 def unreadable(name: str, why: str) -> TargetError:

@@ -5,6 +5,7 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 
 | module | what it does |
 |---|---|
+| `process` | signals, and an exit code that nobody else decides on |
 | `app` | the commands and their options |
 | `options` | the options that every command shares; numbers from the command line |
 | `targets`, `places` | files that commands write; places on the command line |
@@ -17,12 +18,25 @@ import sys
 
 
 def main() -> None:
-    """The entry point. It imports the rest itself: from its first line on an interruption has its exit code."""
+    """The entry point. It imports the rest itself: from its first line on an interruption has its exit code.
+
+    It does not return: the process ends here, with a code that is one of ours.
+    """
+    code = 3  # ExitCode.INTERNAL: what is not imported yet cannot fail
     try:
+        from tubecert.cli import process
+
+        process.prepare()
         from tubecert.cli.app import start
 
-        start()
-    except KeyboardInterrupt:
+        code = start()
+    except KeyboardInterrupt as stop:
+        code = 130  # ExitCode.INTERRUPTED; `leave` knows the signal
         if sys.stderr is not None:
-            print("tubecert: interrupted", file=sys.stderr)
-        sys.exit(130)  # ExitCode.INTERRUPTED: what is not imported cannot be interrupted
+            print(f"tubecert: {str(stop) or 'interrupted'}", file=sys.stderr)
+    except BaseException as error:
+        if sys.stderr is not None:
+            print(f"tubecert: internal error: {type(error).__name__}: {str(error)[:200]!a}", file=sys.stderr)
+    from tubecert.cli import process
+
+    process.leave(code)

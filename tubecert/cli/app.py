@@ -11,10 +11,13 @@ from typing import Annotated
 import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising
-from tubecert.cli.guard import flush_stdout, guarded, stdout_failed
+from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
 from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
+from tubecert.errors import ExitCode
 from tubecert.kinds import NAMES
 
+# ClickException: typer has a click of its own, or uses click's
+_USAGE: type[Exception] = typer.BadParameter.__mro__[2]
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
 From a YAML file that describes a control-affine system with matched uncertainty, tubecert proves: with this
@@ -32,7 +35,7 @@ Exit codes:
   2  the command line or an input file is invalid
   3  internal error
   4  undecided: a budget ran out (the report says what to raise)
-  130  interrupted
+  130  interrupted (SIGTERM: 143)
 """
 
 _CERTIFY_AFTER = """\b
@@ -171,16 +174,22 @@ rechecking.register(app)
 everyday.register(app)
 
 
-def start() -> None:
-    """Runs a command: never a traceback, whatever stdout is connected to."""
+def start() -> int:
+    """Runs a command; its exit code. Never a traceback, whatever stdout is connected to."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's deprecations are no message to users
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        app(prog_name="tubecert")
-    except SystemExit as end:
-        sys.exit(flush_stdout() or end.code)
+        code = app(prog_name="tubecert", standalone_mode=False)
+    except _USAGE as error:
+        code = refuse_usage(error)
+    except typer.Abort:
+        code = ExitCode.INTERRUPTED
     except OSError as error:  # from --help, which writes by itself
-        sys.exit(stdout_failed(error))
+        code = stdout_failed(error)
+    except SystemExit as end:  # typer's own: the reader of --help has gone, or completion is done
+        fine = end.code in (None, 0) or isinstance(end.__context__, BrokenPipeError)
+        code = ExitCode.CERTIFIED if fine else ExitCode.INTERNAL
+    return flush_stdout() or (code if isinstance(code, int) else 0)

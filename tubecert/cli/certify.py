@@ -19,6 +19,7 @@ from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
 from tubecert.libraries import versions
+from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def _kept_metric(result: Mapping[str, Any], target: str | None) -> str | None:
 def _record(started: datetime, seconds: float) -> dict[str, Any]:
     """How the certificate was made; no part of what is hashed."""
     return {
-        "command": shlex.join(["tubecert", *sys.argv[1:]]),
+        "command": visible(shlex.join(["tubecert", *sys.argv[1:]])),
         "started": started.isoformat(timespec="seconds"),
         "seconds": round(seconds, 3),
         "versions": versions(),

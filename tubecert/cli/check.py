@@ -6,12 +6,13 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
 from tubecert.errors import ExitCode
 from tubecert.findings import Finding
+from tubecert.printable import printable_json
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
 
@@ -28,7 +29,7 @@ def run(paths: Sequence[str], given: Mapping[str, Any], output: Output) -> ExitC
     jobs, options = _options(given)
     files = list(_expand(paths))
     results = _nothing(paths) if not files else _checked(files, options, jobs, output)
-    write_stdout(_text(results, format_, output, len(files)))
+    write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
     if format_ == "github":
         from tubecert.report import github
 
@@ -109,24 +110,41 @@ def _leave_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _text(results: Sequence[Checked], format_: str, output: Output, count: int) -> str:
+def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
     findings = [item for result in results for item in result.findings]
-    if format_ == "json":
-        return json.dumps([as_data(finding) for finding in findings], indent=1, ensure_ascii=False) + "\n"
-    if format_ == "github":
-        from tubecert.report import github
+    return terminal.text(render(() if quiet else findings, closing=summary(findings, len(results))))
 
-        return github.render(results)
-    if format_ == "junit":
-        from tubecert.report import junit
 
-        return junit.render(results)
-    if format_ == "sarif":
-        from tubecert.report import sarif
+def _as_json(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    data = [as_data(item) for result in results for item in result.findings]
+    return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
-        return sarif.render(results)
-    shown = () if output.quiet else findings
-    return Terminal.stdout(color=output.color).text(render(shown, closing=summary(findings, count)))
+
+def _as_github(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    from tubecert.report import github
+
+    return github.render(results)
+
+
+def _as_junit(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    from tubecert.report import junit
+
+    return junit.render(results)
+
+
+def _as_sarif(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    from tubecert.report import sarif
+
+    return sarif.render(results)
+
+
+FORMATS: Final = {
+    "text": _as_text,
+    "json": _as_json,
+    "github": _as_github,
+    "junit": _as_junit,
+    "sarif": _as_sarif,
+}
 
 
 def _expand(paths: Sequence[str]) -> Iterator[str]:

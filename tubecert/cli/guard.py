@@ -6,11 +6,12 @@ import contextlib
 import os
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from tubecert.errors import ExitCode, TargetError, TubecertError
+from tubecert.printable import printable_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,10 +29,15 @@ def guarded(output: Output) -> Iterator[None]:
     except TubecertError as error:
         show(error, output)
         raise typer.Exit(error.exit_code) from None
-    except KeyboardInterrupt:
-        _tell("interrupted")
+    except KeyboardInterrupt as stop:
+        _tell(str(stop) or "interrupted")
         raise typer.Exit(ExitCode.INTERRUPTED) from None
-    except Exception as error:
+    except MemoryError as error:
+        if output.debug:
+            raise
+        _tell(_no_memory(error))
+        raise typer.Exit(ExitCode.INTERNAL) from None
+    except BaseException as error:  # a library's `sys.exit` as well: it knows nothing of verdicts
         if output.debug:
             import traceback
 
@@ -46,6 +52,16 @@ def show(error: TubecertError, output: Output) -> None:
     from tubecert.report.terminal import Terminal
 
     Terminal.stderr(color=output.color).show(render(error.findings))
+
+
+def refuse_usage(error: Any) -> int:
+    """Tells what is wrong with the command line (an exception of click); the exit code."""
+    from io import StringIO
+
+    text = StringIO()
+    error.show(file=text)
+    _tell_as_is(printable_lines(text.getvalue()).rstrip("\n"))
+    return int(error.exit_code)
 
 
 def write_stdout(text: str) -> None:
@@ -100,24 +116,33 @@ def _drop_stdout() -> None:
         os.close(null)
 
 
-def _tell(line: str) -> None:
+def _tell(text: str) -> None:
+    _tell_as_is(printable_lines(f"tubecert: {text}"))
+
+
+def _tell_as_is(text: str) -> None:
     if sys.stderr is None:
         return
     with contextlib.suppress(OSError, ValueError):
-        print(f"tubecert: {line}", file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True)
 
 
-def _defect(error: Exception) -> str:
+def _no_memory(error: MemoryError) -> str:
+    what = " ".join(str(error).split())[:200]
+    line = "internal error: out of memory" + (f": {what}" if what else "")
+    return f"{line}\n  less work at a time needs less: --jobs 1, a smaller --budget, a wider --gap; --debug shows where"
+
+
+def _defect(error: BaseException) -> str:
     """The one line about an unexpected exception, having written its log."""
     what = " ".join(str(error).split())[:200]
-    name = "out of memory" if isinstance(error, MemoryError) else type(error).__name__
-    line = f"internal error: {name}" + (f": {what}" if what else "")
+    line = f"internal error: {type(error).__name__}" + (f": {what}" if what else "")
     log = _write_log(error)
     where = f"details are in {log}" if log else "no log could be written; --debug shows the details"
     return f"{line}\n  this is a defect of tubecert, not of your input; {where}"
 
 
-def _write_log(error: Exception) -> Path | None:
+def _write_log(error: BaseException) -> Path | None:
     import platform
     import tempfile
     import time

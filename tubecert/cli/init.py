@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib import resources
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
+from tubecert.printable import visible
 
 
 def run(template: str, target: str | None, *, quiet: bool) -> None:
@@ -18,16 +20,21 @@ def run(template: str, target: str | None, *, quiet: bool) -> None:
         write_stdout(text)
         return
     name = f"{template}.yaml" if target is None else target
-    text = text.replace(f"tubecert certify {template}.yaml", f"tubecert certify {name}")
+    text = text.replace(f"tubecert certify {template}.yaml", _command(name))
     _create(name, text)
     if not quiet:
-        write_stdout(f"{name}: a specification that certifies as it is\n  tubecert certify {name}\n")
+        write_stdout(f"{visible(name)}: a specification that certifies as it is\n  {_command(name)}\n")
+
+
+def _command(name: str) -> str:
+    return f"tubecert certify {visible(shlex.quote(name))}"
 
 
 def _create(name: str, text: str) -> None:
     try:
-        with Path(name).open("x", encoding="utf-8") as file:
-            file.write(text)
+        data = text.encode()
+        with Path(name).open("xb") as file:
+            file.write(data)
     except FileExistsError:
         raise _refused(f"{name} exists and is not overwritten") from None
     except (OSError, ValueError) as error:

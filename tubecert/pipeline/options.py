@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tubecert.certificate.sections import decimal_data
+from tubecert.printable import visible
 from tubecert.spec import Spec
 
 
@@ -65,5 +66,5 @@ def overrides_data(options: Options) -> dict[str, Any]:
     }
     result: dict[str, Any] = {name: decimal_data(value) for name, value in given.items() if value is not None}
     if options.metric is not None:
-        result["metric"] = options.metric.name
+        result["metric"] = visible(options.metric.name)
     return result

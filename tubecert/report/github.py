@@ -104,7 +104,7 @@ def append_step_summary(results: Sequence[Checked]) -> None:
     """Adds to the file that GitHub names, if it does; that it cannot be written is no failure of the check."""
     target = os.environ.get("GITHUB_STEP_SUMMARY")
     if target:
-        with contextlib.suppress(OSError), open(target, "a", encoding="utf-8") as file:
+        with contextlib.suppress(OSError), open(target, "a", encoding="utf-8", errors="replace") as file:
             file.write(step_summary(results))
 
 

@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET
 
 from tubecert.checking import Checked, Claim
 from tubecert.findings import Finding, Severity
+from tubecert.printable import visible
 
 PARTS = {
     "TC1": "specification",
@@ -73,10 +74,10 @@ def _case(suite: ET.Element, result: Checked, name: str) -> ET.Element:
 
 
 def _failure(case: ET.Element, kind: str, message: str, findings: Sequence[Finding]) -> None:
-    failure = ET.SubElement(case, "failure", type=kind, message=_clean(message))
+    failure = ET.SubElement(case, "failure", type=_clean(kind), message=_clean(message))
     failure.text = _clean("\n".join(map(str, findings)) or message)
 
 
 def _clean(text: str) -> str:
-    """Without the characters that XML 1.0 cannot hold."""
-    return _NOT_XML.sub("\ufffd", text)
+    """Lines of characters that print, and that XML 1.0 can hold."""
+    return _NOT_XML.sub("\ufffd", "\n".join(map(visible, text.split("\n"))))

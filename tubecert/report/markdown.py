@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tubecert.printable import visible
 from tubecert.report.page import (
     Block,
     Cell,
@@ -21,7 +22,10 @@ from tubecert.report.page import (
 )
 from tubecert.report.page_sections import page_of
 
-_SPECIAL = re.compile(r"([\\`*_\[\]<>|~&$])")
+_SPECIAL = re.compile(r"[\\`*_\[\]<>|~&$]|(?<=\w):(?=//)|(?<=www)\.")
+_AT_START = re.compile(
+    r"(?:#{1,6}|[-+]|\d{1,9}[.)])(?=\s|$)|[-=]+$"
+)  # of a heading, a list, the line below a heading
 
 
 def render(certificate: Mapping[str, Any]) -> str:
@@ -30,7 +34,7 @@ def render(certificate: Mapping[str, Any]) -> str:
 
 
 def _lines(page: Page) -> Iterator[str]:
-    yield f"# {escape(page.name)}: {page.verdict}"
+    yield f"# {escape(page.name)}: {escape(page.verdict)}"
     yield ""
     yield f"**{escape(page.summary)}**"
     yield ""
@@ -41,7 +45,7 @@ def _lines(page: Page) -> Iterator[str]:
 
 def _section(section: Section) -> Iterator[str]:
     yield ""
-    yield f"## {section.title}"
+    yield f"## {escape(section.title)}"
     for block in section.blocks:
         lines = list(_block(block))
         if lines:
@@ -55,14 +59,14 @@ def _block(block: Block) -> Iterator[str]:
             yield escape(block.text)
         case Items():
             if block.title:
-                yield from (f"### {block.title}", "")
+                yield from (f"### {escape(block.title)}", "")
             yield from (f"- {escape(item)}" for item in block.items)
         case Facts():
             yield from (f"- {escape(name)}: {_cell(cell)}" for name, cell in block.facts)
         case Table():
             yield from _table(block)
         case Listing():
-            yield from ("", *(f"    {line}" for line in block.text.splitlines()))
+            yield from _fenced(block.text)
         case Reason():
             yield from _reason(block)
 
@@ -86,7 +90,7 @@ def _cell(cell: Cell) -> str:
 
 
 def _reason(reason: Reason) -> Iterator[str]:
-    yield f"- **{reason.verdict}** {escape(reason.claim)}: {escape(reason.message)}"
+    yield f"- **{escape(reason.verdict)}** {escape(reason.claim)}: {escape(reason.message)}"
     if reason.at:
         yield f"  at {escape(reason.at)}"
     if reason.relax:
@@ -95,5 +99,13 @@ def _reason(reason: Reason) -> Iterator[str]:
 
 def escape(text: str) -> str:
     """A text that Markdown shows as it is, on one line."""
-    flat = " ".join(typeset(text).split())
-    return _SPECIAL.sub(r"\\\1", flat)
+    flat = _SPECIAL.sub(r"\\\g<0>", visible(" ".join(typeset(text).split())))
+    start = _AT_START.match(flat)
+    return flat if start is None else f"{flat[: start.end() - 1]}\\{flat[start.end() - 1 :]}"
+
+
+def _fenced(text: str) -> Iterator[str]:
+    """Preformatted lines, between fences that none of them can end."""
+    longest = max((len(ticks) for ticks in re.findall(r"`+", text)), default=0)
+    fence = "`" * max(3, longest + 1)
+    yield from (fence, *map(visible, text.split("\n")), fence)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -90,7 +91,7 @@ def provenance(certificate: Mapping[str, Any]) -> Iterator[Block]:
 
 def check_again(certificate: Mapping[str, Any]) -> Iterator[Block]:
     """How a stranger convinces himself."""
-    name = f"{certificate['result']['spec']['effective']['name']}.certificate.json"
+    name = shlex.quote(f"{certificate['result']['spec']['effective']['name']}.certificate.json")
     yield Words(
         text="This page shows a certificate and proves nothing itself. The certificate, a JSON file with the hash "
         "above, is what can be checked: without a solver, in another arithmetic, and against its specification."

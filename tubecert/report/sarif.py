@@ -13,6 +13,7 @@ from urllib.parse import quote
 from tubecert import __version__
 from tubecert.checking import Checked
 from tubecert.findings import Finding, Location, Severity
+from tubecert.printable import printable_json
 from tubecert.report.pages import codes
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -31,7 +32,7 @@ def render(results: Sequence[Checked]) -> str:
         "results": _results(findings, used),
     }
     log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
-    return json.dumps(log, indent=1, ensure_ascii=False) + "\n"
+    return printable_json(json.dumps(log, indent=1, ensure_ascii=False)) + "\n"
 
 
 def _driver(used: Sequence[str]) -> dict[str, Any]:
@@ -66,7 +67,9 @@ def _results(findings: Sequence[Finding], used: Sequence[str]) -> list[dict[str,
         }
         if item.location is not None:
             result["locations"] = [{"physicalLocation": _place(item.location)}]
-            line = hashlib.sha256(f"{item.code} {item.location.source.strip()}".encode()).hexdigest()[:16]
+            line = hashlib.sha256(
+                f"{item.code} {item.location.source.strip()}".encode("utf-8", "backslashreplace")
+            ).hexdigest()[:16]
             seen[line] = seen.get(line, 0) + 1
             result["partialFingerprints"] = {"primaryLocationLineHash": f"{line}:{seen[line]}"}
         results.append(result)
@@ -88,6 +91,6 @@ def _artifact(file: str) -> dict[str, str]:
     """A path below the current folder relative to it, any other one as an absolute URI."""
     path = Path(os.path.abspath(file))
     try:
-        return {"uri": quote(path.relative_to(Path.cwd()).as_posix()), "uriBaseId": "%SRCROOT%"}
+        return {"uri": quote(os.fsencode(path.relative_to(Path.cwd()).as_posix())), "uriBaseId": "%SRCROOT%"}
     except ValueError:
         return {"uri": path.as_uri()}

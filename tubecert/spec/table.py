@@ -66,6 +66,11 @@ def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Tabl
     name = entry.text("the name of a CSV file")
     if name is None:
         return None
+    if not name.isprintable():
+        entry.fail(
+            codes.NAME, "the name of the file holds a character that does not print", "rename the file"
+        )
+        return None
     path = Path(entry.reader.source.file).parent / name
     try:
         data = read(str(path), PLAN)

@@ -1,0 +1,160 @@
+"""How a process ends: 1 means refuted and nothing else, and what was half written is gone."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SPEC = str(ROOT / "configs" / "three_state.yaml")
+
+pytestmark = [
+    pytest.mark.timeout(120),
+    pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX"),
+]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return work
+
+
+def started(*arguments, before: str = "", **options):
+    """The command in a process of its own; the code `before` runs first."""
+    code = f"{before}\nfrom tubecert.cli import main\nmain()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def ended(process) -> tuple[int, str, str]:
+    output, errors = process.communicate(timeout=100)
+    return process.returncode, output, errors
+
+
+CERTIFY = """
+import ctypes, os, sys, time
+import certificates
+from tubecert import pipeline
+def certify(*arguments):
+    {body}
+    return certificates.certified()
+pipeline.certify = certify
+"""
+
+
+@pytest.mark.parametrize("status", [0, 1, 2, 4, 130])
+def test_a_library_does_not_decide_on_the_exit_code(status):
+    body = f"ctypes.CDLL(None).exit({status})"
+    code, output, errors = ended(started("certify", SPEC, before=CERTIFY.format(body=body)))
+    assert (code, output) == (3, "")
+    assert errors.startswith("tubecert: internal error: a library ended the process")
+
+
+def test_a_library_that_gets_no_memory_refutes_nothing():
+    """OpenBLAS ends the process with 1 when it gets no memory for its threads."""
+    codes = set()
+    for kilobytes in range(100_000, 240_000, 20_000):
+        limit = kilobytes * 1024
+        process = started(
+            "certify", SPEC, "-q",
+            preexec_fn=lambda limit=limit: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        )  # fmt: skip
+        codes.add(ended(process)[0])
+    assert codes <= {0, 3, 130}, "where it gets no thread, OpenBLAS interrupts the process"
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "import sys; sys.modules['typer'] = None",
+        "import sys; sys.modules['tubecert.cli.app'] = None",
+        CERTIFY.format(body="raise MemoryError('4 TiB')"),
+        CERTIFY.format(body="raise SystemError"),
+        CERTIFY.format(body="raise GeneratorExit"),
+        CERTIFY.format(body="sys.exit(1)"),
+    ],
+)
+def test_an_exception_that_nobody_expects_is_an_internal_error(before):
+    code, output, errors = ended(started("certify", SPEC, before=before))
+    assert (code, output) == (3, "")
+    assert "Traceback" not in errors
+    assert errors.startswith("tubecert: internal error")
+
+
+def test_out_of_memory_is_no_defect():
+    code, _, errors = ended(
+        started("certify", SPEC, before=CERTIFY.format(body="raise MemoryError('4 TiB')"))
+    )
+    assert (code, "out of memory: 4 TiB" in errors) == (3, True)
+    assert "defect" not in errors
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "said"),
+    [
+        (signal.SIGINT, 130, "tubecert: interrupted\n"),
+        (signal.SIGTERM, 143, "tubecert: terminated\n"),
+        (signal.SIGHUP, 129, "tubecert: terminated\n"),
+    ],
+)
+@pytest.mark.parametrize("where", ["work", "write"])
+def test_a_signal_leaves_nothing_behind(folder, number, code, said, where):
+    slow = "print('here', file=sys.stderr, flush=True); time.sleep(60)"
+    before = CERTIFY.format(body=slow if where == "work" else "pass")
+    if where == "write":
+        before += f"def slow(handle): {slow}\nos.fsync = slow\n"
+    process = started("certify", SPEC, "-o", "c.json", before=before)
+    assert process.stderr.readline() == "here\n"
+    if where == "write":
+        assert [path.suffix for path in folder.iterdir()] == [".part"]
+    process.send_signal(number)
+    assert ended(process) == (code, "", said)
+    assert not list(folder.iterdir())
+
+
+def test_a_signal_while_modules_are_imported():
+    for name in ("typer", "numpy"):
+        before = f"""
+import os, signal, sys
+class Stop:
+    def find_spec(self, module, path, target=None):
+        if module == {name!r}:
+            os.kill(os.getpid(), signal.SIGTERM)
+from tubecert.cli import process
+sys.meta_path.insert(0, Stop())
+"""
+        assert ended(started("certify", SPEC, before=before)) == (143, "", "tubecert: terminated\n")
+
+
+def test_nohup_is_honoured(folder):
+    def ignore():
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    body = "os.kill(os.getpid(), 1); time.sleep(0.1)"
+    process = started("certify", SPEC, "-q", before=CERTIFY.format(body=body), preexec_fn=ignore)
+    assert ended(process)[0] == 0
+    assert list(folder.iterdir())
+
+
+def test_what_was_registered_for_the_end_is_done_and_output_is_whole(folder):
+    before = "import atexit; atexit.register(print, 'the end')\n" + CERTIFY.format(body="pass")
+    code, output, _ = ended(started("certify", SPEC, "-q", before=before))
+    assert (code, output.splitlines()[-1]) == (0, "the end")

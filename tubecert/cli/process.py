@@ -1,0 +1,69 @@
+"""The process of a command: how it can be ended from outside, and that its exit code is always ours.
+
+A shell and a workflow read 1 as *refuted*. Others end processes with 1 as well: Python after an exception that nobody
+caught, the C library when a library calls `exit(1)` (OpenBLAS does so when it gets no memory). So a command ends with
+`os._exit` and the code that it decided on, and a call of `exit` by anybody else becomes an internal error (3).
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+_INTERNAL, _INTERRUPTED = 3, 130  # as in `errors.ExitCode`, which is not imported yet
+_SIGNALS = ("SIGTERM", "SIGHUP")  # as SIGINT: what is half written is removed, then 128 + the signal's number
+_ENDED = b"tubecert: internal error: a library ended the process, perhaps for lack of memory"
+
+_received: list[int] = []
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was asked to end."""
+
+
+def prepare() -> None:
+    """Signals that ask for an end are treated as an interruption is; a library cannot decide on the exit code."""
+    for name in _SIGNALS:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup ignores SIGHUP
+            signal.signal(number, _terminate)
+    with contextlib.suppress(ImportError, OSError, AttributeError, MemoryError):
+        _watch_exits()
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+    _received.append(number)
+    raise Terminated("terminated")
+
+
+def _watch_exits() -> None:
+    """Whoever calls `exit` of the C library ends the process with an internal error (see `leave` for who does not).
+
+    The C library itself does it, in reverse order of registration: Python may be in any state by then.
+    """
+    import ctypes
+
+    library = ctypes.CDLL(None)
+    nothing = ctypes.c_void_p(None)
+    register = library["__cxa_atexit"]
+    register(library["_exit"], ctypes.c_void_p(_INTERNAL), nothing)
+    register(library["perror"], _ENDED, nothing)
+
+
+def leave(code: int) -> NoReturn:
+    """Ends the process: what was registered for the end is done, what is buffered is written, then nothing else."""
+    try:
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                with contextlib.suppress(OSError, ValueError):
+                    stream.flush()
+    except BaseException:
+        code = code or _INTERNAL
+    finally:
+        os._exit(128 + _received[0] if _received and code == _INTERRUPTED else code)
