@@ -281,12 +281,14 @@ def check_all(constants, truth):
             check_above(constant, truth[name], name)
 
 
+@pytest.mark.slow
 def test_constants_of_the_three_state_system_enclose_sampled_ones_within_a_hundredth(three, three_truth):
     missing = {name for name, _, _ in three[1].items()} - set(three_truth)
     assert missing == {"initial_distance"}
     check_all(three[1], three_truth)
 
 
+@pytest.mark.slow
 def test_constants_along_a_moving_plan_enclose_sampled_ones_within_a_hundredth(two, two_truth):
     assert {name for name, _, _ in two.items()} == set(two_truth)
     check_all(two, two_truth)
@@ -378,6 +380,7 @@ POWERS = {"lower": -1, "upper": -1, "M_x": -1, "feedback_gain": 0.5, "metric_inp
           "initial_distance": -0.5, "input_gain_least": -0.5, "plan_defect_metric": -0.5}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", ["1e-2", "1e2"])
 def test_scaling_the_metric_scales_every_constant_as_theory_says(three, factor):
     suprema, plain, _, spec = three
@@ -392,6 +395,7 @@ def test_scaling_the_metric_scales_every_constant_as_theory_says(three, factor):
         assert changed.above <= constant.above * scale * 1.0101 + 1e-15, name
 
 
+@pytest.mark.slow
 def test_a_smaller_tube_has_no_larger_constants(two):
     inner = constants_of_two(rho=0.35)
     for name, constant, _ in inner.items():
@@ -402,6 +406,7 @@ def test_a_smaller_tube_has_no_larger_constants(two):
             assert constant.above <= outer.above * 1.0101 + 1e-15
 
 
+@pytest.mark.slow
 def test_permuted_states_have_the_same_constants(three):
     from tubecert.model import ControlAffineModel
 
@@ -536,6 +541,7 @@ def test_a_broken_sine_rule_is_noticed(two, two_truth, monkeypatch):
         check_all(replace(two, h_t=suprema.uncertainty()[2]), two_truth)
 
 
+@pytest.mark.slow
 def test_the_wrong_tube_is_noticed(two, two_truth):
     smaller = constants_of_two(rho=RHO_TWO * 0.97)
     with pytest.raises(AssertionError):

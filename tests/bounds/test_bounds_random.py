@@ -98,6 +98,7 @@ def values_at(at, x, rng):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("moving_input", [False, True], ids=["constant B", "moving B"])
 def test_constants_of_random_systems_are_above_sampled_ones(seed, moving_input):

@@ -75,6 +75,7 @@ def tube_points(draw, name, rho):
     return when, point, centre, inputs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("variables", [("x", "y", "z", "t"), ("z", "u", "x", "t"), ("y", "t"), ("u", "t")])
 @given(data=st.data(), rho=st.sampled_from([1e-3, 0.25, 2.0]))

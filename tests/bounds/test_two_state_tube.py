@@ -71,6 +71,7 @@ def sampled_gain(jacobians: np.ndarray) -> float:
     return best
 
 
+@pytest.mark.slow
 def test_every_proven_side_is_above_the_samples_and_within_a_hundredth(result, samples):
     assert result["tube"]["rho"] == RHO
     for name, seen in samples.items():

@@ -136,6 +136,7 @@ def test_expectations(changes, expect, code, findings, certified):
         assert line[: item["column"] - 1].endswith(f"{key}: ")
 
 
+@pytest.mark.slow
 def test_the_real_thing():
     assert (
         run(spec("good.yaml", expect=f"expect: {{verdict: certified, {RANGES}}}"), "--certify").exit_code == 0
@@ -189,6 +190,7 @@ def test_options_that_make_no_sense(options):
     assert result.stdout == ""
 
 
+@pytest.mark.slow
 def test_jobs_give_the_same(folder):
     for k in range(3):
         spec(f"{k}.yaml", ("rate: 0.9999", f"rate: {k + 0.9}"))
@@ -256,6 +258,7 @@ def test_annotations():
     assert closing == "1 specification checked: 1 error, 1 warning, 1 note"
 
 
+@pytest.mark.slow
 @given(st.text(), st.text(min_size=1))
 def test_no_text_escapes_an_annotation(message, file):
     place = Location(file=file.replace("\0", ""), line=1, column=1)
@@ -291,6 +294,7 @@ def test_github_is_detected_and_gets_a_summary(monkeypatch, tmp_path):
     assert (tmp_path / "summary.md").read_text("utf-8") == summary
 
 
+@pytest.mark.slow
 def test_the_summary_is_one_table_without_markup():
     rows = [line for line in github.step_summary(example()).splitlines() if line.startswith("|")]
     assert all(len(re.findall(r"(?<!\\)\|", row)) == 6 for row in rows), rows
@@ -449,6 +453,7 @@ def test_another_program_does_it_again(monkeypatch):
     assert len(entries()) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [

@@ -160,6 +160,7 @@ def test_a_certificate_is_written_and_reported(folder, proven):
     assert certificate["run"]["versions"]["tubecert"] == __version__
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("result", "code"),
     [
@@ -214,6 +215,7 @@ def test_options_are_exact(proven):
     assert proven["options"] == pipeline.Options(conditions="all", formulas="as-printed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--rho-a", "--epsilon", "--gap", "--budget"])
 @pytest.mark.parametrize(
     "text",
@@ -282,6 +284,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BAD)
 @pytest.mark.parametrize("command", ["certify", "check"])
 def test_bad_specifications(folder, tmp_path, name, command):
@@ -478,6 +481,7 @@ def test_targets_that_take_nothing(folder, proven, target):
     assert not list(folder.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize(
     "arguments", [["certify", SPEC], ["certify", SPEC, "-o", "-"], ["--help"], ["version"]]
@@ -519,6 +523,7 @@ def test_gains_that_nothing_can_have_are_refused(unused, gain):
 # the ways to end
 
 
+@pytest.mark.slow
 def test_a_pipe_that_closes_is_no_error(folder):
     command = process("certify", SPEC, "-v", code=STUBBED.format(body="time.sleep(0.2)"))
     command.stdout.close()
@@ -529,6 +534,7 @@ def test_a_pipe_that_closes_is_no_error(folder):
     assert len(list(folder.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_closed_streams(folder):
     code = STUBBED.format(body="pass").replace("main()", "sys.stdout = sys.stderr = None\nmain()")
     command = process("certify", SPEC, code=code)
@@ -536,6 +542,7 @@ def test_closed_streams(folder):
     assert command.returncode == 0
 
 
+@pytest.mark.slow
 def test_an_ascii_terminal_is_served(folder):
     code = STUBBED.format(body="pass") + "\n"
     command = process(
@@ -545,6 +552,7 @@ def test_an_ascii_terminal_is_served(folder):
     assert (output[:9], errors) == ("certified", "")
 
 
+@pytest.mark.slow
 def test_interrupted(folder):
     body = "print('at work', file=sys.stderr, flush=True); time.sleep(50)"
     command = process("certify", SPEC, code=STUBBED.format(body=body))
@@ -557,6 +565,7 @@ def test_interrupted(folder):
     assert not list(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_interrupted_in_the_middle_of_a_real_run(folder):
     command = process("certify", SPEC, "--gap", "1e-12", "--budget", "1e12")
     time.sleep(3)
@@ -702,6 +711,7 @@ def test_a_real_refusal(folder):
     assert len(reason["at"]["x"]) == 3
 
 
+@pytest.mark.slow
 def test_printed_formulas_prove_nothing(folder):
     result = run("certify", SPEC, "--formulas", "as-printed", "-q")
     assert result.exit_code == 4
@@ -720,6 +730,7 @@ def test_a_budget_that_runs_out_is_undecided(folder):
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_specification_of_the_readme_certifies(folder):
     [text] = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)
     (folder / "example.yaml").write_text(text, encoding="utf-8")
@@ -727,6 +738,7 @@ def test_the_specification_of_the_readme_certifies(folder):
     assert run("certify", "example.yaml").exit_code == 0
 
 
+@pytest.mark.slow
 def test_the_output_of_the_readme_is_real(folder):
     [command] = re.findall(r"tubecert (certify configs/\S+.*)", README)
     _, spec, *options = command.split()

@@ -55,6 +55,7 @@ def test_schema_of_the_specification_by_default():
 # init
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("template", Template)
 def test_templates_certify_as_they_are(template, folder):
     made = run("init", "--template", template)
@@ -141,6 +142,7 @@ def test_every_constant_and_every_tag_has_a_page():
     assert tags <= set(pages.equations()), tags - set(pages.equations())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("topic", sorted({*pages.codes(), *pages.constants(), *pages.equations()}))
 def test_every_page_has_meaning_formula_and_source(topic):
     page = pages.find(topic)

@@ -19,6 +19,7 @@ LINT = ["--cases", "250", "--jobs", "2", "--budget", "200", "--alarm", "60"]
 CERTIFY = ["--cases", "10", "--first", "50", "--jobs", "2", "--mode", "certify", "--budget", "300"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [LINT, CERTIFY], ids=["lint", "certify"])
 def test_nothing_but_findings_comes_out(arguments):
     options = fuzz.options_of(arguments)

@@ -161,6 +161,7 @@ def test_a_sampled_recipe_with_one_number_too_small_is_rejected():
         assert margin_sampled(problem, bad).lo == -np.inf
 
 
+@pytest.mark.slow
 def test_distance_margin_against_an_independent_evaluation():
     problem = alive()
     r = distance_recipe(problem)
@@ -214,6 +215,7 @@ def test_mean_age_and_filter_share_at_high_precision():
             assert age.w.hi - age.w.lo < 1e-12 * float(share)
 
 
+@pytest.mark.slow
 def test_sampled_margin_against_an_independent_evaluation():
     problem = alive()
     r = sampled.recipe_at(problem, Fraction("0.02"), Fraction(40), Fraction("3.5"))
@@ -301,6 +303,7 @@ IN_DISTANCE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(ALIVE))
 def test_every_constant_acts_where_it_should_and_only_there(name):
     base = alive()

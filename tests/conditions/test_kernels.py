@@ -42,6 +42,7 @@ def random_kernel_case() -> tuple[float, float, float, float]:
     return float(c), float(w), float(s0), float(s1)
 
 
+@pytest.mark.slow
 def test_tight_kernel_is_the_supremum_over_time():
     for _ in range(400):
         c, w, s0, s1 = random_kernel_case()
@@ -104,6 +105,7 @@ def D_of_t(case: dict[str, float], t: np.ndarray) -> np.ndarray:
     return A1 + (case["d0"] - A1) * np.exp(-lam * t) + case["beta"] * (case["H0"] - case["S"]) * K
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("horizon", [False, True])
 def test_sup_D_against_dense_grids(horizon):
     for _ in range(500):
@@ -136,6 +138,7 @@ def test_D_is_the_solution_of_its_differential_equation():
         assert path.max() <= float(bound.supremum()) * (1 + 1e-8)
 
 
+@pytest.mark.slow
 def test_sup_D_interval_contains_the_value_at_high_precision():
     narrow = 0
     with mpmath.workdps(80):
@@ -177,6 +180,7 @@ def sup_D_exact(v: dict[str, mpmath.mpf]) -> mpmath.mpf:
 sizes = st.floats(0.0, 5.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.tuples(*[sizes] * 6), st.tuples(*[st.floats(0, 0.5)] * 6), st.floats(0.2, 5), st.floats(0.05, 50))
 def test_sup_D_rises_with_every_size_and_intervals_include(low, extra, lam, omega):

@@ -118,6 +118,7 @@ ELSEWHERE = {"u_star": {"u_star": 40.0}, "h_initial": {"h_t": 0.1, "h_x": 0.01, 
 INERT = {"f", "plan_defect", "input_gain_least", "contraction_excess"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(ALIVE) - INERT))
 def test_a_constant_reduced_by_two_per_cent_changes_the_printed_gains(name):
     values = ALIVE | ELSEWHERE.get(name, {})
@@ -178,6 +179,7 @@ CASES_26 = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", CASES_26)
 def test_least_gains_of_26_against_brute_force(options):
     problem = alive(**options)
@@ -208,6 +210,7 @@ def test_where_26b_binds_a_hundredth_is_left():
     assert judged_26(alive()).binds == "26a"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", CASES_26[:4])
 def test_printed_pairs_of_26_are_proven_and_cannot_be_smaller(options):
     problem = alive(**options)
@@ -264,6 +267,7 @@ def least_rate_by_scan(problem: TubeProblem, omegas: np.ndarray, g: float | None
     return best[1], best[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "g"),
     [
@@ -294,6 +298,7 @@ def test_auto_takes_the_best_predictor_gain_of_b():
     assert pair.recipe.predictor_gain > low
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "problem", [two_state(), three_state(), alive(), alive(A_m=None), alive(smooth=Fraction("0.1"))]
 )
@@ -314,6 +319,7 @@ def test_printed_pairs_of_b_are_proven_and_cannot_be_smaller(problem):
 # --- certificate C
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", [two_state(), three_state(), alive(), alive(A_m=None)])
 def test_sample_times_are_proven_and_cannot_be_longer(problem):
     result = judged_sampled(problem)
@@ -332,6 +338,7 @@ def test_sample_times_are_proven_and_cannot_be_longer(problem):
     assert list(serves(n, Ts, 1e10 / Ts, g)) == [True, False]
 
 
+@pytest.mark.slow
 def test_least_speed_of_c_is_the_least_fixed_point():
     rng = np.random.default_rng(5)
     for _ in range(25):
@@ -392,6 +399,7 @@ def test_a_gap_in_the_constants_leaves_gains_undecided():
     assert judged_sampled(problem, sample_time=Ts * 2).verdict is Verdict.REFUTED
 
 
+@pytest.mark.slow
 def test_one_gain_asked_for_leaves_the_other_to_the_search():
     problem = alive()
     only_rate = judged_26(problem, adaptation_rate=Fraction(10**7))
@@ -510,6 +518,7 @@ def random_problem(rng: np.random.Generator) -> TubeProblem:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_problems_end_in_a_verdict_that_says_why(seed):
     rng = np.random.default_rng(seed)

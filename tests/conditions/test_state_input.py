@@ -33,6 +33,7 @@ def result():
     return certify(spec(), Options())
 
 
+@pytest.mark.slow
 def test_it_is_certified(result):
     assert result["verdict"] == "certified"
 

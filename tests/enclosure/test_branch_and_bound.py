@@ -102,6 +102,7 @@ def check(found, truth, gap=0.01):
     assert found.above - found.below <= max(gap * abs(found.below), 1e-12) * (1 + 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("gap", [0.01, 1e-4])
 def test_known_suprema_are_enclosed_within_the_gap(name, gap):
@@ -143,6 +144,7 @@ def test_the_budget_holds_when_many_boxes_are_taken_at_once():
     assert found.below <= 0
 
 
+@pytest.mark.slow
 def test_a_long_queue_is_sorted_rarely():
     sweeps = []
     effort = Effort(budget=120_000, progress=lambda boxes, below, above: sweeps.append(boxes))
@@ -151,6 +153,7 @@ def test_a_long_queue_is_sorted_rarely():
     assert len(sweeps) < 60  # one batch at a time would take 117 sweeps, each as long as the queue
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "threshold", "verdict"),
     [
@@ -206,6 +209,7 @@ def test_a_range_without_a_float_is_bounded_above_only():
     assert found.below == -math.inf
 
 
+@pytest.mark.slow
 @given(
     coefficients=st.lists(st.fractions(-3, 3, max_denominator=8), min_size=6, max_size=6),
     cut=st.fractions(0, 1, max_denominator=16),
@@ -223,6 +227,7 @@ def test_a_smaller_set_has_no_larger_bound_beyond_the_gap(coefficients, cut):
         assert inner.above <= whole.above * (1 + 0.01)
 
 
+@pytest.mark.slow
 @given(order=st.permutations(["x", "y", "z"]))
 @settings(max_examples=6, deadline=None)
 def test_renaming_the_variables_changes_nothing_beyond_the_gap(order):

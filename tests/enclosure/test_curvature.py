@@ -120,6 +120,7 @@ shares = st.sampled_from([Fraction(0), Fraction(1), HALF, QUARTER, Fraction(2, 7
 # -- the theorem of the module, literally
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @given(data=st.data())
 @QUICK
@@ -152,6 +153,7 @@ def test_the_enclosure_is_that_of_the_theorem(dim, data):
 # -- containment, without any tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dim", "degree"), [(1, 4), (2, 3), (3, 2), (3, 3)])
 @given(data=st.data())
 @QUICK
@@ -455,6 +457,7 @@ USERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", USERS)
 def test_values_inside_are_below_the_bounds_of_boxes(name):
     """Also against targets: one that is exceeded inside is never said to hold; in small boxes little is lost."""
@@ -484,6 +487,7 @@ def test_values_inside_are_below_the_bounds_of_boxes(name):
     assert (objective.upper(lo[:, own], near[:, own], goal).upper <= goal + 0.05).all()
 
 
+@pytest.mark.slow
 def test_weights_that_vary_with_a_further_variable():
     """N <= tau (D_1/mu + mu D_2) for mu in a range: the value is that of sampled mu, or 0."""
     D = [multiply(B, transpose(B)), W]

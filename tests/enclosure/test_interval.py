@@ -85,6 +85,7 @@ def check_arithmetic(data, name):
     assert within(ball(exact(p, q)), operation(thin_or_wide(a), thin_or_wide(b)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARITHMETIC)
 @given(data=st.data())
 @SETTINGS
@@ -158,6 +159,7 @@ def check_function(data, name):
     assert within(exact(ball(data.draw(members(a)))), function(thin_or_wide(a)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOMAINS)
 @given(data=st.data())
 @SETTINGS
@@ -193,6 +195,7 @@ def test_tangent_across_a_pole_is_undefined(k, side, width):
     assert np.isnan(iv.tan(Interval(*a)).lo)
 
 
+@pytest.mark.slow
 @given(data=st.data(), count=st.integers(1, 4))
 @SETTINGS
 def test_norm_and_direction_contain_the_exact_result(data, count):
@@ -223,6 +226,7 @@ UNARY = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNARY)
 @given(data=st.data())
 @SETTINGS

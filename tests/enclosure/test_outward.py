@@ -59,6 +59,7 @@ def projected_values(model, points):
     return np.linalg.eigvalsh(root @ form @ np.swapaxes(root, -1, -2))[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inputs", [1, 2])
 def test_finslers_lemma_is_proven_at_every_vertex(inputs):
     """A target below a value inside the box is never said to hold, one well above it is in small boxes."""

@@ -123,6 +123,7 @@ def turned(d, v):
     return d + 1e3, np.swapaxes(v, -1, -2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, -1.0, np.nan])
 @pytest.mark.parametrize(
     "lie",
@@ -206,6 +207,7 @@ INPUTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INPUTS)
 def test_the_feedback_gain_holds_over_ranges_of_mu(name):
     """x' = A x + B u with a constant W for which C2 holds: every range of mu, down to 0 among them, against values."""

@@ -37,6 +37,7 @@ parts = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(text=texts(), box=boxes, part=parts)
 @SETTINGS
 def test_intervals_contain_the_value_of_the_text(text, box, part):
@@ -49,6 +50,7 @@ def test_intervals_contain_the_value_of_the_text(text, box, part):
     assert possible(evaluate(text, inner), found.lo[0, 0], found.hi[0, 0])
 
 
+@pytest.mark.slow
 @given(text=texts(), point=points)
 @SETTINGS
 def test_thin_intervals_and_floats_agree_with_the_text(text, point):
@@ -64,6 +66,7 @@ def test_thin_intervals_and_floats_agree_with_the_text(text, point):
         assert abs(floats - value) <= 4 * spread + 1e-14 * abs(value) + 1e-300
 
 
+@pytest.mark.slow
 @given(several=st.lists(texts(leaves=6), min_size=2, max_size=5), box=boxes)
 @SETTINGS
 def test_many_outputs_share_slots_without_harm(several, box):

@@ -92,6 +92,7 @@ def by_nodes(e: Expression, point: Point) -> Fraction:
     return done[e]
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(built=rational_functions, point=points)
 def test_a_graph_has_the_value_of_its_construction(built: Built, point: Point) -> None:
@@ -134,6 +135,7 @@ class Dual:
         return result if n >= 0 else Dual(Fraction(1)) / result
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(built=rational_functions, point=points, name=st.sampled_from(NAMES))
 def test_a_derivative_is_that_of_dual_numbers(built: Built, point: Point, name: str) -> None:

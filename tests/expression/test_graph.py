@@ -140,6 +140,7 @@ def test_derivative_of_a_norm_is_a_direction() -> None:
     assert directions[0].args == (x, 2 * y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=60, deadline=None)
 @given(text=texts(), point=points)
@@ -177,6 +178,7 @@ def test_number_text_is_exact(q: Fraction) -> None:
     assert parse_number(number_text(q)) == q
 
 
+@pytest.mark.slow
 @given(
     numerator=st.integers(-(2**4_999), 2**4_999),
     denominator=st.integers(1, 2**4_999)
@@ -236,6 +238,7 @@ def test_free_symbols() -> None:
     assert free_symbols([x * sin(y), PI]) == {"x", "y"}
 
 
+@pytest.mark.slow
 def test_deep_expressions_need_no_recursion() -> None:
     e = x
     for _ in range(20_000):

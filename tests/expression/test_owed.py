@@ -77,6 +77,7 @@ def partial(draw: st.DrawFn) -> str:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(text=partial())
 def test_the_text_owes_what_was_owed(text: str) -> None:

@@ -39,6 +39,7 @@ def test_identity_survives_pickle(text: str) -> None:
         assert all(found is other for found in copies(other))
 
 
+@pytest.mark.slow
 def test_depth_needs_no_recursion() -> None:
     e = x
     for _ in range(20_000):

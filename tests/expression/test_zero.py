@@ -81,6 +81,7 @@ def test_nothing_else_is_claimed(text: str) -> None:
     assert is_zero(read(text)) is None
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(text=texts(), point=points)
 def test_a_claim_agrees_with_the_values(text: str, point: dict) -> None:  # type: ignore[type-arg]
@@ -101,6 +102,7 @@ def test_the_product_rule_is_proven_for_trigonometric_polynomials(a: str, b: str
     assert is_zero(shift + 1) is not True
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(30)
 def test_the_budget_ends_an_expansion() -> None:
     big = read("((x + y + t + 1)**12*(x - y + 2*t + 3)**12)**2 - (x*y + t)**12")

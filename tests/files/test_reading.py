@@ -66,6 +66,7 @@ def strange(kind: str) -> str:
 STRANGE = ["pipe", "link to a pipe", "folder", "socket", "/dev/zero", "/dev/tty", "/dev/full"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", STRANGE)
 @pytest.mark.parametrize(
     "command",
@@ -158,6 +159,7 @@ SECRETS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SECRETS)
 @pytest.mark.parametrize("format_", ["text", "json", "sarif", "junit", "github"])
 def test_nothing_is_shown_of_a_file_that_is_no_plan(name, format_):
@@ -194,6 +196,7 @@ def test_a_link_in_a_folder_does_not_lead_out_of_it():
 # size of what is reported (S3)
 
 
+@pytest.mark.slow
 def test_long_lines_and_many_columns_cost_little():
     Path("spec.yaml").write_text(PLAN.replace("FILE", "plan.csv"))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -95,6 +95,7 @@ def only_for_types(tree: ast.Module) -> set[ast.AST]:
     return {inner for block in blocks for inner in ast.walk(block)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", modules("__init__", "__main__"))
 def test_a_room_imports_only_from_earlier_rooms(path):
     own = room_of(path)
@@ -129,6 +130,7 @@ def test_recheck_shares_nothing_with_the_producer(path):
     assert not {name.split(".")[0] for name in imported(tree)} & {"numpy", "scipy", "cvxpy", "sympy"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", modules())
 def test_nothing_is_evaluated(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -49,6 +49,7 @@ def test_dependencies_are_what_is_imported():
     assert foreign == {MODULE_OF.get(name, name) for name in needed()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", libraries.SHOWING)
 def test_what_only_shows_is_used_where_things_are_shown(name):
     figures = {path for path in MODULES if path.name.startswith("figures")}

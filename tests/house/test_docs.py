@@ -112,6 +112,7 @@ def test_errata_mentioned_elsewhere_exist():
     assert known == {f"E{i}" for i in range(1, len(known) + 1)}
 
 
+@pytest.mark.slow
 def test_theorem_b_can_be_checked_from_the_file_alone():
     """The check that docs/guarantee describes, (4.1)-(4.4), in plain floats."""
     text = (ROOT / "configs" / "three_state.yaml").read_text(encoding="utf-8")

@@ -22,6 +22,7 @@ def shape(line: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"\d[\d.]*(e-?\d+)?", "#", line)).strip()
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_the_tutorial(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -156,6 +156,7 @@ def test_three_state_has_the_known_values(rho, known):
     assert found.value.below <= found.value.above <= known * 1.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "W", "rho"), [(CURVED, curved, 0.3), (CURVED, curved, 0.05)])
 def test_bounds_lie_above_sampling(system, W, rho):
     found = bounded(system, (0, 0, 0), rho)
@@ -181,6 +182,7 @@ def test_half_plane_has_its_closed_form():
     assert found.slope.below <= L <= found.slope.above <= 2.1 * L
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "centre", "rho"), [(HALF_PLANE, (0, 1), 0.45), (CURVED, (0, 0, 0), 0.3)])
 def test_the_value_is_that_of_the_theorem(system, centre, rho):
     """(5.1) in rational numbers: G rho + L rho^2/8, from the enclosures of G and L; here L counts."""
@@ -197,12 +199,14 @@ def test_the_value_is_that_of_the_theorem(system, centre, rho):
     assert Fraction(found.slope.above) * Fraction(rho) ** 2 / 8 > above / 50
 
 
+@pytest.mark.slow
 def test_a_tube_beyond_the_cut_locus_fails():
     """Many minimisers join opposite points of a sphere; in these coordinates (1, 0) is opposite (-1, 0)."""
     assert not bounded(SPHERE, (1, 0), 2.0).holds
     assert bounded(SPHERE, (1, 0), 0.2).holds
 
 
+@pytest.mark.slow
 def test_the_value_does_not_depend_on_the_scale_of_the_metric_or_the_order_of_states():
     once = bounded(CURVED, (0, 0, 0), 0.2)
     scaled = model([[e * 7 for e in row] for row in CURVED.W])
@@ -234,6 +238,7 @@ def test_where_the_metric_degenerates_nothing_is_proven():
     assert not bounded(singular, (0, Fraction(1, 2)), 0.6, budget=2000).holds
 
 
+@pytest.mark.slow
 def test_the_verdict_rests_on_the_bound_from_above():
     found = bounded(CURVED, (0, 0, 0), 0.3, budget=1)
     assert found.value.above >= bounded(CURVED, (0, 0, 0), 0.3).value.below
@@ -249,6 +254,7 @@ def test_a_wrong_derivative_would_be_noticed(monkeypatch):
     assert np.abs(mid[0] - slopes(curved, np.full(3, 0.2))).max() > 1e-2
 
 
+@pytest.mark.slow
 def test_the_certificate_says_whether_uniqueness_is_proven():
     three = certify(load_text(THREE, "three.yaml"), Options())
     entry = three["metric"]["unique_geodesics"]

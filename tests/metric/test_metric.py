@@ -253,6 +253,7 @@ def sampled_rate(dW):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("i", "j"), [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_one_entry_moved_by_a_thousandth_is_judged_as_the_sampled_rate_says(i, j, sign):
@@ -272,6 +273,7 @@ def test_one_entry_moved_by_a_thousandth_is_judged_as_the_sampled_rate_says(i, j
         assert_witness(model, proof, model.rate, BOX_THREE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", range(7))
 def test_a_wrong_sign_in_f_is_refused(wrong):
     terms = [["-x1", "x3"], ["x1**2", "-2*x1*x3", "-x2", "x3"], ["-x2"]]
@@ -320,6 +322,7 @@ def test_a_metric_that_vanishes_at_one_point_is_not_certified():
     assert proof.verdict != "certified"
 
 
+@pytest.mark.slow
 def test_the_rate_is_judged_exactly():
     proof = verdict_of(three_state(), BOX_THREE)
     below, above = Fraction(proof.largest_rate.below), Fraction(proof.largest_rate.above)
@@ -358,6 +361,7 @@ def test_a_drift_that_cannot_be_bounded_within_the_budget_is_no_crash():
 # -- invariance ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", ["1e-2", "0.3", "1e2"])
 def test_scaling_the_metric_changes_no_rate(factor):
     plain = verdict_of(three_state(), BOX_THREE)

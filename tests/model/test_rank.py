@@ -61,6 +61,7 @@ def test_full_rank_is_proven(name: str) -> None:
     assert verdict(FULL[name]) == "proven"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEFICIENT)
 @pytest.mark.parametrize("side", [("-1", "1"), ("-1", "1/3"), ("-1", "0.5")])
 def test_a_rank_that_is_lost_somewhere_is_never_proven(name: str, side: tuple[str, str]) -> None:
@@ -68,6 +69,7 @@ def test_a_rank_that_is_lost_somewhere_is_never_proven(name: str, side: tuple[st
     assert verdict(DEFICIENT[name], side) != "proven"
 
 
+@pytest.mark.slow
 def test_a_lost_rank_is_shown_with_its_point() -> None:
     found = rank_decision(model([["x"], ["y"]]), [(Fraction(-1), Fraction(1))] * 2, EFFORT)
     assert found.verdict == "refuted"
@@ -108,6 +110,7 @@ def codes(**given: str) -> list[str]:
     return [f.code for f in domain_findings(load_text(text), (Fraction(0), Fraction(4)), EFFORT)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["F", "G", "H", "W"])
 @pytest.mark.parametrize(
     ("owed", "expected"),

@@ -93,6 +93,7 @@ def test_three_state_tube_is_the_fixed_point_of_its_own_metric_bounds(three):
     assert needed <= three["tube"]["rho"] <= needed * (1 + 2e-6)
 
 
+@pytest.mark.slow
 def test_gains_of_the_reference_rows(monkeypatch):
     problem = captured_problem(declared(THREE), monkeypatch)
     worst_start = dataclasses.replace(problem.constants, h_initial=problem.constants.h)
@@ -110,6 +111,7 @@ def test_gains_of_the_reference_rows(monkeypatch):
     assert c.sample_time_limit == pytest.approx(0.1258, rel=0.03)
 
 
+@pytest.mark.slow
 def test_as_printed_reproduces_the_papers_own_formulas():
     result = run(declared(THREE), formulas="as-printed")
     assert result["verdict"] == "undecided"
@@ -143,6 +145,7 @@ def test_false_metrics_are_refuted_with_a_point_and_the_largest_rate(text, large
     assert "conditions_26" not in result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", ["1/100", "100"])
 def test_scaling_the_metric_changes_no_gain(three, scale):
     spec = load_text(THREE, "spec.yaml")
@@ -153,6 +156,7 @@ def test_scaling_the_metric_changes_no_gain(three, scale):
     assert_same_gains(three, run(with_metric(THREE, f"  dual_metric:\n{rows}\n")))
 
 
+@pytest.mark.slow
 def test_permuting_the_states_changes_no_gain(three):
     names = {"x1": "p", "x2": "q", "x3": "r"}
     spec = load_text(THREE, "spec.yaml")
@@ -202,6 +206,7 @@ def assert_same_gains(one, other):
     assert other["sampled"]["sample_time"] == pytest.approx(one["sampled"]["sample_time"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_smaller_tube_never_has_larger_constants(three):
     smaller = run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "epsilon: 0.005, rho_a: 0.005")))
     derived = {"theta", "prediction_error", "filter_error", "zeta_1", "zeta_2", "zeta_3", "Psi_rate", "speed"}
@@ -212,6 +217,7 @@ def test_a_smaller_tube_never_has_larger_constants(three):
     assert smaller["constants"]["lower"]["below"] >= three["constants"]["lower"]["below"] * 0.99
 
 
+@pytest.mark.slow
 def test_gains_asked_for_are_judged_as_given(three):
     omega = Fraction(repr(three["conditions_26"]["bandwidth"]))
     Gamma = Fraction(three["conditions_26"]["adaptation_rate"])
@@ -224,6 +230,7 @@ def test_gains_asked_for_are_judged_as_given(three):
     assert any(reason["condition"] == "26c" for reason in weak["reasons"])
 
 
+@pytest.mark.slow
 def test_gains_beyond_all_bounds_are_told_in_words():
     result = run(THREE, bandwidth=Fraction(1, 10**30), adaptation_rate=Fraction(1))
     reasons = [from_json(Reason, reason, "reason") for reason in result["reasons"]]
@@ -233,6 +240,7 @@ def test_gains_beyond_all_bounds_are_told_in_words():
     assert not any("inf" in words for words in said.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["26", "distance", "sampled", "all"])
 def test_the_chosen_conditions_decide(name):
     result = run(THREE, conditions=name)
@@ -240,6 +248,7 @@ def test_the_chosen_conditions_decide(name):
     assert len(result["decided_by"]) == (3 if name == "all" else 1)
 
 
+@pytest.mark.slow
 def test_a_moving_plan_is_certified_and_its_defect_proven_zero():
     result = run(ORBIT)
     assert result["verdict"] == "certified"
@@ -248,6 +257,7 @@ def test_a_moving_plan_is_certified_and_its_defect_proven_zero():
     assert result["tube"]["rho"] == 0.7
 
 
+@pytest.mark.slow
 def test_a_wrong_plan_has_its_defect_measured_and_costs_gain_or_the_certificate():
     exact = run(ORBIT)
     slightly = run(edited(ORBIT, ("    - sin(t)\n", "    - 1.02*sin(t)\n")))
@@ -269,6 +279,7 @@ def test_a_tube_that_leaves_the_safe_set_is_refuted_with_time_and_point():
     assert reason["at"]["x"][1] == pytest.approx(1.7, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_declared_bounds_are_checked_against_the_expression():
     broken = run(edited(THREE, ('  h: ["0.1*sin(2*t)"]', '  h: ["0.1*sin(2*t)"]\n  bounds: {h: 0.09}')))
     assert broken["verdict"] == "refuted"
@@ -285,6 +296,7 @@ def test_declared_metric_bounds_must_hold_on_the_safe_set():
     assert (result["reasons"][0]["claim"], result["reasons"][0]["side"]) == ("metric_bound", "lower")
 
 
+@pytest.mark.slow
 def test_declared_uncertainty_alone_is_believed_and_named():
     result = run(edited(THREE, ('  h: ["0.1*sin(2*t)"]', "  bounds: {h: 0.1, h_x: 0, h_t: 0.2}")))
     assert result["verdict"] == "certified"
@@ -292,6 +304,7 @@ def test_declared_uncertainty_alone_is_believed_and_named():
     assert result["constants"]["h_initial"]["above"] == 0.1
 
 
+@pytest.mark.slow
 def test_an_aperiodic_uncertainty_needs_a_horizon():
     text = edited(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + 0.01*sin(pi*t)"))
     with pytest.raises(SpecError, match="horizon") as caught:
@@ -329,6 +342,7 @@ def test_a_point_is_said_to_be_near_a_zero_unless_it_is_one(expression, said):
     assert any(said in finding.message for finding in caught.value.findings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "expression", ["0*(1/(t + 1)) + x1", "(t/(t**2 + 1))**0 + x1", "exp((x1 - x1)/(x2 + t))"]
 )
@@ -347,6 +361,7 @@ def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
     assert x[0] + x[1] == pytest.approx(0.05, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_the_ball(three):
     around = run(edited(THREE, ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01732050808}")))  # |x0| of the point
     assert around["verdict"] == "certified"
@@ -361,6 +376,7 @@ def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_
     assert around["conditions_26"]["bandwidth"] > three["conditions_26"]["bandwidth"]  # E0 is larger
 
 
+@pytest.mark.slow
 def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
     text = edited(
         THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}")
@@ -374,6 +390,7 @@ def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
     assert result["constants"]["h_initial"]["above"] <= 0.0101
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("supremum", "loser"), [("metric_slope", "conditions_26"), ("norms", None)])
 def test_a_constant_without_a_bound_stops_only_what_needs_it(supremum, loser, monkeypatch):
     """B and C do not contain the slope of the metric; without a bound of h there is nothing."""

@@ -54,7 +54,9 @@ def examine(document, budget=20_000, memory=None):
     return recheck(json.dumps(document), "certificate", budget, memory=memory)
 
 
-@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [THREE, *(pytest.param(path, marks=pytest.mark.slow) for path in CONFIGS if path != THREE)]
+)
 def test_a_shipped_certificate_is_confirmed(shipped, path):
     found = examine(shipped(path))
     assert [claim for claim in found.claims if not claim.outcome.holds] == []
@@ -62,6 +64,7 @@ def test_a_shipped_certificate_is_confirmed(shipped, path):
     assert len(found.claims) > 45
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", CONFIGS[:3], ids=lambda path: path.stem)
 def test_the_bounds_of_both_arithmetics_agree_within_the_gap(shipped, path):
     """Above: confirmed (the test before). A bound a little below the producer's `below` is never confirmed."""
@@ -81,6 +84,7 @@ def test_the_bounds_of_both_arithmetics_agree_within_the_gap(shipped, path):
     assert refuted >= 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "count"), [(THREE, 150), (TWO, 40)], ids=["three_state", "two_state"])
 def test_a_changed_field_is_never_confirmed_unless_it_is_harmless(shipped, path, count):
     refused, accepted, wrong = tampers.campaign(shipped(path), count, seed=7)
@@ -89,6 +93,7 @@ def test_a_changed_field_is_never_confirmed_unless_it_is_harmless(shipped, path,
     assert accepted  # harmless changes are not refused
 
 
+@pytest.mark.slow
 def test_every_constant_that_is_understated_is_named(shipped):
     document, memory = shipped(THREE), {}
     examine(document, memory=memory)
@@ -104,6 +109,7 @@ def test_every_constant_that_is_understated_is_named(shipped):
         assert found.exit_code == ExitCode.NOT_CERTIFIED, name
 
 
+@pytest.mark.slow
 def test_a_change_without_the_hash_is_contradicted(shipped):
     document = shipped(THREE)
     document["result"]["reasons"][0]["margins"]["26a"] = 0.5
@@ -166,6 +172,7 @@ BUGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bug", BUGS)
 def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
     place, name, broken, claims = BUGS[bug]
@@ -246,6 +253,7 @@ def other_metric(effective):
     effective["metric"]["dual_metric"][0][0] = "0.2"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "claim"),
     [(louder, "h <="), (faster, "C2"), (longer, "rho ="), (other_metric, "C")],
@@ -277,6 +285,7 @@ def test_a_refuted_metric_is_confirmed_at_its_witness():
         examine(written(result))
 
 
+@pytest.mark.slow
 def test_as_printed_formulas_never_certify():
     options = pipeline.Options(formulas="as-printed")
     result = pipeline.certify(spec.load(THREE), options)
@@ -299,6 +308,7 @@ def command(*arguments):
     return CliRunner().invoke(app, ["recheck", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_the_command_confirms_and_says_so(certified):
     done = command(certified, "--spec", THREE)
     assert done.exit_code == 0
@@ -308,6 +318,7 @@ def test_the_command_confirms_and_says_so(certified):
     assert command(certified, "-q").stdout.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_the_command_answers_in_json(certified):
     data = json.loads(command(certified, "--json").stdout)
     assert data["verdict"] == "confirmed"
@@ -322,6 +333,7 @@ def test_another_specification_is_a_named_error(certified):
     assert "system" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_comment_in_the_specification_changes_its_text_only(certified, tmp_path):
     other = tmp_path / "commented.yaml"
     other.write_text("# mine\n" + THREE.read_text(encoding="utf-8"), encoding="utf-8")
@@ -330,6 +342,7 @@ def test_a_comment_in_the_specification_changes_its_text_only(certified, tmp_pat
     assert "the text of the file has changed" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_failing_claim_is_named_first(certified):
     document = json.loads(certified.read_text(encoding="utf-8"))
     document["result"]["constants"]["f_x"] |= {"below": 1.7, "above": 1.8}

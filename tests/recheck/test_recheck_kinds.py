@@ -90,6 +90,7 @@ def failing(found):
     return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_certificate_is_confirmed(kind):
     text, *changes = KINDS[kind]
@@ -114,6 +115,7 @@ def claims_more(document):
     yield "margin"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["start within a radius", "an h with a kink", "two inputs"])
 def test_no_kind_of_certificate_may_claim_more(kind):
     text, *changes = KINDS[kind]
@@ -214,12 +216,14 @@ def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
     assert found.outcome.verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_what_was_left_undecided_stays_so():
     document = certified(SMALL, formulas="as-printed")
     assert document["result"]["verdict"] == "undecided"
     assert examine(document).exit_code == ExitCode.UNDECIDED
 
 
+@pytest.mark.slow
 def test_a_radius_is_proven_with_sharper_bounds_where_those_that_are_printed_fall_short():
     """What is printed is rounded outward: rho may be a little less than it asks for, but not less than the truth."""
     document = certified(SMALL, conditions="distance")
@@ -256,6 +260,7 @@ def command(*arguments):
     return CliRunner().invoke(app, ["recheck", "-q", *map(str, arguments)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -273,6 +278,7 @@ def test_what_no_claim_rests_on_makes_no_other_system(files, change, words):
     assert f"nothing rests on what differs: {words}" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -294,6 +300,7 @@ def test_what_claims_rest_on_makes_another_system(files, change, words):
     assert f"small.yaml: {words} differ" in " ".join(done.stderr.split())
 
 
+@pytest.mark.slow
 def test_what_the_command_line_replaced_is_said(files):
     path, target = files(SMALL, epsilon=Fraction("0.3"))
     done = command(target, "--spec", path)
@@ -301,6 +308,7 @@ def test_what_the_command_line_replaced_is_said(files):
     assert "with epsilon given on the command line" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_synthesised_metric_belongs_to_the_file_that_asked_for_it(tmp_path):
     text = replaced(
         SMALL,
@@ -319,6 +327,7 @@ def test_a_synthesised_metric_belongs_to_the_file_that_asked_for_it(tmp_path):
     assert "TC604" in command(target, "--spec", path).stderr
 
 
+@pytest.mark.slow
 def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     rows = ["t,x,y,u", "0,0,0,0", "1,0,0,0", "2,0,0,0"]
     plan = tmp_path / "plan.csv"
@@ -344,6 +353,7 @@ def wiggling():
     return json.dumps(certified(replaced(SMALL, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))))
 
 
+@pytest.mark.slow
 def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
     document = json.loads(wiggling())
     assert document["result"]["constants"]["plan_defect"]["above"] == 0
@@ -360,6 +370,7 @@ def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     assert found.verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_a_defect_that_is_denied_is_contradicted():
     document = certified(replaced(SMALL, (PLAN, PLAN.replace("[0, 0]", "[0.02, 0]"))))
     assert document["result"]["constants"]["plan_defect_metric"]["below"] > 0

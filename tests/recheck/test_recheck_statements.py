@@ -167,6 +167,7 @@ def sealed(result):
     return json.loads(certificate.dump(certificate.seal(result, {})))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["metric_slope", "contraction_excess", "input_gain_least"])
 def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
     """B does not rest on it: its certificate is confirmed."""
@@ -186,6 +187,7 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
     assert found.exit_code == ExitCode.CERTIFIED
 
 
+@pytest.mark.slow
 def test_a_pole_in_the_safe_set_is_found():
     """What an expression owes is read with it, and the curve between the poles proves nothing."""
     document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), pipeline.Options()))
@@ -197,6 +199,7 @@ def test_a_pole_in_the_safe_set_is_found():
         assert claim.outcome(None).holds is not found
 
 
+@pytest.mark.slow
 def test_nothing_rests_on_a_constant_without_a_bound():
     """Whichever bound is struck out of a certificate, every section that rests on it is no longer confirmed."""
     document = sealed(

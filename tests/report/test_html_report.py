@@ -100,6 +100,7 @@ def parsed(certificate):
 # -- the page as a document
 
 
+@pytest.mark.slow
 def test_well_formed_with_unique_anchors_that_resolve(any_certificate):
     page = parsed(any_certificate)
     ids = page.values("id") + [x.get("id") for d in page.drawings for x in d.iter() if x.get("id")]
@@ -144,6 +145,7 @@ def test_the_same_certificate_gives_the_same_page_before_and_after_it_is_written
         assert render(any_certificate) == render(read_back) == render(shuffled)
 
 
+@pytest.mark.slow
 def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
     file = tmp_path / "orbit.json"
     file.write_text(certificate.dump(orbit), encoding="utf-8")
@@ -185,6 +187,7 @@ def _planted(text):
     return certificate.seal(result, {**RUN, "command": text, "versions": {text or "a": text}})
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(HOSTILE)
 def test_no_text_becomes_markup(text):

@@ -50,6 +50,7 @@ def drawn():
 # what comes out
 
 
+@pytest.mark.slow
 def test_a_campaign_that_finds_nothing(files, drawn):
     result = command("--runs", "8", "--controllers", "ccm,l1,sampled")
     assert result.exit_code == 0, result.output
@@ -72,6 +73,7 @@ def test_a_campaign_that_finds_nothing(files, drawn):
     assert last["u"] == pytest.approx(last["plan_u"] + last["k_u"] + last["u_a_u"], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(files, drawn):
     for name in ("one", "two"):
         assert command("--runs", "3", "--controllers", "l1", "-o", name).exit_code == 0
@@ -96,6 +98,7 @@ def test_json_and_quiet():
     assert command("--runs", "0", "-q").stdout.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_gains_that_are_far_too_small_leave_the_tube(files):
     text = FLAT.replace("0.2*sin(t)", "1.5*sin(t)").replace("epsilon: 0.2", "epsilon: 0.3")
     (files / "strong.yaml").write_text(text)
@@ -107,6 +110,7 @@ def test_gains_that_are_far_too_small_leave_the_tube(files):
     assert (files / "strong.simulation" / "certificate.json").exists()
 
 
+@pytest.mark.slow
 def test_a_broken_promise_is_loud_and_can_be_replayed(files):
     """A certificate that promises too much: the tube is made ten times thinner than it was certified."""
     _, result = certified("flat")
@@ -135,6 +139,7 @@ def test_a_broken_promise_is_loud_and_can_be_replayed(files):
 # runs do not depend on how they are grouped; interruption keeps what is finished
 
 
+@pytest.mark.slow
 def test_runs_do_not_depend_on_their_batches(monkeypatch):
     where = setting("flat", duration="2")
     loop = loop_of(where, "l1", Choice())
@@ -195,6 +200,7 @@ def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
     assert result.stdout.startswith("no result flat: ")
 
 
+@pytest.mark.slow
 def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
     from fractions import Fraction
 

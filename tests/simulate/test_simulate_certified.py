@@ -161,12 +161,14 @@ def test_the_duration_is_the_horizon_unless_asked_for():
     assert "the plan ends at 4 s" in finding.message
 
 
+@pytest.mark.slow
 def test_a_plan_for_ever_is_simulated_for_ten_time_constants():
     spec, result = certified("three_state")
     assert setting_of(spec, result).horizon == 10  # simulation.duration
     assert setting_of(replace(spec, simulation=None), result).horizon == pytest.approx(10 / 0.9999)
 
 
+@pytest.mark.slow
 def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
     text = (CONFIGS / "three_state.yaml").read_text() + '  h: ["0.05*cos(t)"]\n'
     _, result = certified("three_state")

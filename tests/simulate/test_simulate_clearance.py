@@ -80,6 +80,7 @@ def test_a_curve_meets_an_obstacle_in_the_plane_of_its_states():
     assert of_curve(spec, t, x)[0].value == pytest.approx(1 - 4 * 0.29)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(coordinates, coordinates, st.floats(0.2, 2), st.floats(0.1, 1), st.floats(0.1, 1))
 def test_the_clearance_of_a_tube_is_never_too_large(a, c, rho, wide, high):

@@ -109,6 +109,7 @@ START = np.array([[0.4, -0.3]])
 SIZES = {"nominal": 0, "ccm": 0, "reference": 1, "l1": 4}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", SIZES)
 def test_loops_agree_with_dop853(controller):
     gains = Gains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e4)
@@ -127,6 +128,7 @@ def test_loops_agree_with_dop853(controller):
     assert np.allclose(found.distance[0], size, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_sharp_projection_agrees_with_dop853_between_its_switches():
     """The radius is half of what h needs: the projection works for most of the time."""
     gains = Gains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
@@ -178,6 +180,7 @@ def switching(gains, times):
     return np.array([rows[s] for s in times])
 
 
+@pytest.mark.slow
 def test_smooth_projection_agrees_with_dop853():
     gains = Gains(
         bandwidth=10.0, projection_radius=1.5, predictor_gain=2.0, adaptation_rate=400.0, smooth=0.2
@@ -223,6 +226,7 @@ def sampled_reference(gains, times, h=h2):
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [50.0, 1.0])
 def test_sampled_loop_agrees_with_its_formulas(radius):
     gains = Gains(bandwidth=20.0, projection_radius=radius, predictor_gain=3.0, sample_time=0.037)
@@ -258,6 +262,7 @@ STEADY = X + Fraction(1, 2) * sin(X)
 SMOOTH_H = (sin(2 * T) + Fraction(3, 10) * sin(X),)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "B", "rate", "least"),
     [
@@ -341,6 +346,7 @@ def slanted_rate(controller, gains):
     return rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ["reference", "l1"])
 def test_state_dependent_inputs_agree_with_dop853(controller):
     gains = Gains(bandwidth=10.0, projection_radius=5.0, predictor_gain=4.0, adaptation_rate=2000.0)
@@ -357,6 +363,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ["ccm", "reference", "l1", "sampled"])
 def test_held_controllers_converge_to_the_continuous_ones(controller):
     gains = Gains(

@@ -44,6 +44,7 @@ def hyperbolic(p, q):
     return float(np.arccosh(1 + ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) / (2 * p[1] * q[1])))
 
 
+@pytest.mark.slow
 def test_constant_metrics_have_straight_geodesics():
     W = [[Fraction(2), Fraction(1, 2)], [Fraction(1, 2), Fraction(3)]]
     p, q = np.array([0.3, -1.0]), np.array([1.0, 2.0])
@@ -54,6 +55,7 @@ def test_constant_metrics_have_straight_geodesics():
     assert np.allclose(found.covectors, [M @ (q - p)] * 2, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_flat_metrics_in_curved_coordinates_keep_their_distances():
     """z = (x, y + x^2/2) with |dz|^2: W = J^-1 J^-T; the solver has to find the straight line in z."""
     W = [[1, -X], [-X, 1 + X**2]]

@@ -274,6 +274,7 @@ L1 = Gains(bandwidth=20.0, projection_radius=50.0, predictor_gain=2.0, adaptatio
 C = Gains(bandwidth=20.0, projection_radius=50.0, predictor_gain=3.0, sample_time=0.037)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "gains"), [("ccm", None), ("l1", L1), ("sampled", C)], ids=["ccm", "l1", "sampled"]
 )
@@ -287,6 +288,7 @@ def test_inputs_that_jump_at_knots(controller, gains):
 PAIRS = [np.array(u) for u in ((0.3, -0.2), (-0.4, 0.5), (0.2, 0.1))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smooth", [None, 0.2], ids=["hard", "smooth"])
 def test_two_inputs_whose_estimate_slides_along_the_ball(smooth):
     gains = Gains(
@@ -302,6 +304,7 @@ def test_two_inputs_whose_estimate_slides_along_the_ball(smooth):
     assert np.ptp(angle) > 0.5  # along the rim, not only at one place
 
 
+@pytest.mark.slow
 def test_two_sampled_inputs_are_clipped_to_the_ball():
     gains = Gains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=3.0, sample_time=0.04)
     found, expected = compared(TWO_INPUTS, ("sampled", gains), PAIRS, span=0.3, K=12)
@@ -311,6 +314,7 @@ def test_two_sampled_inputs_are_clipped_to_the_ball():
     assert size.max() <= RADIUS * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_tolerances_are_kept_where_inputs_jump():
     """The error estimate is no smaller than the error."""
     for tolerance in (1e-3, 1e-5):

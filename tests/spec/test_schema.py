@@ -174,6 +174,7 @@ expect: {verdict: certified}
 """
 
 
+@pytest.mark.slow
 def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path):
     """Every call of `.mapping(` is met, and what it asks for is what the schema says at that place."""
     asked = Asked()
@@ -269,6 +270,7 @@ VARIANTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(VARIANTS))
 def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     path, old, new, options = VARIANTS[name]

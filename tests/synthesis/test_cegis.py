@@ -180,6 +180,7 @@ def test_symmetries_are_found_and_halve_the_unknowns():
     assert (len(signs), mask.sum()) == (0, 189)
 
 
+@pytest.mark.slow
 def test_symmetries_do_not_change_the_least_kappa(monkeypatch):
     monkeypatch.setattr(
         cegis, "counterexample", lambda *_: Judgement(verdict="proven")
@@ -277,6 +278,7 @@ def cvxpy_least(A, B, rate, floor=None):
     return None if found is None else found.value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floor", ["identity", "input"])
 def test_bound_is_that_of_cvxpy(floor):
     # C2 of the two-state system is affine in x2^2: its extremes are all there is
@@ -291,6 +293,7 @@ def test_bound_is_that_of_cvxpy(floor):
     assert np.linalg.eigvalsh(V - least)[0] > -1e-6
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10_000), rate=st.sampled_from([0.2, 0.7]))
 def test_linear_systems_agree_with_cvxpy(seed, rate):
@@ -319,6 +322,7 @@ def test_three_state_is_proven_close_to_the_uncontrollable_mode():
     assert beyond.coefficients is None
 
 
+@pytest.mark.slow
 def test_any_expression_of_the_specification():
     model = system(
         ["x", "y", "z"],
@@ -343,6 +347,7 @@ def framed_family(model, degree):
     )
 
 
+@pytest.mark.slow
 def test_cart_pole_with_a_moving_input_direction():
     model = cart_pole()
     safe_set = box((-5, 5), ("-0.4", "0.4"), (-5, 5), ("-0.5", "0.5"))
@@ -424,6 +429,7 @@ LIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lie", LIES)
 @pytest.mark.parametrize("rate", [1.5, 2.5])  # the second has no metric
 def test_a_solver_that_lies_is_harmless(monkeypatch, lie, rate):

@@ -482,6 +482,7 @@ def test_state_dependent_input():
     assert verified(asked, proposal, "0.3").verdict == "certified"
 
 
+@pytest.mark.slow
 def test_planar_quadrotor_with_true_sine_and_cosine():
     """The published rate .8 and condition number (126.1 with W of degree 4, 160 with 3) nearly at degree 2, at points.
 

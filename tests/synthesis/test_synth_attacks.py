@@ -203,6 +203,7 @@ def sampled(spec, count=4000):
     return (-0.5 * F[:, 0, 0] / W[:, 0, 0]).min(), eigenvalues[:, 0].min(), eigenvalues[:, -1].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WISHES)
 def test_the_file_says_what_is_true_of_what_it_holds(name, tmp_path):
     wanted = WISHES[name]
@@ -270,6 +271,7 @@ def test_what_reads_back_differently_is_proven_as_it_reads(monkeypatch):
     assert isinstance(found.reason.claim.failure, NotProvenAsWritten)
 
 
+@pytest.mark.slow
 def test_a_certificate_of_a_synthesised_metric_is_consistent(tmp_path):
     spec = tmp_path / "own.yaml"
     spec.write_text(small())

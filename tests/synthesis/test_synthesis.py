@@ -74,6 +74,7 @@ MODELS = [CART_POLE, ARM, OBLIQUE, ROLLING]
 # -- C3 on the coefficients
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", MODELS, ids=["cart-pole", "arm", "oblique", "rolling"])
 @settings(max_examples=2, deadline=None)
 @given(seed=st.integers(0, 10**6), degree=st.integers(0, 2))
@@ -210,6 +211,7 @@ def test_advice_names_a_rate_and_a_box_that_work():
     assert Fraction(1, 8) < factor < Fraction(1, 4)
 
 
+@pytest.mark.slow
 def test_a_proof_that_runs_out_of_boxes_asks_for_more_of_them(tmp_path):
     spec = str(ROOT / "configs" / "quadrotor3d.yaml")
     result = synth(spec, "--route", "cegis", "--budget", "1", "-o", str(tmp_path / "m"))
@@ -250,6 +252,7 @@ def liar(kind, seed=0):
 KINDS = ["perturbed", "nan", "infinite", "negated", "zero", "asymmetric", "shape", "nothing"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_lying_solver_leads_to_no_metric_that_is_not_one(kind):
     for seed in range(3):
@@ -314,6 +317,7 @@ def synth(*arguments):
     return CliRunner().invoke(app, ["synth", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_the_three_state_metric(tmp_path):
     target = tmp_path / "m.json"
     spec = ROOT / "configs" / "three_state.yaml"
@@ -357,6 +361,7 @@ def test_wrong_options_are_located(options, where, words, tmp_path):
     assert "Traceback" not in done.output
 
 
+@pytest.mark.slow
 def test_certify_synthesises_by_itself_and_keeps_the_metric(tmp_path):
     text = (ROOT / "configs" / "three_state.yaml").read_text()
     start = text.index("metric:")
@@ -379,6 +384,7 @@ def test_certify_synthesises_by_itself_and_keeps_the_metric(tmp_path):
     assert "uncontrollable mode" in done.output
 
 
+@pytest.mark.slow
 def test_the_shipped_metric_is_proven_where_the_tube_is():
     """On the whole safe set `certify` proves it, which takes half a minute."""
     file = str(ROOT / "configs" / "pvtol_adaptation.metric.json")
@@ -397,6 +403,7 @@ def test_a_plot_that_is_no_svg_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_end_to_end_objective_compares_certificates(tmp_path):
     plot = tmp_path / "sweep.svg"
     spec = ROOT / "configs" / "two_state_orbit.yaml"

@@ -58,6 +58,7 @@ def test_a_plan_at_rest_is_no_harder_than_an_equilibrium():
     assert found.boxes < 20_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "f",
     [(y - x, -y, -z), (-x, -y, -z), (y - x, -y, Fraction(1, 3) - z), (x * y, y * z - Fraction(1, 5), x * z)],
@@ -108,6 +109,7 @@ def test_declared_bounds_of_the_metric_may_be_absurd(lower, start):
     assert "beyond the range of numbers" in message
 
 
+@pytest.mark.slow
 def test_inputs_that_are_nearly_parallel_are_no_crash():
     """The closed form of the feedback gain holds nowhere: its bound is infinite, and the exact one stands."""
     two = SPEC.replace("[u], f:", "[u, v], f:").replace("[[0], [1]]", '[[1, 1], [1, "1 + 1e-9"]]')
@@ -131,6 +133,7 @@ def test_a_knot_beyond_the_horizon_refutes_nothing():
     assert far_beyond(data, None, f) == "refuted"
 
 
+@pytest.mark.slow
 def test_a_curve_far_outside_is_refuted_within_few_boxes():
     assert far_beyond(knots("0 0 0 0", "1 1e300 0 0"), None, LINEAR.f) == "refuted"
 

@@ -89,6 +89,7 @@ def test_derivatives_of_a_step_are_those_of_the_step():
         assert (ahead - behind).T / (2 * small) == pytest.approx(slopes[:, :, column], abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_cost_decreases_with_every_step():
     found = ilqr.plan(Dynamics(MODEL), problem(goal=False))
     assert found.outcome is ilqr.Outcome.FOUND
@@ -96,6 +97,7 @@ def test_the_cost_decreases_with_every_step():
     assert (np.diff(found.costs) <= 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", [True, False])
 def test_the_goal_is_met_with_the_published_effort(held):
     seen = []
@@ -133,6 +135,7 @@ trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 4}
         x = (A - B @ K) @ x
 
 
+@pytest.mark.slow
 def test_planning_is_deterministic():
     one, two = (ilqr.plan(Dynamics(MODEL), problem(t=np.linspace(0, 5, 41))) for _ in range(2))
     assert one.u.tobytes() == two.u.tobytes()
@@ -150,6 +153,7 @@ def test_times_are_decimals_and_end_at_the_horizon():
     assert rounded(-0.1) == Fraction(-1, 10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
     spec = edited(("  goal: true", f"  interpolation: {interpolation}\n  goal: true"))
@@ -165,11 +169,13 @@ def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
     assert last == pytest.approx([0, 0], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_smaller_tube_asks_for_more_sub_knots():
     small = replace(ROOM, rho=Fraction(7, 1000))
     assert len(laid(SPEC, MODEL, small).pieces) > len(laid(SPEC, MODEL, ROOM).pieces)
 
 
+@pytest.mark.slow
 def test_the_planner_may_start_elsewhere_than_the_state():
     spec = edited(("  target: [0, 0]", "  target: [0, 0]\n  start: [3.3, -2.4]"))
     plan = laid(spec, MODEL, ROOM)
@@ -259,6 +265,7 @@ def counted(monkeypatch):
     return calls
 
 
+@pytest.mark.slow
 def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     calls = counted(monkeypatch)
@@ -271,6 +278,7 @@ def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
     assert len(list(kept_folder(cache.KIND).iterdir())) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [
@@ -292,6 +300,7 @@ def test_a_broken_cache_is_not_believed(tmp_path, monkeypatch, damage):
     assert len(calls) == 1
 
 
+@pytest.mark.slow
 def test_an_unwritable_cache_is_noted_and_does_no_harm(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("", encoding="utf-8")
@@ -322,6 +331,7 @@ def first_problem(spec, options, monkeypatch):
     return certify(spec, options), seen[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(CASES), ids=" ".join)
 def test_the_published_cases_are_certified_and_the_reference_rows_met(case, monkeypatch):
     radii = {"epsilon": Fraction(case[0]), "rho_a": Fraction(case[1])}
@@ -376,12 +386,14 @@ def as_file(folder: Path, result, step: int, more: str):
     return load(str(folder / "spec.yaml"))
 
 
+@pytest.mark.slow
 def test_the_recorded_knots_are_the_plan(tmp_path, planned):
     again = certify(as_file(tmp_path, planned, 1, ", interpolation: hold"), Options(conditions="distance"))
     assert again["constants"] == planned["constants"]
     assert again["distance"] == planned["distance"]
 
 
+@pytest.mark.slow
 def test_a_coarse_plan_is_certified_with_larger_gains(tmp_path, planned):
     coarse = certify(as_file(tmp_path, planned, 4, ", interpolation: hold"), Options(conditions="distance"))
     assert coarse["constants"]["plan_defect_metric"]["above"] == pytest.approx(0.0066, rel=0.05)
@@ -392,6 +404,7 @@ def test_a_coarse_plan_is_certified_with_larger_gains(tmp_path, planned):
         )
 
 
+@pytest.mark.slow
 def test_the_wrong_interpolation_costs_most_of_the_tube_and_is_named(tmp_path, planned):
     wrong = certify(as_file(tmp_path, planned, 4, ""), Options())
     assert wrong["constants"]["plan_defect"]["above"] == pytest.approx(0.91, abs=0.01)
@@ -403,5 +416,6 @@ def test_the_wrong_interpolation_costs_most_of_the_tube_and_is_named(tmp_path, p
     assert mend["remedy"]["defect"] == pytest.approx(0.0127, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_certificates_of_plans_are_deterministic(planned):
     assert certify(SPEC, Options(conditions="distance")) == planned

@@ -92,6 +92,7 @@ def pieces_at(data: Knots, t: Fraction):
 # -- the curve -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 @given(ends=st.tuples(*[st.fractions(0, Fraction(13, 10), max_denominator=500)] * 3))
 @settings(max_examples=150, deadline=None)
@@ -134,6 +135,7 @@ def test_a_supremum_along_the_plan_reaches_the_ends_of_its_pieces():
     assert lo[0, 1] <= data.x[2][0] <= hi[0, 1]
 
 
+@pytest.mark.slow
 def test_windows_are_tight():
     data = knots()
     plan = piecewise_plan(POLYNOMIAL, data)
@@ -464,6 +466,7 @@ def test_findings_of_a_plan_file_point_into_it(tmp_path):
     assert finding.location.source == "1,0,inf,0"
 
 
+@pytest.mark.slow
 def test_a_plan_file_of_too_many_rows_or_bytes_is_refused(tmp_path):
     rows = "".join(f"{k},0,0,0\n" for k in range(MAX_ROWS + 1))
     with pytest.raises(SpecError, match="at most 10,001 rows") as caught:
@@ -484,6 +487,7 @@ def resting(count: int) -> str:
     return "t,p,q,u\n" + "".join(f"{k / 10},0.5,0.5,0.5\n" for k in range(count))
 
 
+@pytest.mark.slow
 def test_a_plan_from_a_file_is_certified_and_recorded(tmp_path):
     result = certify(load(str(written(tmp_path, resting(21)))), Options(conditions="all"))
     assert result["verdict"] == "certified"
@@ -499,6 +503,7 @@ def test_a_plan_from_a_file_is_certified_and_recorded(tmp_path):
     assert result["spec"]["effective"]["trajectory"]["horizon"] == "2"
 
 
+@pytest.mark.slow
 def test_the_initial_state_is_the_first_row_unless_it_is_given(tmp_path):
     path = written(tmp_path, resting(3))
     assert load(str(path)).x0 == (Fraction(1, 2), Fraction(1, 2))
@@ -529,6 +534,7 @@ def test_a_plan_that_goes_where_the_dynamics_are_undefined_is_refuted_at_a_knot(
     assert reason["at"]["x"][0] == pytest.approx(-5.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "rows",
     [
@@ -545,6 +551,7 @@ def test_extreme_plans_are_judged_without_an_exception(tmp_path, rows):
     seal(result, {})
 
 
+@pytest.mark.slow
 def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):
     rows = "t,p,q,u\n0,0,0,0\n1,1,1,0\n2,-1,-1,0\n"
     result = certify(load(str(written(tmp_path, rows))), Options(conditions="distance"))
