@@ -185,12 +185,27 @@ def build(spec: Spec) -> ControlAffineModel:
     )
 
 
-def time_period(h: Iterable[Expression]) -> Interval | None:
-    """An enclosure of a common period in t of expressions that depend on t through sin, cos, tan only.
+@dataclass(frozen=True, slots=True)
+class Frequencies:
+    """Of the waves in t that expressions consist of: all `rational`, or all rational multiples `of_pi`, in rad/s."""
 
-    None if there is none to be seen; [0, 0] if t does not occur. Frequencies must be all rational or all rational
-    multiples of pi.
-    """
+    rational: tuple[Fraction, ...]
+    of_pi: tuple[Fraction, ...]
+
+    @property
+    def period(self) -> tuple[Fraction, bool] | None:
+        """The common period as (q, whether times pi), in s; None if nothing changes with t."""
+        found = [q for q in self.rational or self.of_pi if q]
+        if not found:
+            return None
+        common = Fraction(
+            reduce(gcd, (q.numerator for q in found)), reduce(lcm, (q.denominator for q in found))
+        )
+        return 2 / abs(common), bool(self.rational)
+
+
+def frequencies(h: Iterable[Expression]) -> Frequencies | None:
+    """The waves of expressions that depend on t through sin, cos, tan only; None if they depend on it otherwise."""
     rational: list[Fraction] = []
     of_pi: list[Fraction] = []
     replaced: dict[Expression, Expression] = {}
@@ -212,16 +227,24 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
             replaced[node] = symbol(f"wave#{len(replaced)}")
     if TIME in free_symbols(replaced[root] for root in roots) or (rational and of_pi):
         return None
-    if not rational and not of_pi:
+    return Frequencies(tuple(rational), tuple(of_pi))
+
+
+def time_period(h: Iterable[Expression]) -> Interval | None:
+    """An enclosure of a common period in t of expressions that depend on t through sin, cos, tan only.
+
+    None if there is none to be seen; [0, 0] if t does not occur.
+    """
+    found = frequencies(h)
+    if found is None:
+        return None
+    if not found.rational and not found.of_pi:
         return Interval(0.0)
-    frequencies = [q for q in rational or of_pi if q]
-    if not frequencies:
+    if found.period is None:
         return Interval(1.0)  # t occurs, as in sin((t + 1) - t), but changes nothing
-    common = Fraction(
-        reduce(gcd, (q.numerator for q in frequencies)), reduce(lcm, (q.denominator for q in frequencies))
-    )
+    length, of_pi = found.period
     with np.errstate(over="ignore"):
-        period = Interval.of(2 / abs(common)) * (PI if rational else Interval(1.0))
+        period = Interval.of(length) * (PI if of_pi else Interval(1.0))
     return period if np.isfinite(period.hi) else None
 
 

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from flint import ctx
 
+from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded
 from tubecert.recheck.document import read
@@ -36,11 +37,12 @@ def main() -> int:
     given = parser.parse_args()
     failed, step = False, Fraction(given.within)
     for path in given.certificates:
-        case = Case(read(path.read_text(encoding="utf-8"), str(path))["result"], given.boxes)
+        document = read(path.read_text(encoding="utf-8"), str(path))
+        case = Case(read_certificate(document).result, given.boxes)
         for name in OVER_TUBE:
             rising = name in ("lower", "input_gain_least")
-            value = case.result["constants"][name]["above" if rising else "below"].number()
-            if value <= 0:
+            value = getattr(case.constants[name], "above" if rising else "below")
+            if value is None or value <= 0:
                 continue
             start = time.process_time()
             with ctx.workprec(64):

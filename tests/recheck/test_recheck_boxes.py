@@ -11,23 +11,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import rechecked
 import sympy
 from flint import arb, arb_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import texts
 
-from tubecert.expression import parse, symbol
 from tubecert.recheck import boxes, expansion, monomials, pencils, statements
 from tubecert.recheck.balls import is_positive
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.pencils import LeastGain, SlopesBelow
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
-from tubecert.recheck.terms import from_expressions, number, slopes
+from tubecert.recheck.terms import number, slopes
 
 NAMES = "xyz"
-SYMBOLS = {name: symbol(name) for name in NAMES}
 FEW = [
     "x**3*y - 0.37*x*z + 2",
     "sin(x)**2*cos(x)**3 + sin(x)**4*y",
@@ -45,7 +44,7 @@ SYMMETRIC = [
 
 
 def terms(expressions):
-    return from_expressions([parse(text, symbols=SYMBOLS).expression for text in expressions])
+    return rechecked.terms(expressions, NAMES)
 
 
 def matrix(rows, shift=0):
@@ -331,7 +330,7 @@ def test_the_weights_of_a_least_gain_are_proposals_only(y, monkeypatch):
 @given(texts(leaves=6), st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_random_expressions_are_enclosed(text, ends):
     box = dict(zip("xyt", [tuple(sorted(ends[2 * k : 2 * k + 2])) for k in range(3)], strict=True))
-    e = from_expressions([parse(text, symbols={name: symbol(name) for name in box}).expression])
+    e = rechecked.terms([text], list(box))
     field = Field(e)
     (found,) = field.hull([box[v] for v in field.variables])
     for share in (0.0, 0.3, 1.0):

@@ -3,23 +3,19 @@
 import copy
 import json
 from fractions import Fraction
-from functools import cache
 
 import pytest
-from proven import proven
+from rechecked import certified, examine, failing, respecified, sealed, terms
 from systems import SMALL
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline, spec
 from tubecert.cli.app import app
 from tubecert.errors import ExitCode
-from tubecert.expression import parse, symbol
 from tubecert.recheck.balls import exact
-from tubecert.recheck.document import digest
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
-from tubecert.recheck.run import recheck
-from tubecert.recheck.terms import from_expressions, matrix_replaced, number
+from tubecert.recheck.terms import matrix_replaced, number
 
 TWO_INPUTS = """
 tubecert: 1
@@ -76,18 +72,6 @@ KINDS = {
     "two inputs": (TWO_INPUTS,),
     "two inputs, matrix A_m": (TWO_INPUTS, (LOOP, "A_m: [[-10, 1, 0], [0, -12, 0], [0, 2, -9]]")),
 }
-
-
-def certified(text, **options):
-    return proven(text, **{"conditions": "all", **options})
-
-
-def examine(document, budget=20_000):
-    return recheck(json.dumps(document), "certificate", budget)
-
-
-def failing(found):
-    return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
 
 
 @pytest.mark.slow
@@ -205,12 +189,19 @@ def test_a_mode_that_no_input_reaches_is_confirmed(kind):
 def test_a_mode_that_excludes_nothing_is_not_confirmed(path, value):
     kind = "at a forced equilibrium" if value == "1.2" else "a real mode"
     document = certified(replaced(SMALL, SYNTHESISED, *UNREACHED[kind]))
-    place = document["result"]["spec"]["effective"]
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    document["result"]["spec"]["effective_hash"] = digest(document["result"]["spec"]["effective"])
-    document["hash"] = certificate.seal(document["result"], {})["hash"]
+
+    def change(effective):
+        for key in path[:-1]:
+            effective = effective[key]
+        effective[path[-1]] = value
+
+    document = respecified(document, change)
+    result = document["result"]
+    result["safe_set"] = {
+        name: [float(end) for end in ends] for name, ends in result["claim"]["domain"].items()
+    }
+    result["synthesis"]["asked"] = result["spec"]["effective"]["metric"]["synthesise"]
+    document = sealed(document)
     (found,) = [item for item in examine(document).claims if not item.outcome.holds]
     assert found.name == "refuted: metric_found"
     assert found.outcome.verdict == "undecided"
@@ -348,21 +339,20 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     assert "the knots of plan.csv" in " ".join(done.stderr.split())
 
 
-@cache
 def wiggling():
-    return json.dumps(certified(replaced(SMALL, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}"))))
+    return certified(replaced(SMALL, (PLAN, WIGGLE), (START, "initial_state: {within: 0.03}")))
 
 
 @pytest.mark.slow
 def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
-    document = json.loads(wiggling())
+    document = wiggling()
     assert document["result"]["constants"]["plan_defect"]["above"] == 0
     assert failing(examine(document)) == []
 
 
 def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     """No more is concluded where the addition theorems do not reach."""
-    document = json.loads(wiggling())
+    document = wiggling()
     monkeypatch.setattr("tubecert.recheck.angles._MULTIPLE", 0)
     found = examine(document)
     verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
@@ -401,7 +391,7 @@ ADDED = {
 @pytest.mark.parametrize("text", ADDED)
 def test_what_vanishes_by_an_addition_theorem(text):
     for shown, zero in ((text, True), (ADDED[text], False)):
-        term = from_expressions([parse(shown, symbols={name: symbol(name) for name in "xy"}).expression])
+        term = terms([shown], "xy")
         assert vanish(term) is zero, shown
         values = {"x": Fraction(3, 7), "y": Fraction(-2, 5)}
         (number_there,) = Program(term, ("x", "y")).run([exact(values[name]) for name in "xy"])
@@ -446,7 +436,7 @@ def test_a_slip_in_the_addition_theorems_is_caught(slip, monkeypatch):
     ],
 )
 def test_what_vanishes(text, zero):
-    term = from_expressions([parse(text, symbols={name: symbol(name) for name in "xy"}).expression])
+    term = terms([text], "xy")
     assert vanish(term) is zero
 
 
@@ -459,6 +449,5 @@ def test_what_vanishes(text, zero):
     ],
 )
 def test_what_vanishes_at_a_point(text, zero):
-    x = symbol("x")
-    (term,) = from_expressions([parse(text, symbols={"x": x}).expression])
+    (term,) = terms([text], "x")
     assert vanish(matrix_replaced([[term]], {"x": number(Fraction(4))})[0]) is zero

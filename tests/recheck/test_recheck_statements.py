@@ -12,29 +12,28 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
+import rechecked
 from flint import arb
 from systems import SMALL
 
 from tubecert import certificate, pipeline, spec
 from tubecert.bounds.suprema import Suprema
 from tubecert.errors import ExitCode
-from tubecert.expression import parse, symbol
 from tubecert.recheck import boxes
 from tubecert.recheck.boxes import Field
-from tubecert.recheck.claims import Case, of_certified
-from tubecert.recheck.document import Node
+from tubecert.recheck.claims import of_certified
 from tubecert.recheck.pencils import GainBelow
 from tubecert.recheck.run import recheck
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
-from tubecert.recheck.terms import from_expressions, number
+from tubecert.recheck.terms import number
 
-SYMBOLS = {name: symbol(name) for name in ("a", "b", "c", "d", "e", "f", "g", "x", "y")}
+NAMES = ["a", "b", "c", "d", "e", "f", "g", "x", "y"]
 LITTLE = Fraction(1, 10**6)
 SQUARES = "a**2 + b**2 + c**2 + d**2 + e**2 + f**2 + g**2"
 
 
 def term(text):
-    return from_expressions([parse(text, symbols=SYMBOLS).expression])[0]
+    return rechecked.terms([text], NAMES)[0]
 
 
 def rows(matrix):
@@ -190,21 +189,19 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
 @pytest.mark.slow
 def test_a_pole_in_the_safe_set_is_found():
     """What an expression owes is read with it, and the curve between the poles proves nothing."""
-    document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), pipeline.Options()))
+    document = rechecked.certified(SMALL)
     for pole, found in (("1e-9/(x - 0.9)", True), ("1e-9/(x - 1.1)", False), ("1e-9*sqrt(x + 0.9)", True)):
         result = json.loads(json.dumps(document["result"]))
         result["spec"]["effective"]["system"]["f"][0] = f"-x + y + {pole}"
-        case = Case(Node(result, "result"), 2_000)
-        claim = next(item for item in of_certified(case) if item.name == "f, B, W, h are smooth")
+        case = rechecked.case_of({**document, "result": result}, 2_000)
+        claim = next(item for item in of_certified(case) if item.name == "f, B, W, h and the plan are smooth")
         assert claim.outcome(None).holds is not found
 
 
 @pytest.mark.slow
 def test_nothing_rests_on_a_constant_without_a_bound():
     """Whichever bound is struck out of a certificate, every section that rests on it is no longer confirmed."""
-    document = sealed(
-        pipeline.certify(spec.load_text(SMALL, "small.yaml"), pipeline.Options(conditions="all"))
-    )
+    document = rechecked.certified(SMALL)
     assert document["result"]["verdict"] == "certified"
     rests = (
         "f_x",

@@ -75,6 +75,36 @@ def safe_set_data(spec: Spec) -> dict[str, Any]:
     }
 
 
+def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Result:
+    """`result.claim`: what is claimed, in words of its own. `period` of h as (q, whether times pi), in s.
+
+    The checker derives it again from its own reading of the specification. `bounds` count beside an expression only
+    if |h| itself is declared: else H0 is that of the expression.
+    """
+    horizon, bounds = spec.trajectory.horizon, spec.uncertainty.bounds
+    for_ever = None if horizon is not None else "autonomous" if period is None else "periodic"
+    covers = "expression" if bounds is None or bounds.h is None else "expression or bounds"
+    return {
+        "id": "tube",
+        "horizon": None if horizon is None else number_text(horizon),
+        "for_all_time": for_ever,
+        "period": None if for_ever != "periodic" or period is None else _period_text(*period),
+        "domain": {
+            name: [number_text(low), number_text(high)]
+            for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
+        },
+        "start": {"at": [number_text(value) for value in spec.x0]}
+        if spec.within is None
+        else {"within": number_text(spec.within)},
+        "uncertainty": "bounds" if spec.uncertainty.h is None else covers,
+    }
+
+
+def _period_text(q: Fraction, of_pi: bool) -> str:
+    """An exact period in s, as `2/3`, `pi` or `2/3*pi`."""
+    return str(q) if not of_pi else "pi" if q == 1 else f"{q}*pi"
+
+
 def metric_data(spec: Spec, proof: MetricProof) -> Result:
     """`result.metric` as far as C1-C3 on the safe set tell."""
     metric = spec.metric

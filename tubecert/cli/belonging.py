@@ -1,8 +1,8 @@
 """`recheck --spec`: whether a certificate is of the specification in a file.
 
 Compared is what claims rest on: system, safe set, uncertainty, plan (from a CSV file: its knots), start, radii,
-adaptation, conditions, and the metric. A metric that was synthesised for the file is not in it: that one is proven
-anyway. What differs beside that is said, and makes no other system.
+adaptation, conditions, and the metric. A metric that was synthesised for the file is not in it: there the certificate
+must say that it was synthesised, and for what. What differs beside that is said, and makes no other system.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding
+from tubecert.recheck.certificate import Knots, read_certificate
 from tubecert.recheck.document import Node
 
 _IDLE = ("name", "expect", "simulation", "obstacles", "system.units", "trajectory.file")
@@ -28,13 +29,18 @@ def belongs(document: Node, name: str, path: str) -> str:
     """A sentence that says that the certificate is of the specification at `path`; raises TC604 if it is not."""
     from tubecert import spec as specification
 
-    result, loaded = document["result"], specification.load(path)
-    own, effective = specification.canonical(loaded), result["spec"]["effective"].mapping()
-    overridden = _overridden(own, effective, result["overrides"].mapping())
+    read = read_certificate(document).result
+    result, loaded = document.mapping()["result"], specification.load(path)
+    own, effective = specification.canonical(loaded), result["spec"]["effective"]
+    overridden = _overridden(own, effective, result["overrides"])
+    asked = own["metric"].get("synthesise") if "metric" in own else None
+    if asked is not None:
+        found = result.get("synthesis", {}).get("asked")
+        own["metric"] = effective["metric"] if found == asked else own["metric"]
     differing = _differing(own, effective)
     table = loaded.trajectory.table
     if table is not None and "trajectory" not in differing:
-        differing += _other_table(result["plan"], table)
+        differing += _other_table(read.plan.knots, table)
     serious = [key for key in differing if key not in _IDLE]
     if serious:
         message = f"{name} does not belong to {path}: {', '.join(serious)} differ"
@@ -42,11 +48,11 @@ def belongs(document: Node, name: str, path: str) -> str:
         raise ForeignError([Finding(code="TC604", message=message, help=help_)])
     digest = "sha256:" + hashlib.sha256(loaded.source.encode()).hexdigest()
     notes = [f"with {', '.join(overridden)} given on the command line"] if overridden else []
-    if "synthesise" in own.get("metric", {}):
+    if asked is not None:
         notes.append("the metric was synthesised for it")
     if differing:
         notes.append(f"nothing rests on what differs: {', '.join(differing)}")
-    elif digest != result["spec"]["file_hash"].text():
+    elif digest != result["spec"]["file_hash"]:
         notes.append("the text of the file has changed, the system has not")
     return f"belongs to {path}" + (f" ({'; '.join(notes)})" if notes else "")
 
@@ -67,9 +73,6 @@ def _overridden(own: dict[str, Any], effective: Mapping[str, Any], overrides: Ma
 def _differing(own: Mapping[str, Any], effective: Mapping[str, Any]) -> list[str]:
     """The keys whose values differ, by name; those that are idle inside a section apart."""
     ours, theirs = _spread(own), _spread(effective)
-    if "synthesise" in ours.get("metric", {}):
-        ours.pop("metric")
-        theirs.pop("metric", None)
     return sorted(key for key in {*ours, *theirs} if ours.get(key) != theirs.get(key))
 
 
@@ -85,11 +88,9 @@ def _spread(data: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _other_table(plan: Node, table: Any) -> list[str]:
+def _other_table(knots: Knots | None, table: Any) -> list[str]:
     """What of a plan file differs: bytes that say the same knots are the same plan."""
-    knots = plan["knots"]
-    rows = {key: [tuple(row.numbers()) for row in knots[key].entries()] for key in ("x", "u")}
-    same = tuple(knots["t"].numbers()) == tuple(table.knots.t) and all(
-        rows[key] == [tuple(row) for row in getattr(table.knots, key)] for key in rows
+    same = knots is not None and all(
+        tuple(getattr(knots, key)) == tuple(getattr(table.knots, key)) for key in ("t", "x", "u")
     )
     return [] if same else [f"the knots of {table.file}"]

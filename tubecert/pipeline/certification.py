@@ -16,6 +16,7 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.file import digest
 from tubecert.certificate.sections import (
     assumptions,
+    claim_data,
     constant_data,
     decimal_data,
     declared_data,
@@ -60,6 +61,7 @@ from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import unique_geodesics
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import TIME, ControlAffineModel, build, rank_decision
+from tubecert.pipeline.checks import period_of
 from tubecert.pipeline.gains import gains
 from tubecert.pipeline.options import Options, Progress, Step, overrides_data
 from tubecert.pipeline.reasons import UNBOUNDED_RELAX
@@ -102,6 +104,7 @@ class Certification:
                 "effective_hash": digest(text),
                 "file_hash": "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
             },
+            "claim": claim_data(spec, period_of(spec)),
             "overrides": overrides_data(options),
             "effort": {"gap": decimal_data(options.gap), "budget": options.budget},
             "plan": {"kind": spec.trajectory.kind},

@@ -17,6 +17,7 @@ from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
 from tubecert.records import to_json
 from tubecert.spec import Spec, Synthesis
+from tubecert.spec.canonical import synthesis_data
 from tubecert.spec.metric_file import FORMAT
 from tubecert.synthesis.ladder import Attempt
 from tubecert.synthesis.problem import Floor
@@ -91,6 +92,7 @@ class Synthesised:
         """`result.synthesis` of a certificate: what was asked for, what was tried; no times."""
         wanted = self.wanted
         data: dict[str, Any] = {
+            "asked": synthesis_data(wanted),
             "objective": wanted.objective,
             "verdict": self.verdict,
             "attempts": [

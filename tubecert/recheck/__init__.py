@@ -1,13 +1,13 @@
 """Re-verification of a certificate in a second arithmetic: python-flint's balls, no solver, nothing of the producer.
 
 In: the text of a certificate. Out: every claim that its verdict rests on, confirmed, contradicted or undecided.
-Trusted: yes. Imports of this package only `errors`, `findings` and `expression` (its parser and node types): a wrong
-derivative, kernel, formula or rounding in the producer must not pass both.
+Trusted: yes. Imports of this package only `errors` and `findings`: a misread text, a wrong derivative, kernel,
+formula or rounding in the producer must not pass both.
 
 | module | what it does |
 |---|---|
 | `balls` | ball arithmetic: exact numbers, ends, norms, positive definite matrices |
-| `terms`, `program` | expressions with derivative rules of this room's own; evaluated on balls |
+| `grammar`, `terms`, `program` | text to terms with derivative rules of this room's own; evaluated on balls |
 | `monomials` | the same as exact combinations of monomials: a whole matrix with its derivatives by one product |
 | `identity`, `angles` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
 | `boxes`, `expansion` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
@@ -15,9 +15,12 @@ derivative, kernel, formula or rounding in the producer must not pass both.
 | `pencils`, `multiplier`, `lipschitz` | statements of other kinds: pencils, columns over a ball, an h with kinks |
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
-| `document`, `reading`, `system` | the certificate and the specification inside it, read and checked for form |
+| `document`, `reading` | JSON and expressions, read and checked for form |
+| `specification`, `certificate`, `reasons`, `orientation` | closed types of all that a certificate may say |
+| `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `filtering`, `predictor`, `conditions`, `sampling`, `gains` | the conditions A, B and C at printed gains |
+| `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `consistency`, `refuted`, `claims` | what must agree; what refutes; all claims in their order |
 | `uncontrollable` | the mode of the linearisation that leaves no metric |
 """

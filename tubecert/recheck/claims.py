@@ -13,17 +13,32 @@ from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import consistency, gains, geodesics, metric, start
+from tubecert.recheck import claimed, consistency, gains, geodesics, metric, planned, start
 from tubecert.recheck.balls import exact
+from tubecert.recheck.certificate import (
+    DERIVED,
+    INFIMA,
+    DistanceSection,
+    MetricSection,
+    Pair,
+    RateSection,
+    Result,
+    SampledSection,
+    Sections,
+    TubeSection,
+)
 from tubecert.recheck.conditions import USED, Numbers, Setting
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
-from tubecert.recheck.document import Node, digest
+from tubecert.recheck.document import digest
 from tubecert.recheck.place import Place
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.reading import TIME, Duty
-from tubecert.recheck.system import System, read_curve, read_system
+from tubecert.recheck.reading import TIME
+from tubecert.recheck.reasons import Enclosure
+from tubecert.recheck.specification import Expressed, Planned
+from tubecert.recheck.system import System, curve_of, system_of
+from tubecert.recheck.times import time_range
 
 _BITS = 64  # for boxes
 _SHARP = 160  # for formulas at decimals
@@ -34,16 +49,16 @@ Memory = MutableMapping[str, Outcome]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement of the certificate, what it depends on, and how to examine it."""
+    """A statement of the certificate, what it depends on (None: it is examined each time), and how to examine it."""
 
     name: str
-    key: tuple[object, ...]
+    key: tuple[object, ...] | None
     examine: Callable[[], Outcome] = field(repr=False)
     bits: int = _BITS
 
     def outcome(self, memory: Memory | None = None) -> Outcome:
         """The outcome; what arithmetic cannot represent is undecided."""
-        if memory is None:
+        if memory is None or self.key is None:
             return self._examined()
         name = json.dumps([self.name, self.key], default=str, sort_keys=True)
         if name not in memory:
@@ -60,41 +75,50 @@ class Claim:
 
 @dataclass(frozen=True)
 class Case:
-    """A certificate, read."""
+    """A certificate with a metric, read."""
 
-    result: Node
+    result: Result
     budget: int
 
     @cached_property
-    def effective(self) -> Node:
-        """The specification inside."""
-        return self.result["spec"]["effective"]
-
-    @cached_property
     def system(self) -> System:
-        """Its system; the metric is that of the specification, or the one that was synthesised for it."""
-        own = self.effective["metric"]
-        if "dual_metric" in own.mapping():
-            return read_system(self.effective)
-        return read_system(
-            Node({**self.effective.mapping(), "metric": self.result["metric"].value}, "spec.effective")
-        )
-
-    @cached_property
-    def plan(self) -> tuple[Curve, list[Duty]]:
-        """The plan, and where its expressions must be defined."""
-        with ctx.workprec(_SHARP):
-            return read_curve(self.effective, self.result["plan"], self.system)
+        """Its system."""
+        return system_of(self.result.specification)
 
     @cached_property
     def curve(self) -> Curve:
         """The plan."""
-        return self.plan[0]
+        with ctx.workprec(_SHARP):
+            return curve_of(self.result.specification, self.result.plan, self.system)
+
+    @cached_property
+    def metric(self) -> MetricSection:
+        """What is claimed of the metric."""
+        assert self.result.metric is not None
+        return self.result.metric
+
+    @cached_property
+    def tube(self) -> TubeSection:
+        """What is claimed of the tube."""
+        assert self.result.tube is not None
+        return self.result.tube
+
+    @cached_property
+    def constants(self) -> dict[str, Enclosure]:
+        """What is claimed of the constants."""
+        assert self.result.constants is not None
+        return self.result.constants
+
+    @cached_property
+    def sections(self) -> Sections:
+        """What is claimed of gains."""
+        assert self.result.sections is not None
+        return self.result.sections
 
     @cached_property
     def place(self) -> Place:
         """The tube."""
-        return Place(self.system, self.curve, self.result["tube"]["rho"].number(), self.budget)
+        return Place(self.system, self.curve, self.tube.rho, self.budget)
 
     @cached_property
     def setting(self) -> Setting:
@@ -106,30 +130,31 @@ class Case:
         return Setting(self.system, Numbers(**values), self.place.rho)
 
     def bound(self, name: str) -> Fraction:
-        """The side of a constant that the conditions use."""
-        return self._side(name).number()
+        """The side of a constant that the conditions use; raises `ValueError` where there is none."""
+        found = self.bound_if_any(name)
+        if found is None:
+            raise ValueError(f"{name} has no bound")
+        return found
 
     def bound_if_any(self, name: str) -> Fraction | None:
         """The same; None where the certificate states that none was found: it claims nothing of the constant then."""
-        side = self._side(name)
-        return None if side.value is None else side.number()
-
-    def _side(self, name: str) -> Node:
-        side = "below" if name in ("lower", "input_gain_least") else "above"
-        return self.result["constants"][name][side]
+        value = self.constants[name]
+        return value.below if name in INFIMA else value.above
 
     @cached_property
     def whole(self) -> tuple[object, ...]:
         """What every claim about the system depends on."""
-        parts = {key: value for key, value in self.effective.mapping().items() if key not in _IDLE}
-        metric = self.result.get("metric")  # none was found: what is claimed then is about the system
-        return digest(parts), metric and digest(metric["dual_metric"].value), self.budget
+        return self.result.specification.content, self.budget
 
     @cached_property
     def over_tube(self) -> tuple[object, ...]:
         """What every claim over the tube depends on."""
-        plan = self.result["plan"].mapping()
-        return *self.whole, digest([plan.get("knots"), plan.get("interpolation")]), self.place.rho
+        return *self.whole, self.knots, self.place.rho
+
+    @cached_property
+    def knots(self) -> str:
+        """The knots of the plan, as a hash."""
+        return digest(repr(self.result.plan.knots))
 
     @cached_property
     def numbers(self) -> tuple[object, ...]:
@@ -137,50 +162,50 @@ class Case:
         return *self.whole, self.place.rho, *(self.bound_if_any(name) for name in USED)
 
 
-_IDLE = {"name", "expect", "simulation", "obstacles"}
+def of_every(result: Result) -> Iterator[Claim]:
+    """What every certificate says of itself, whatever its verdict."""
+    yield Claim("the specification and what repeats it", None, lambda: consistency.specification(result))
+    yield Claim("the claim is that of the specification", None, lambda: claimed.agrees(result))
+    yield Claim("bounds are intervals", None, lambda: consistency.bounds(result))
 
 
 def of_certified(case: Case) -> Iterator[Claim]:
     """Every claim that a verdict `certified` rests on, and those that stand beside it."""
-    yield from _statements(case)
+    result = case.result
+    yield Claim("the verdict follows from the sections", None, lambda: consistency.verdict(result))
+    yield Claim("assumptions are complete", None, lambda: consistency.assumptions(result, case.system))
     yield from _on_set(case)
     yield from _tube(case)
     yield from _constants(case)
     yield from _gains(case)
 
 
-def _statements(case: Case) -> Iterator[Claim]:
-    result, system = case.result, case.system
-    outcomes = {
-        "the specification and what repeats it": consistency.specification(result, system),
-        "bounds are intervals": consistency.bounds(result),
-        "the verdict follows from the sections": consistency.verdict(result),
-        "assumptions are complete": consistency.assumptions(result, system),
-    }
-    for name, outcome in outcomes.items():
-        yield Claim(name, (outcome.verdict, outcome.why), lambda outcome=outcome: outcome)  # type: ignore[misc]
-
-
 def _on_set(case: Case) -> Iterator[Claim]:
-    s, budget, whole, shown = case.system, case.budget, case.whole, case.result["metric"]
+    s, budget, whole, shown = case.system, case.budget, case.whole, case.metric
     on_set = metric.on_set(s)
-    lower, upper = shown["lower_on_set"].pair()[0].number(), shown["upper_on_set"].pair()[1].number()
-    yield Claim("f, B, W, h are smooth", (*case.over_tube,), lambda: _smooth(case))
+    yield Claim("f, B, W, h and the plan are smooth", (*case.over_tube,), lambda: _smooth(case))
+    lower = None if shown.lower_on_set is None else shown.lower_on_set.below
+    upper = None if shown.upper_on_set is None else shown.upper_on_set.above
+    if lower is not None:
+        yield Claim(
+            f"C1: M >= {float(lower):.6g} I on the safe set",
+            (*whole, lower),
+            lambda: metric.lower_bound(s, lower, on_set, budget),
+        )
+    if upper is not None:
+        yield Claim(
+            f"C1: M <= {float(upper):.6g} I on the safe set",
+            (*whole, upper),
+            lambda: metric.upper_bound(s, upper, on_set, budget),
+        )
     yield Claim(
-        f"C1: M >= {float(lower):.6g} I on the safe set",
-        (*whole, lower),
-        lambda: metric.lower_bound(s, lower, on_set, budget),
-    )
-    yield Claim(
-        f"C1: M <= {float(upper):.6g} I on the safe set",
-        (*whole, upper),
-        lambda: metric.upper_bound(s, upper, on_set, budget),
+        "C1 has bounds on the safe set",
+        (lower is None, upper is None),
+        lambda: metric.stated(None not in (lower, upper), "there are none"),
     )
     yield Claim("C3: the Killing condition", whole, lambda: metric.killing(s))
     if len(s.inputs) < len(s.states):
-        margin = shown["margin"].pair()[0].number()
-        rate = shown["largest_rate"].pair()[0].number()
-        most = max(margin, rate - s.rate)
+        most = _rate_margin(case)
         yield Claim(
             f"C2 on the safe set at rate {float(s.rate):.6g} + {float(most):.4g}",
             (*whole, most),
@@ -188,125 +213,216 @@ def _on_set(case: Case) -> Iterator[Claim]:
         )
 
 
+def _rate_margin(case: Case) -> Fraction:
+    """The largest margin that is claimed for C2; 0 where none is."""
+    margin, largest = case.metric.margin, case.metric.largest_rate
+    margins = [
+        Fraction(0) if margin is None or margin.below is None else margin.below,
+        Fraction(0) if largest is None or largest.below is None else largest.below - case.system.rate,
+    ]
+    return max(margins) if margins[0] > 0 else Fraction(0)
+
+
 def _smooth(case: Case) -> Outcome:
-    s = case.system
-    time = metric.time_range(s)
+    s, trajectory = case.system, case.result.specification.trajectory
+    time = time_range(s.uncertainty, s.horizon)
     ranges = {**s.safe_set, **({} if time is None else {TIME: time})}
-    found = metric.smooth(s.duties, ranges, case.budget)
-    horizon = Fraction(0) if s.horizon is None else s.horizon
-    along = metric.smooth(case.plan[1], {TIME: (Fraction(0), horizon)}, case.budget)
+    found = metric.smooth((*s.duties, *s.uncertainty.duties), ranges, case.budget)
+    if not isinstance(trajectory, Expressed):
+        return found
+    along = metric.smooth(trajectory.duties, {TIME: (Fraction(0), trajectory.horizon)}, case.budget)
     return metric.together([found, along])
 
 
 def _tube(case: Case) -> Iterator[Claim]:
-    s, place = case.system, case.place
-    lower, upper = case.bound("lower"), case.bound("upper")
+    place, trajectory, plan = case.place, case.result.specification.trajectory, case.result.plan
+    lower, upper = case.bound_if_any("lower"), case.bound_if_any("upper")
+    if isinstance(trajectory, Planned):
+        yield Claim(
+            "the plan serves its task",
+            (*case.whole, case.knots),
+            lambda: planned.serves(trajectory, plan),
+            _SHARP,
+        )
+    yield Claim(
+        "what is drawn of the plan lies on it",
+        (*case.whole, case.knots, plan.samples),
+        lambda: planned.drawn(case.curve, plan),
+    )
     yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",
         (*case.over_tube, lower, upper),
-        lambda: start.radius(place, lower, upper),
+        lambda: start.radius(place, case.bound("lower"), case.bound("upper")),
         _SHARP,
     )
     yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))
-    widths = case.result["tube"]["half_widths"]
-    for i, name in enumerate(s.states):
-        width = widths[name].number()
+    for i, (name, width) in enumerate((case.tube.half_widths or {}).items()):
         yield Claim(
             f"half-width of {name} <= {float(width):.6g}",
             (*case.over_tube, width, lower),
-            lambda i=i, width=width: half_width(place, i, width, lower),  # type: ignore[misc]
+            lambda i=i, width=width: half_width(place, i, width, case.bound("lower")),  # type: ignore[misc]
         )
 
 
 def _constants(case: Case) -> Iterator[Claim]:
     place, over = case.place, case.over_tube
-    B, upper = case.bound("B"), case.bound("upper")
-    # smax(Theta B) <= |B| sqrt(A)
-    largest = Fraction(float(B) * float(upper) ** 0.5) * _ROUND_UP if upper > 0 else Fraction(0)
+    B, upper = case.bound_if_any("B"), case.bound_if_any("upper")
     for name in OVER_TUBE:
         limit = case.bound_if_any(name)
         if limit is None:
             continue
-        relation = ">=" if name in ("lower", "input_gain_least") else "<="
+        relation = ">=" if name in INFIMA else "<="
         yield Claim(
             f"{name} {relation} {float(limit):.6g}",
-            (*over, limit, largest if name == "feedback_gain" else None),
-            lambda name=name, limit=limit: bounded(place, name, limit, largest),  # type: ignore[misc]
+            (*over, limit, (B, upper) if name == "feedback_gain" else None),
+            lambda name=name, limit=limit: bounded(place, name, limit, _largest(B, upper)),  # type: ignore[misc]
         )
-    d0, H0 = case.bound("initial_distance"), case.bound_if_any("h_initial")
-    yield Claim(
-        f"initial_distance <= {float(d0):.6g}", (*over, d0, upper), lambda: start.distance(place, d0, upper)
-    )
+    d0, H0 = case.bound_if_any("initial_distance"), case.bound_if_any("h_initial")
+    if d0 is not None:
+        yield Claim(
+            f"initial_distance <= {float(d0):.6g}",
+            (*over, d0, upper),
+            lambda: start.distance(place, d0, case.bound("upper")),
+        )
     if H0 is not None:
         yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
-    test = case.result["metric"].get("unique_geodesics")
-    if test is not None and test["holds"].flag():
-        value = test["value"].pair()[1].number()
+    test = case.metric.geodesics
+    if test is not None and test.holds:
+        value = test.value.above
         yield Claim(
             "geodesics are unique",
             (*over, value),
             lambda: (
                 geodesics.unique(place, value)
-                if value < 1
+                if value is not None and value < 1
                 else metric.stated(False, "the test is not below 1")
             ),
         )
 
 
+def _largest(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
+    """smax(Theta B) <= |B| sqrt(A); None where one of them is not bounded."""
+    if B is None or upper is None:
+        return None
+    return Fraction(float(B) * float(upper) ** 0.5) * _ROUND_UP if upper > 0 else Fraction(0)
+
+
 def _gains(case: Case) -> Iterator[Claim]:
-    result, setting, proof = case.result, case.setting, case.result["proof"]
-    A, B, C = (result[name] for name in gains.SECTIONS)
+    radii = [pair.projection_radius for pair in _pairs(case.sections)]
+    R_H = radii[0] if radii else Fraction(0)
+    yield from _rates(case, case.sections.rates, R_H)
+    yield from _distance(case, case.sections.distance, R_H)
+    yield from _sampled(case, case.sections.sampled)
 
-    def claim(name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
-        return Claim(name, (*case.numbers, digest(parts)), examine, _SHARP)
 
-    if gains.is_certified(A):
-        at = gains.section_gains(A)
-        shown = {key: value for key, value in A.mapping().items() if key not in ("curve", "least_adaptation")}
-        derived = {name: result["constants"][name]["above"].value for name in consistency.DERIVED}
-        yield claim("A: the predictor", (shown,), lambda: gains.loop(A, case.system))
-        yield claim(
+def _pairs(sections: Sections) -> Iterator[Pair]:
+    """All pairs of A and B."""
+    for pair in (sections.rates.pair, sections.rates.least_adaptation, *sections.distance.pairs.values()):
+        if pair is not None:
+            yield pair.gains
+
+
+def _formula(case: Case, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
+    return Claim(name, (*case.numbers, *parts), examine, _SHARP)
+
+
+def _rates(case: Case, A: RateSection, R_H: Fraction) -> Iterator[Claim]:
+    setting, recipe = case.setting, case.result.recipes.rates
+    pair, least, radius = A.pair, A.least_adaptation, A.ultimate_radius
+    if A.predictor is not None and pair is not None:
+        printed = A.predictor
+        yield _formula(case, "A: the predictor", (printed,), lambda: gains.loop(printed, case.system))
+    if pair is not None:
+        at, shown = gains.gains_of(pair.gains), {name: case.constants[name] for name in DERIVED}
+        yield _formula(
+            case,
             "A: derived constants",
-            (shown, derived),
-            lambda: gains.derived_constants(result["constants"], setting, at),
+            (at, shown),
+            lambda: gains.derived_constants(case.constants, setting, at),
         )
-        yield claim(f"A: (26a)-(26c) at {_words(at)}", (shown,), lambda: gains.margins(A, setting, at))
-        yield claim("A: ultimate radius", (shown,), lambda: gains.ultimate_26(A, setting, at))
-        recipe = proof["conditions_26"]
-        yield claim(
-            "A: its recipe",
-            (shown, recipe.value),
-            lambda: metric.stated(gains.gains_of(recipe) == at, "it is for other gains"),
-        )
-        least = A.get("least_adaptation")
-        if least is not None:
-            own = gains.gains_of(least)
-            yield claim(
-                f"A: (26a)-(26c) at {_words(own)}", (least.value,), lambda: gains.margins(least, setting, own)
+        if A.verdict == "certified":
+            yield _formula(
+                case,
+                f"A: (26a)-(26c) at {_words(at)}",
+                (pair,),
+                lambda: gains.margins(pair.margins, setting, at),
             )
-        yield claim("A: the curve is feasible", (shown, A["curve"].value), lambda: gains.curve_26(A, setting))
-    if gains.is_certified(B):
-        chosen = gains.decisive(B)[0]
-        for name in ("asked", "split", "least_adaptation"):
-            pair = B.get(name)
-            if pair is not None:
-                recipe_B = proof["distance"] if name == chosen else None
-                yield claim(
-                    f"B: sup D < dbar at {_words(gains.gains_of(pair))}",
-                    (pair.value, recipe_B and recipe_B.value),
-                    lambda pair=pair, recipe_B=recipe_B: gains.distance_pair(pair, setting, recipe_B),  # type: ignore[misc]
-                )
-        yield claim("B: ultimate radius", (B.value,), lambda: gains.agreed(B))
-        yield claim("B: the curve is feasible", (B.value,), lambda: gains.distance_curve(B, setting))
-    if gains.is_certified(C):
-        recipe_C = proof["sampled"]
-        words = f"omega = {float(C['bandwidth'].number()):.6g}, Ts = {float(C['sample_time'].number()):.6g}"
-        yield claim(
-            f"C: sup D < dbar at {words}",
-            (C.value, recipe_C.value),
-            lambda: gains.sampled(C, setting, recipe_C),
+            yield _formula(
+                case,
+                "A: its recipe",
+                (pair, recipe),
+                lambda: metric.stated(recipe == pair.gains, "it is for other gains"),
+            )
+        if radius is not None:
+            yield _formula(
+                case, "A: ultimate radius", (at, radius), lambda: gains.ultimate_26(radius, setting, at)
+            )
+        yield _formula(
+            case, "A: below twice the rate", (A,), lambda: gains.below_twice_rate(A, case.system.rate)
         )
-        yield claim("C: the curve is feasible", (C.value,), lambda: gains.sampled_curve(C, setting))
+    if least is not None:
+        own = gains.gains_of(least.gains)
+        yield _formula(
+            case,
+            f"A: (26a)-(26c) at {_words(own)}",
+            (least,),
+            lambda: gains.margins(least.margins, setting, own),
+        )
+    yield _formula(
+        case, "A: the curve is feasible", (A.curve, R_H), lambda: gains.curve_26(A.curve, R_H, setting)
+    )
+    around = A.around
+    if around is not None:
+        yield _formula(
+            case, "A: margins around", (around, R_H), lambda: gains.around_26(around, R_H, setting)
+        )
+
+
+def _distance(case: Case, B: DistanceSection, R_H: Fraction) -> Iterator[Claim]:
+    setting, recipe = case.setting, case.result.recipes.distance
+    for k, (name, pair) in enumerate(B.pairs.items()):
+        decides = k == 0
+        if name == "asked" and B.verdict != "certified":
+            continue
+        own = recipe if decides and B.verdict == "certified" else None
+        missing = decides and B.verdict == "certified" and recipe is None
+        yield _formula(
+            case,
+            f"B: sup D < dbar at {_words(gains.gains_of(pair.gains))}",
+            (pair, own, missing),
+            lambda pair=pair, own=own, missing=missing: (  # type: ignore[misc]
+                metric.stated(False, "it has no recipe")
+                if missing
+                else gains.distance_pair(pair, setting, own)
+            ),
+        )
+        if decides:
+            yield _formula(case, "B: ultimate radius", (B, pair), lambda pair=pair: gains.agreed(B, pair))  # type: ignore[misc]
+    yield _formula(
+        case, "B: the curve is feasible", (B.curve, R_H), lambda: gains.distance_curve(B.curve, R_H, setting)
+    )
+    around = B.around
+    if around is not None:
+        yield _formula(
+            case, "B: margins around", (around, R_H), lambda: gains.around_distance(around, R_H, setting)
+        )
+
+
+def _sampled(case: Case, C: SampledSection) -> Iterator[Claim]:
+    setting, recipe, pair = case.setting, case.result.recipes.sampled, C.pair
+    if C.verdict == "certified" and pair is not None:
+        words = f"omega = {float(pair.bandwidth):.6g}, Ts = {float(pair.sample_time):.6g}"
+        yield _formula(
+            case,
+            f"C: sup D < dbar at {words}",
+            (C, recipe),
+            lambda: (
+                metric.stated(False, "it has no recipe")
+                if recipe is None
+                else gains.sampled(C, setting, recipe)
+            ),
+        )
+    yield _formula(case, "C: the curve is feasible", (C.curve, pair), lambda: gains.sampled_curve(C, setting))
 
 
 def _words(at: Gains) -> str:

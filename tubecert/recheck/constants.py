@@ -46,10 +46,10 @@ from tubecert.recheck.terms import (
 _FIRST = 500  # boxes before another way is tried
 
 
-def bounded(place: Place, name: str, limit: Fraction, largest: Fraction) -> Outcome:
+def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) -> Outcome:
     """Whether the constant `name` is at most `limit` (`lower`, `input_gain_least`: at least).
 
-    `largest` is a bound of smax(Theta B) over the tube.
+    `largest` is a bound of smax(Theta B) over the tube, None if none is claimed.
     """
     if name == "lower":
         return lower_bound(place.system, limit, place.tube(), place.budget)
@@ -58,6 +58,8 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction) -> Outc
     if limit < 0:
         return stated(False, "it is negative")
     if name == "feedback_gain":
+        if largest is None:
+            return Outcome(verdict="undecided", why="|B| or the metric has no bound")
         return feedback_gain(place, limit, largest)
     return _CLAIMS[name](place, limit)
 

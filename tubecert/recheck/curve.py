@@ -137,9 +137,11 @@ def _hull(boxes: Sequence[Ends]) -> Ends:
 
 
 def expressed(x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction | None) -> Curve:
-    """A curve given by terms of `time`; without a horizon it stays at a point."""
+    """A curve given by terms of `time`; only a point needs no horizon (`ValueError`)."""
+    if horizon is None and time in names([*x, *u]):
+        raise ValueError("a plan that moves needs a horizon")
     clock = {time: variable(CLOCK)}
-    part = Part(exact(0), exact(horizon or 0), {})
+    part = Part(exact(0), exact(0 if horizon is None else horizon), {})
     start = tuple(replaced(x, {time: number(0)}))
     return Curve(tuple(replaced(x, clock)), tuple(replaced(u, clock)), (part,), horizon, start)
 
@@ -148,9 +150,9 @@ def expressed(x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction
 class Knots:
     """Exact knots of a plan: times, states, inputs (row by row), and whether inputs are held or linear between."""
 
-    t: list[Fraction]
-    x: list[list[Fraction]]
-    u: list[list[Fraction]]
+    t: tuple[Fraction, ...]
+    x: tuple[tuple[Fraction, ...], ...]
+    u: tuple[tuple[Fraction, ...], ...]
     held: bool
 
 

@@ -9,24 +9,30 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 from tubecert.errors import TubecertError
-from tubecert.expression import ExpressionError, parse_number
 from tubecert.findings import Finding, Location
+from tubecert.recheck.grammar import GrammarError, read_number
 
 FORMAT = "tubecert-certificate/2"
 MOST_BYTES = 64_000_000
 _VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
 _DEEPEST = 60
+_LONGEST = 40  # characters of a number
+_LEAST, _MOST = Fraction(1, 10**300), Fraction(10**300)
+_PLAIN = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?")  # most numbers: read without a grammar
+_DECIMAL = re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][-+]?[0-9]+)?)")
+T = TypeVar("T")
 
 CODES = {
     "TC600": "the certificate cannot be read",
     "TC601": "the file is not a certificate",
     "TC602": "the certificate's format version is not known",
-    "TC603": "a field of the certificate is missing or of the wrong kind",
+    "TC603": "a field of the certificate is missing, unknown or of the wrong kind",
     "TC604": "the certificate belongs to another specification",
 }
 
@@ -48,30 +54,37 @@ class Node:
     def __init__(self, value: Any, path: str) -> None:
         self.value, self.path = value, path
 
-    def __getitem__(self, key: str) -> Node:
-        if key not in self.mapping():
-            raise wrong("TC603", f"{self.path}.{key} is missing", "write the certificate again")
-        return Node(self.value[key], f"{self.path}.{key}")
-
-    def get(self, key: str) -> Node | None:
-        """A member that may be absent or null."""
-        value = self.mapping().get(key)
-        return None if value is None else Node(value, f"{self.path}.{key}")
-
     def _expected(self, kind: str) -> CertificateError:
-        shown = json.dumps(self.value, ensure_ascii=True)[:40]
-        return wrong("TC603", f"{self.path} is {shown}, not {kind}", "write the certificate again")
+        shown = (
+            "an object" if isinstance(self.value, dict) else "a list" if isinstance(self.value, list) else ""
+        )
+        shown = shown or json.dumps(self.value, ensure_ascii=True)[:40]
+        return self.refused(f"is {shown}, not {kind}")
+
+    def refused(self, why: str) -> CertificateError:
+        """The error that says what is wrong with this value."""
+        return wrong("TC603", f"{self.path} {why}", "write the certificate again")
 
     def mapping(self) -> dict[str, Any]:
-        """An object."""
+        """An object whose keys are names of somebody else's: states, constants, libraries."""
         if not isinstance(self.value, dict):
             raise self._expected("an object")
         return self.value
 
-    def items(self) -> Iterator[tuple[str, Node]]:
-        """The members of an object."""
+    def closed(self, *required: str, optional: Collection[str] = ()) -> Members:
+        """An object with exactly these keys, each of the optional ones there or not; anything else is an error."""
         for key in self.mapping():
-            yield key, self[key]
+            if key not in required and key not in optional:
+                raise Node(None, f"{self.path}.{key[:60]}").refused("is not known in this place")
+        return Members(self, {key: self._member(key) for key in self.mapping()})
+
+    def items(self) -> Iterator[tuple[str, Node]]:
+        """The members of an object whose keys are names of somebody else's."""
+        for key in self.mapping():
+            yield key, self._member(key)
+
+    def _member(self, key: str) -> Node:
+        return Node(self.value[key], f"{self.path}.{key[:60]}")
 
     def entries(self) -> list[Node]:
         """An array."""
@@ -85,38 +98,113 @@ class Node:
             raise self._expected("a text")
         return self.value
 
+    def word(self, *words: str) -> str:
+        """One of several words."""
+        if self.text() not in words:
+            raise self._expected(" or ".join(words))
+        return self.text()
+
     def flag(self) -> bool:
         """True or false."""
         if not isinstance(self.value, bool):
             raise self._expected("true or false")
         return self.value
 
+    def count(self) -> int:
+        """A whole number that is not negative."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int) or self.value < 0:
+            raise self._expected("a whole number")
+        return self.value
+
     def number(self) -> Fraction:
-        """An exact number: the decimal that is written, or a text `p/q`."""
-        value = self.value
-        if isinstance(value, bool) or not isinstance(value, (int, float, str, Fraction)):
+        """A number of JSON: the decimal that is written, which is the one that is hashed."""
+        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
             raise self._expected("a number")
-        if isinstance(value, str):
-            try:
-                return parse_number(value)
-            except ExpressionError:
-                raise self._expected("a number") from None
-        return value if isinstance(value, Fraction) else Fraction(value)
+        q = Fraction(repr(self.value))
+        if abs(q) > _MOST:
+            raise self._expected("a number of at most 1e300")
+        return q
 
-    def texts(self) -> list[str]:
+    def decimal(self) -> Fraction:
+        """A number of JSON, or a text where it is not the shortest decimal of a float: a decimal or `p/q`."""
+        if isinstance(self.value, str) and _DECIMAL.fullmatch(self.value):
+            return self.exact()
+        return self.number()
+
+    def exact(self) -> Fraction:
+        """A text that stands for a rational number."""
+        if isinstance(self.value, str) and _PLAIN.fullmatch(self.value):
+            return self._sized(Fraction(self.value))
+        try:
+            return self._sized(read_number(self.text()))
+        except GrammarError as error:
+            raise self._expected(f"a number: {error}") from None
+
+    def _sized(self, q: Fraction) -> Fraction:
+        """Neither so large nor so small that a float could not be near it."""
+        if q and not _LEAST <= abs(q) <= _MOST:
+            raise self._expected("a number between 1e-300 and 1e300")
+        return q
+
+    def texts(self) -> tuple[str, ...]:
         """A list of texts."""
-        return [item.text() for item in self.entries()]
+        return tuple(item.text() for item in self.entries())
 
-    def numbers(self) -> list[Fraction]:
-        """A list of numbers."""
-        return [item.number() for item in self.entries()]
+    def numbers(self) -> tuple[Fraction, ...]:
+        """A list of numbers of JSON."""
+        return tuple(item.number() for item in self.entries())
+
+    def decimals(self) -> tuple[Fraction, ...]:
+        """A list of numbers, or texts that are decimals or quotients."""
+        return tuple(item.decimal() for item in self.entries())
+
+    def exacts(self) -> tuple[Fraction, ...]:
+        """A list of texts that stand for numbers."""
+        return tuple(item.exact() for item in self.entries())
 
     def pair(self) -> tuple[Node, Node]:
-        """[below, above]; either may be null."""
-        both = self.entries()
-        if len(both) != 2:
-            raise self._expected("a pair")
-        return both[0], both[1]
+        """Two values."""
+        first, second = self.sized(2)
+        return first, second
+
+    def sized(self, size: int) -> list[Node]:
+        """The items of a list of a known size."""
+        items = self.entries()
+        if len(items) != size:
+            raise self.refused(f"has {len(items)} entries, not {size}")
+        return items
+
+    def rows(self, p: int, q: int) -> list[list[Node]]:
+        """The items of a matrix of known size."""
+        return [row.sized(q) for row in self.sized(p)]
+
+
+class Members:
+    """The members of an object whose keys are known."""
+
+    def __init__(self, owner: Node, members: Mapping[str, Node]) -> None:
+        self._owner, self._members = owner, members
+
+    def __getitem__(self, key: str) -> Node:
+        if key not in self._members:
+            raise Node(None, f"{self._owner.path}.{key}").refused("is missing")
+        return self._members[key]
+
+    def require(self, *keys: str) -> None:
+        """Raises if one of these is not there."""
+        for key in keys:
+            self[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._members
+
+    def get(self, key: str, reads: Callable[[Node], T]) -> T | None:
+        """A member that may be absent."""
+        return reads(self[key]) if key in self._members else None
+
+    def known(self, key: str, reads: Callable[[Node], T]) -> T | None:
+        """A member that must be there, and may be null: then it says that there is nothing."""
+        return None if self[key].value is None else reads(self[key])
 
 
 def read(text: str, file: str) -> Node:
@@ -126,7 +214,9 @@ def read(text: str, file: str) -> Node:
     if _depth(text) > _DEEPEST:
         raise wrong("TC600", f"{file} is nested deeper than {_DEEPEST}")
     try:
-        data = json.loads(text, object_pairs_hook=_once, parse_constant=_refused, parse_float=_Decimal)
+        data = json.loads(
+            text, object_pairs_hook=_once, parse_constant=_refused, parse_float=_float, parse_int=_whole
+        )
     except json.JSONDecodeError as error:
         at = Location(file=file, line=error.lineno, column=error.colno)
         raise wrong("TC600", f"not JSON: {error.msg}", "write the certificate again", at) from None
@@ -139,27 +229,28 @@ def read(text: str, file: str) -> Node:
         )
     if known != FORMAT:
         newer = int(match[1][:9]) > int(FORMAT.rpartition("/")[2])
+        told = "a newer" if newer else "an older"
         remedy = "use a newer tubecert" if newer else "certify again"
-        raise wrong("TC602", f"{file} has the format {known}; this version reads {FORMAT}", remedy)
+        message = (
+            f"{file} was written by {told} version: its format is {known[:60]}, this version reads {FORMAT}"
+        )
+        raise wrong("TC602", message, remedy)
     return Node(data, "certificate")
 
 
-class _Decimal(float):
-    """A float that remembers the decimal it was read from."""
+def _float(text: str) -> float:
+    """A number whose shortest decimal is what is written: the hash, which is of that decimal, binds it exactly."""
+    value = float(text)
+    if len(text) > _LONGEST or not math.isfinite(value) or Decimal(repr(value)) != Decimal(text):
+        raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
+    return value
 
-    __slots__ = ("written",)
-    written: str
 
-    def __new__(cls, text: str) -> _Decimal:
-        value = super().__new__(cls, text)
-        if not math.isfinite(value) or len(text) > 400:
-            raise ValueError(f"the number {text[:40]} is out of range")
-        value.written = text
-        return value
-
-    def as_integer_ratio(self) -> tuple[int, int]:
-        """The decimal itself, exactly (`Fraction` reads this)."""
-        return Fraction(self.written).as_integer_ratio()
+def _whole(text: str) -> int:
+    """A whole number of a length that can be a bandwidth, a rate or a budget."""
+    if len(text) > _LONGEST:
+        raise ValueError(f"the number {text[:40]} is too long")
+    return int(text)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

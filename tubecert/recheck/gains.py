@@ -1,16 +1,28 @@
 """Claims about gains: what each section of the certificate states at its printed decimals.
 
-A section whose verdict is not `certified` claims nothing here; its numbers are passed over.
+A section whose verdict is not `certified` does not claim its own gains; what it states beside them is examined.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from fractions import Fraction
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact, root
+from tubecert.recheck.certificate import (
+    Around,
+    DistancePair,
+    DistanceRecipe,
+    DistanceSection,
+    Pair,
+    Point,
+    Predictor,
+    RateSection,
+    SampledRecipe,
+    SampledSection,
+)
 from tubecert.recheck.conditions import (
     DistanceProof,
     Setting,
@@ -21,75 +33,61 @@ from tubecert.recheck.conditions import (
     own_distance_proof,
 )
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node, wrong
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.predictor import Gains
+from tubecert.recheck.reasons import Enclosure
 from tubecert.recheck.sampling import SampledGains, sampled_margin
 from tubecert.recheck.system import System
 
 SECTIONS = ("conditions_26", "distance", "sampled")
 
 
-def is_certified(section: Node) -> bool:
-    """Whether a section claims its gains."""
-    verdict = section["verdict"].text()
-    if verdict not in ("certified", "refuted", "undecided"):
-        raise wrong("TC603", f"{section.path}.verdict is {verdict!r}, which is not known")
-    return verdict == "certified"
-
-
-def _optional(node: Node | None) -> Fraction | None:
-    return None if node is None else node.number()
-
-
-def gains_of(node: Node, predictor_gain: Fraction | None = None) -> Gains:
-    """The gains of a pair, or of the section of A with the predictor that it prints as a matrix."""
+def gains_of(pair: Pair) -> Gains:
+    """The gains of a pair."""
     return Gains(
-        bandwidth=node["bandwidth"].number(),
-        adaptation_rate=node["adaptation_rate"].number(),
-        predictor_gain=_optional(node.get("predictor_gain")) if predictor_gain is None else predictor_gain,
-        projection_radius=node["projection_radius"].number(),
+        bandwidth=pair.bandwidth,
+        adaptation_rate=pair.adaptation_rate,
+        predictor_gain=pair.predictor_gain,
+        projection_radius=pair.projection_radius,
     )
 
 
-def _sampled_gains(node: Node) -> SampledGains:
-    return SampledGains(
-        sample_time=node["sample_time"].number(),
-        bandwidth=node["bandwidth"].number(),
-        predictor_gain=node["predictor_gain"].number(),
-        projection_radius=node["projection_radius"].number(),
-    )
+def _of_point(point: Point, R_H: Fraction) -> Gains:
+    return gains_of(Pair(point.bandwidth, point.adaptation_rate, point.predictor_gain, R_H))
 
 
-def _at_least(value: Ball, pair: Node, what: str) -> Outcome:
+def _at_least(value: Ball, printed: Enclosure, what: str) -> Outcome:
     """A margin: proven to be at least the lower end that is printed, which is positive."""
-    below, above = pair.pair()
-    printed = below.number()
-    if printed <= 0:
+    below = printed.below
+    if below is None or below <= 0:
         return stated(False, f"the printed margin of {what} is not positive")
-    if above.value is not None and above.number() < printed:
+    if not printed.is_interval:
         return stated(False, f"the printed margin of {what} is not an interval")
-    if value >= exact(printed):
+    return _above(value, below, what)
+
+
+def _above(value: Ball, below: Fraction, what: str) -> Outcome:
+    if value >= exact(below):
         return CONFIRMED
     if not value.is_finite():
         return Outcome(verdict="contradicted", why=f"the condition on {what} does not hold at these numbers")
     return Outcome(
-        verdict="contradicted" if value < exact(printed) else "undecided",
-        why=f"the margin of {what} is {float(value.lower()):.6g}, not {float(printed):.6g}",
+        verdict="contradicted" if value < exact(below) else "undecided",
+        why=f"the margin of {what} is {float(value.lower()):.6g}, not {float(below):.6g}",
     )
 
 
-def _at_most(value: Ball, node: Node, what: str) -> Outcome:
-    if value <= exact(node.number()):
+def _at_most(value: Ball, printed: Fraction, what: str) -> Outcome:
+    if value <= exact(printed):
         return CONFIRMED
-    verdict = "contradicted" if value > exact(node.number()) or not value.is_finite() else "undecided"
+    verdict = "contradicted" if value > exact(printed) or not value.is_finite() else "undecided"
     return Outcome(
         verdict=verdict,  # type: ignore[arg-type]
-        why=f"{what} is {float(value.upper()):.12g}, more than {float(node.number()):.12g}",
+        why=f"{what} is {float(value.upper()):.12g}, more than {float(printed):.12g}",
     )
 
 
-def _all(outcomes: Iterator[Outcome]) -> Outcome:
+def _all(outcomes: Iterable[Outcome]) -> Outcome:
     """The first that is not confirmed."""
     return next((item for item in outcomes if not item.holds), CONFIRMED)
 
@@ -97,15 +95,15 @@ def _all(outcomes: Iterator[Outcome]) -> Outcome:
 # -- certificate A -------------------------------------------------------------------------------------------------
 
 
-def loop(section: Node, s: System) -> Outcome:
+def loop(printed: Predictor, s: System) -> Outcome:
     """The predictor that the section prints: A_m as specified, P = I, Q = -(A_m + A_m')."""
-    A, P, Q = ([row.numbers() for row in section[key].entries()] for key in ("A_m", "P", "Q"))
+    A, P, Q = printed.A_m, printed.P, printed.Q
     n = len(s.states)
-    if any(len(m) != n or any(len(row) != n for row in m) for m in (A, P, Q)):
-        return stated(False, "A_m, P or Q has the wrong size")
     if s.A_m is not None and s.A_m != A:
         return stated(False, "A_m is not that of the specification")
-    if s.A_m is None and _scalar(A) is None:
+    if s.A_m is None and (
+        A[0][0] >= 0 or any(A[i][j] != (A[0][0] if i == j else 0) for i in range(n) for j in range(n))
+    ):
         return stated(False, "A_m is not -g I with g > 0")
     if any(P[i][j] != (i == j) for i in range(n) for j in range(n)):
         return stated(False, "P is not the identity")
@@ -114,152 +112,159 @@ def loop(section: Node, s: System) -> Outcome:
     )
 
 
-def _scalar(A: list[list[Fraction]]) -> Fraction | None:
-    """The g > 0 of A = -g I."""
-    g = -A[0][0]
-    same = all(e == (-g if i == j else 0) for i, row in enumerate(A) for j, e in enumerate(row))
-    return g if same and g > 0 else None
-
-
-def section_gains(section: Node) -> Gains:
-    """The gains that certificate A prints."""
-    return gains_of(section, _scalar([row.numbers() for row in section["A_m"].entries()]))
-
-
-def margins(section: Node, setting: Setting, gains: Gains) -> Outcome:
+def margins(printed: dict[str, Enclosure], setting: Setting, gains: Gains) -> Outcome:
     """(26a)-(26c) hold with the margins printed."""
     found = margins_26(setting, gains)
-    printed = section["margins"]
     return _all(_at_least(found[claim], printed[claim], f"({claim})") for claim in found)
 
 
-def derived_constants(constants: Node, setting: Setting, gains: Gains) -> Outcome:
-    """The derived constants at these gains."""
+def derived_constants(constants: dict[str, Enclosure], setting: Setting, gains: Gains) -> Outcome:
+    """The derived constants at these gains; one without a bound claims nothing."""
     found = derived(setting, gains)
-    return _all(_at_most(value, constants[name]["above"], name) for name, value in found.items())
+    tops = {name: top for name in found if (top := constants[name].above) is not None}
+    return _all(_at_most(found[name], top, name) for name, top in tops.items())
 
 
-def ultimate_26(section: Node, setting: Setting, gains: Gains) -> Outcome:
+def ultimate_26(radius: Fraction, setting: Setting, gains: Gains) -> Outcome:
     """|x - x*| in the long run, by theorem B at the same gains."""
-    node = section.get("ultimate_radius")
-    if node is None:
-        return CONFIRMED
-    return _ultimate(node, setting, gains, own_distance_proof(setting, gains))
+    return _ultimate(radius, setting, gains, own_distance_proof(setting, gains))
 
 
-def _ultimate(node: Node, setting: Setting, gains: Gains, proof: DistanceProof) -> Outcome:
+def _ultimate(radius: Fraction, setting: Setting, gains: Gains, proof: DistanceProof) -> Outcome:
     bound = distance_bound(setting, gains, proof)
     if bound is None or not bound.supremum() < setting.reach:
         return Outcome(verdict="undecided", why="theorem B could not be shown at these gains")
-    return _at_most(bound.ultimate() / root(setting.n.lower), node, "the ultimate radius")
+    return _at_most(bound.ultimate() / root(setting.n.lower), radius, "the ultimate radius")
 
 
-def curve_26(section: Node, setting: Setting) -> Outcome:
+def curve_26(curve: Iterable[Point], R_H: Fraction, setting: Setting) -> Outcome:
     """Every point of the curve is feasible."""
-    R_H = section["projection_radius"].number()
     return _all(
         stated(
-            all(value > 0 for value in margins_26(setting, _curve_gains(point, R_H)).values()),
-            f"{point.path} is not feasible",
+            all(value > 0 for value in margins_26(setting, _of_point(point, R_H)).values()),
+            f"the point at bandwidth {float(point.bandwidth):.6g} is not feasible",
         )
-        for point in section["curve"].entries()
+        for point in curve
     )
 
 
-def _curve_gains(point: Node, R_H: Fraction) -> Gains:
-    return Gains(
-        bandwidth=point["bandwidth"].number(),
-        adaptation_rate=point["adaptation_rate"].number(),
-        predictor_gain=_optional(point.get("predictor_gain")),
-        projection_radius=R_H,
-    )
+def around_26(around: Around, R_H: Fraction, setting: Setting) -> Outcome:
+    """The margins that are printed along the bandwidth."""
+    outcomes = []
+    for k, bandwidth in enumerate(around.bandwidths):
+        found = margins_26(
+            setting, gains_of(Pair(bandwidth, around.adaptation_rate, around.predictor_gain, R_H))
+        )
+        printed = {claim: values[k] for claim, values in around.margins.items()}
+        outcomes += [
+            _above(found[claim], below, f"({claim}) at bandwidth {float(bandwidth):.6g}")
+            for claim, below in printed.items()
+            if below is not None
+        ]
+    return _all(outcomes)
 
 
 # -- certificate B -------------------------------------------------------------------------------------------------
 
 
-def decisive(section: Node) -> tuple[str, Node]:
-    """The pair that the verdict of B is about."""
-    for name in ("asked", "least_adaptation", "split"):
-        if (pair := section.get(name)) is not None:
-            return name, pair
-    raise wrong("TC603", f"{section.path} has no pair of gains")
-
-
-def distance_pair(pair: Node, setting: Setting, recipe: Node | None) -> Outcome:
+def distance_pair(pair: DistancePair, setting: Setting, recipe: DistanceRecipe | None) -> Outcome:
     """Theorem B at a pair: with the recipe, if there is one, which must be for these gains, else with an own proof."""
-    gains = gains_of(pair)
+    gains = gains_of(pair.gains)
     if recipe is None:
         proof = own_distance_proof(setting, gains)
+    elif recipe.gains != pair.gains:
+        return stated(False, "the recipe is for other gains")
     else:
-        if gains_of(recipe) != gains:
-            return stated(False, "the recipe is for other gains")
         proof = DistanceProof(
-            speed=exact(recipe["speed"].number()),
-            prediction_error=exact(recipe["prediction_error"].number()),
-            uncertainty=exact(recipe["uncertainty"].number()),
+            speed=exact(recipe.speed),
+            prediction_error=exact(recipe.prediction_error),
+            uncertainty=exact(recipe.uncertainty),
         )
+    found = _at_least(_distance_margin(setting, gains, proof), pair.margin, "the distance")
+    radius = pair.ultimate_radius
+    return _ultimate(radius, setting, gains, proof) if found.holds and radius is not None else found
+
+
+def _distance_margin(setting: Setting, gains: Gains, proof: DistanceProof) -> Ball:
     bound = distance_bound(setting, gains, proof)
-    value = arb("nan") if bound is None else margin(setting, bound.supremum())
-    found = _at_least(value, pair["margin"], "the distance")
-    node = pair.get("ultimate_radius")
-    return _ultimate(node, setting, gains, proof) if found.holds and node is not None else found
+    return arb("nan") if bound is None else margin(setting, bound.supremum())
 
 
-def distance_curve(section: Node, setting: Setting) -> Outcome:
+def _own_margin(setting: Setting, gains: Gains) -> Ball:
+    return (
+        _distance_margin(setting, gains, own_distance_proof(setting, gains)) if gains.sensible else arb("nan")
+    )
+
+
+def agreed(section: DistanceSection, decisive: DistancePair) -> Outcome:
+    """The radius in the long run that B prints is that of its pair."""
+    own, shown = decisive.ultimate_radius, section.ultimate_radius
+    return stated(shown is None or (own is not None and own <= shown), "it is not that of the pair")
+
+
+def distance_curve(curve: Iterable[Point], R_H: Fraction, setting: Setting) -> Outcome:
     """Every point of the curve is feasible."""
-    R_H = decisive(section)[1]["projection_radius"].number()
-
-    def feasible(point: Node) -> bool:
-        gains = _curve_gains(point, R_H)
-        if not gains.sensible:
-            return False
-        bound = distance_bound(setting, gains, own_distance_proof(setting, gains))
-        return bound is not None and bool(bound.supremum() < setting.reach)
-
     return _all(
-        stated(feasible(point), f"{point.path} is not feasible") for point in section["curve"].entries()
+        stated(
+            bool(_own_margin(setting, _of_point(point, R_H)) > 0),
+            f"the point at bandwidth {float(point.bandwidth):.6g} is not feasible",
+        )
+        for point in curve
+    )
+
+
+def around_distance(around: Around, R_H: Fraction, setting: Setting) -> Outcome:
+    """The margins that are printed along the bandwidth."""
+    return _all(
+        _above(
+            _own_margin(
+                setting, gains_of(Pair(bandwidth, around.adaptation_rate, around.predictor_gain, R_H))
+            ),
+            below,
+            f"the distance at bandwidth {float(bandwidth):.6g}",
+        )
+        for bandwidth, below in zip(around.bandwidths, around.margins["margin"], strict=True)
+        if below is not None
     )
 
 
 # -- certificate C -------------------------------------------------------------------------------------------------
 
 
-def sampled(section: Node, setting: Setting, recipe: Node | None) -> Outcome:
+def sampled(section: SampledSection, setting: Setting, recipe: SampledRecipe) -> Outcome:
     """Theorem C at the sample time."""
-    gains = _sampled_gains(section)
-    speed = None
-    if recipe is not None:
-        if _sampled_gains(recipe) != gains:
-            return stated(False, "the recipe is for other gains")
-        speed = exact(recipe["speed"].number())
-    value, ultimate = sampled_margin(setting, gains, speed)
-    found = _at_least(value, section["margin"], "the distance with sampled adaptation")
-    node = section.get("ultimate_radius")
-    return _at_most(ultimate, node, "the ultimate radius") if found.holds and node is not None else found
+    pair, printed = section.pair, section.margin
+    assert pair is not None
+    assert printed is not None
+    if recipe.gains != pair:
+        return stated(False, "the recipe is for other gains")
+    gains = SampledGains(pair.sample_time, pair.bandwidth, pair.predictor_gain, pair.projection_radius)
+    value, ultimate = sampled_margin(setting, gains, exact(recipe.speed))
+    found = _at_least(value, printed, "the distance with sampled adaptation")
+    radius = section.ultimate_radius
+    return _at_most(ultimate, radius, "the ultimate radius") if found.holds and radius is not None else found
 
 
-def agreed(section: Node) -> Outcome:
-    """The radius in the long run that B prints is that of its pair."""
-    own = decisive(section)[1].get("ultimate_radius")
-    shown = section.get("ultimate_radius")
-    if shown is None:
-        return CONFIRMED
-    return stated(own is not None and own.number() <= shown.number(), "it is not that of the pair")
-
-
-def sampled_curve(section: Node, setting: Setting) -> Outcome:
+def sampled_curve(section: SampledSection, setting: Setting) -> Outcome:
     """Every point of the curve is feasible, at some predictor gain: that of the pair, or those that search proposes."""
-    R_H, g = section["projection_radius"].number(), section["predictor_gain"].number()
+    if section.pair is None:
+        return CONFIRMED
+    R_H, g = section.pair.projection_radius, section.pair.predictor_gain
 
-    def feasible(point: Node) -> bool:
-        Ts, omega = point["sample_time"].number(), point["bandwidth"].number()
-        for gain in (g, omega, 10 * omega, *((1 / Ts, 10 / Ts) if Ts > 0 else ())):
-            own = SampledGains(sample_time=Ts, bandwidth=omega, predictor_gain=gain, projection_radius=R_H)
-            if sampled_margin(setting, own, None)[0] > 0:
-                return True
-        return False
+    def feasible(omega: Fraction, Ts: Fraction) -> bool:
+        proposed = (g, omega, 10 * omega, *((1 / Ts, 10 / Ts) if Ts > 0 else ()))
+        return any(
+            bool(sampled_margin(setting, SampledGains(Ts, omega, gain, R_H), None)[0] > 0)
+            for gain in proposed
+        )
 
     return _all(
-        stated(feasible(point), f"{point.path} is not feasible") for point in section["curve"].entries()
+        stated(feasible(omega, Ts), f"the point at bandwidth {float(omega):.6g} is not feasible")
+        for omega, Ts in section.curve
     )
+
+
+def below_twice_rate(section: RateSection, rate: Fraction) -> Outcome:
+    """The bandwidth lies below twice the rate, if that is said."""
+    lies = section.pair is not None and section.pair.gains.bandwidth < 2 * rate
+    return stated(lies or not section.below_twice_rate, "below_twice_rate is not what the bandwidth says")

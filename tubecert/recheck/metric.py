@@ -9,13 +9,11 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations, islice
 
-from flint import arb
-
 from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
+from tubecert.recheck.grammar import Owed
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import TIME, Duty
 from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.system import System, along
 from tubecert.recheck.terms import (
@@ -24,12 +22,9 @@ from tubecert.recheck.terms import (
     Matrix,
     Rows,
     Term,
-    in_order,
     matrix_slopes,
-    names,
     plus,
     scaled,
-    slopes,
     times,
     turned,
     unit_matrix,
@@ -159,11 +154,10 @@ def _never_zero(e: Term, domain: Domain, budget: int) -> Outcome:
     return positive if positive.holds else prove(NotNegative(-e, strict=True), domain, budget)
 
 
-def smooth(duties: Sequence[Duty], ranges: Mapping[str, Range], budget: int) -> Outcome:
+def smooth(duties: Sequence[Owed], ranges: Mapping[str, Range], budget: int) -> Outcome:
     """Every operation of f, B, W, h and the plan is defined: divisors are not zero, roots are of positive numbers."""
-    outcomes = []
+    outcomes, domain = [], Boxed(ranges)
     for duty in duties:
-        domain = Boxed({**ranges, **({} if TIME in ranges else {TIME: (arb(0), arb(0))})})
         if duty.kind == "positive":
             found = prove(NotNegative(duty.argument, strict=True), domain, budget)
         else:
@@ -174,60 +168,3 @@ def smooth(duties: Sequence[Duty], ranges: Mapping[str, Range], budget: int) -> 
             )
         outcomes.append(found)
     return together(outcomes)
-
-
-def time_range(s: System) -> Range | None:
-    """The times that matter for h: the horizon, one period where there is none, None if h is free of t.
-
-    Raises `ValueError` if h depends on t with no horizon and no period that can be seen.
-    """
-    if s.h is None or TIME not in names(row[0] for row in s.h):
-        return None
-    if s.horizon is not None:
-        return Fraction(0), s.horizon
-    return Fraction(0), period([row[0] for row in s.h])
-
-
-def period(terms: Sequence[Term]) -> arb:
-    """A common period in t of terms in which t occurs in sin, cos, tan of q t + c (all q rational, or all over pi)."""
-    rational: list[Fraction] = []
-    of_pi: list[Fraction] = []
-    bare: dict[Term, bool] = {}  # whether t can be reached without passing through a wave
-    for term in in_order(terms):
-        if term.op in ("sin", "cos", "tan") and bare[term.args[0]]:
-            slope = slopes([term.args[0]], TIME)[0]
-            frequency = _frequency(slope)
-            if frequency is None:
-                raise ValueError("h depends on t without a period that can be seen, so a horizon is needed")
-            (of_pi if frequency[1] else rational).append(frequency[0])
-            bare[term] = False
-        else:
-            bare[term] = term.value == TIME if term.op == "symbol" else any(bare[arg] for arg in term.args)
-    if any(bare[term] for term in terms) or (rational and of_pi):
-        raise ValueError("h depends on t without a period that can be seen, so a horizon is needed")
-    steps = [abs(q) for q in (rational or of_pi) if q]
-    if not steps:
-        return arb(0)
-    common = steps[0]
-    for q in steps[1:]:
-        common = _common(common, q)
-    return 2 * (arb.pi() if rational else arb(1)) / exact(common)
-
-
-def _frequency(slope: Term) -> tuple[Fraction, bool] | None:
-    """q of the slope q, or q of q pi."""
-    if slope.op == "const":
-        return Fraction(str(slope.value)), False
-    if slope.op == "pi":
-        return Fraction(1), True
-    if slope.op == "mul" and {e.op for e in slope.args} == {"const", "pi"}:
-        q = next(e for e in slope.args if e.op == "const")
-        return Fraction(str(q.value)), True
-    return None
-
-
-def _common(p: Fraction, q: Fraction) -> Fraction:
-    """The largest number of which both are integer multiples."""
-    while q:
-        p, q = q, p % q
-    return p

@@ -11,11 +11,12 @@ from flint import arb
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import CLOCK, Curve, expressed
-from tubecert.recheck.metric import time_range, together
+from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable
+from tubecert.recheck.times import time_range
 from tubecert.recheck.tube import Tube
 
 
@@ -31,7 +32,7 @@ class Place:
     def tube(self, extra: dict[str, tuple[Fraction, Fraction]] | None = None) -> Tube:
         """O(rho), with the times that matter for h."""
         s = self.system
-        time = time_range(s)
+        time = time_range(s.uncertainty, s.horizon)
         free = {**(extra or {}), **({} if time is None else {TIME: time})}
         return Tube(self.curve, self.rho, s.states, s.inputs, free)
 

@@ -2,70 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
-from tubecert.expression import Expression, ExpressionError, parse, symbol
-from tubecert.recheck.document import Node, wrong
-from tubecert.recheck.terms import Matrix, Term, from_expressions, number_of
+from tubecert.recheck.document import Node
+from tubecert.recheck.grammar import GrammarError, Owed, read
+from tubecert.recheck.terms import Matrix, Term, variable
 
 TIME = "t"
 
+Column = tuple[Term, ...]
+
 
 @dataclass(frozen=True, slots=True)
-class Duty:
-    """What must hold for an expression to be defined: `argument` is nonzero, or positive."""
-
-    kind: str
-    argument: Term
-    text: str
-    over: str  # "set", "time"
-
-
 class Reader:
-    """Expressions of the specification, and what they owe."""
+    """Reads expressions in some names; what they owe is added to `duties`."""
 
-    def __init__(self, states: Iterable[str]) -> None:
-        self._states = {name: symbol(name) for name in states}
-        self.duties: list[Duty] = []
+    names: tuple[str, ...]
+    kinks: bool
+    duties: list[Owed]
 
-    def term(
-        self, node: Node, over: str, *, time: bool = False, states: bool = True, kinks: bool = False
-    ) -> Term:
-        """One expression; `over` is where it must be defined."""
-        allowed: dict[str, Expression] = dict(self._states) if states else {}
-        if time:
-            allowed[TIME] = symbol(TIME)
+    @classmethod
+    def of(cls, names: Iterable[str], *, kinks: bool = False) -> Reader:
+        """A reader that knows these names."""
+        return cls(tuple(names), kinks, [])
+
+    def term(self, node: Node) -> Term:
+        """One expression."""
         try:
-            parsed = parse(node.text(), symbols=allowed, kinks=kinks)
-        except ExpressionError as error:
-            raise wrong("TC603", f"{node.path} is no expression of the specification: {error}") from None
-        arguments = from_expressions([parsed.expression, *(duty.argument for duty in parsed.obligations)])
-        for duty, argument in zip(parsed.obligations, arguments[1:], strict=True):
-            self.duties.append(Duty(duty.kind, argument, duty.text, over))
-        return arguments[0]
+            term, owed = read(node.text(), {name: variable(name) for name in self.names}, kinks=self.kinks)
+        except GrammarError as error:
+            raise node.refused(f"is no expression that may stand there: {error}") from None
+        self.duties.extend(owed)
+        return term
 
-    def column(self, node: Node, rows: int, over: str, **options: bool) -> Matrix:
-        """A list of expressions as a column."""
-        return [[self.term(item, over, **options)] for item in sized(node, rows)]
+    def column(self, node: Node, rows: int) -> Column:
+        """A list of expressions."""
+        return tuple(self.term(item) for item in node.sized(rows))
 
-
-def sized(node: Node, size: int) -> list[Node]:
-    """The items of a list of a known size."""
-    items = node.entries()
-    if len(items) != size:
-        raise wrong("TC603", f"{node.path} has {len(items)} entries, not {size}")
-    return items
+    def matrix(self, node: Node, rows: int, columns: int) -> Matrix:
+        """A matrix of expressions."""
+        return [[self.term(item) for item in row] for row in node.rows(rows, columns)]
 
 
-def rows_of(node: Node, p: int, q: int) -> list[list[Node]]:
-    """The items of a matrix of known size."""
-    return [sized(row, q) for row in sized(node, p)]
-
-
-def constants(node: Node) -> list[Fraction] | None:
-    """A list of expressions as exact numbers; None if one of them is no rational constant."""
-    reader = Reader(())
-    terms = [reader.term(item, "time", time=True) for item in node.entries()]
-    return [number_of(e) for e in terms] if all(e.op == "const" for e in terms) else None
+def upright(column: Sequence[Term]) -> Matrix:
+    """A column as a matrix."""
+    return [[e] for e in column]

@@ -7,18 +7,21 @@ refuted rests on the lower sides of the constants, which are not examined. A ver
 from __future__ import annotations
 
 from collections.abc import Iterator
+from fractions import Fraction
 
 from flint import arb
 
 from tubecert.recheck import metric, uncontrollable
 from tubecert.recheck.balls import Ball, exact, is_indefinite
+from tubecert.recheck.certificate import Result
 from tubecert.recheck.claims import Case, Claim
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.document import Node, digest
-from tubecert.recheck.gains import SECTIONS, is_certified
+from tubecert.recheck.gains import SECTIONS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
+from tubecert.recheck.reasons import Reason
+from tubecert.recheck.specification import Metric
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
 _AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")
@@ -26,61 +29,59 @@ _AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metri
 
 def of_others(case: Case) -> Iterator[Claim]:
     """What can be examined of a verdict that is not `certified`."""
-    same = case.result["spec"]["effective_hash"].text() == digest(case.effective.value)
-    outcome = metric.stated(same, "spec.effective_hash is not that of spec.effective")
-    yield Claim("the specification and its hash", (same,), lambda: outcome)
-    if case.result["verdict"].text() != "refuted":
+    if case.result.verdict != "refuted":
         return
-    for reason in case.result["reasons"].entries():
-        if reason["verdict"].text() == "refuted":
-            name = reason["claim"].text()
+    for reason in case.result.reasons:
+        if reason.verdict == "refuted":
             yield Claim(
-                f"refuted: {name}",
-                (*case.whole, digest(reason.value)),
-                lambda name=name, reason=reason: _refutation(case, name, reason),  # type: ignore[misc]
+                f"refuted: {reason.claim}",
+                (*case.whole, case.knots, repr(reason), repr(case.result.tube), repr(case.result.sections)),
+                lambda reason=reason: _refutation(case, reason),  # type: ignore[misc]
             )
 
 
-def _refutation(case: Case, name: str, reason: Node) -> Outcome:
+def _refutation(case: Case, reason: Reason) -> Outcome:
+    name, result, at = reason.claim, case.result, reason.at
     if name == "metric_found":
-        return uncontrollable.excludes(case.effective)
-    s, at = case.system, reason.get("at")
+        return uncontrollable.excludes(result.specification)
+    if not isinstance(result.specification.metric, Metric):
+        return Outcome(verdict="undecided", why="refutations of this kind are not examined")
     if name in _AT_A_POINT and at is not None:
-        point = [exact(value) for value in at["x"].numbers()]
-        if len(point) != len(s.states) or not _inside(case, point):
-            return metric.stated(False, "the witness does not lie in the safe set")
-        if name == "metric_bound":
-            return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
-        if name == "metric_definite":
-            return _if(is_indefinite(_value(case, s.W, point)))
-        if name == "metric_contraction":
-            basis = metric.null_space(s, metric.on_set(s), case.budget)
-            if isinstance(basis, Outcome):
-                return basis
-            return _if(
-                is_indefinite(_value(case, scaled(-1, times(turned(basis), times(s.F, basis))), point))
-            )
-        return _if(metric.killing(s).verdict == "contradicted")
+        return _metric_fails(case, name, [exact(value) for value in at[1]])
     if name == "tube_in_safe_set" and at is not None:
-        return _leaves(case, at)
-    if name == "condition_holds" and (section := reason["section"].text()) in SECTIONS:
-        return _gains_fail(case, case.result[section])
+        return _leaves(case, at[0])
+    section = str(reason.parameters.get("section"))
+    if name == "condition_holds" and section in SECTIONS and result.sections is not None:
+        return _gains_fail(result, section)
     return Outcome(verdict="undecided", why="refutations of this kind are not examined")
+
+
+def _metric_fails(case: Case, name: str, point: list[Ball]) -> Outcome:
+    """A condition on the metric is false at the witness."""
+    s = case.system
+    if len(point) != len(s.states) or not _inside(case, point):
+        return metric.stated(False, "the witness does not lie in the safe set")
+    if name == "metric_bound":
+        return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
+    if name == "metric_definite":
+        return _if(is_indefinite(_value(case, s.W, point)))
+    if name == "metric_contraction":
+        basis = metric.null_space(s, metric.on_set(s), case.budget)
+        if isinstance(basis, Outcome):
+            return basis
+        return _if(is_indefinite(_value(case, scaled(-1, times(turned(basis), times(s.F, basis))), point)))
+    return _if(metric.killing(s).verdict == "contradicted")
 
 
 def _declared_bounds(case: Case) -> list[Matrix]:
     """Matrices that are positive semidefinite where the declared bounds of M hold: I/a - W and A W - I."""
-    bounds, s = case.effective["metric"].get("bounds"), case.system
-    if bounds is None:
-        return []
+    declared, s = case.result.specification.metric, case.system
+    assert isinstance(declared, Metric)
     eye, found = unit_matrix(len(s.states)), []
-    lower, upper = (
-        None if (node := bounds.get(key)) is None else node.number() for key in ("lower", "upper")
-    )
-    if lower is not None and lower > 0:
-        found.append(plus(scaled(1 / lower, eye), s.W, -1))
-    if upper is not None:
-        found.append(plus(scaled(upper, s.W), eye, -1))
+    if declared.lower is not None:
+        found.append(plus(scaled(1 / declared.lower, eye), s.W, -1))
+    if declared.upper is not None:
+        found.append(plus(scaled(declared.upper, s.W), eye, -1))
     return found
 
 
@@ -100,10 +101,12 @@ def _value(case: Case, rows: Rows, point: list[Ball]) -> list[list[Ball]]:
     return [[next(flat) for _ in row] for row in rows]
 
 
-def _leaves(case: Case, at: Node) -> Outcome:
+def _leaves(case: Case, at: Fraction | None) -> Outcome:
     """The plan comes closer to a face of the safe set than the radius, near the time of the witness."""
-    rho, s = exact(case.result["tube"]["rho"].number()), case.system
-    t = float(at["t"].number()) if at.get("t") is not None else 0.0
+    if case.result.tube is None:
+        return metric.stated(False, "no radius is stated")
+    rho, s = exact(case.result.tube.rho), case.system
+    t = 0.0 if at is None else float(at)
     segment: Segment = case.curve.root
     while segment.halves:
         segment = min(segment.halves, key=lambda half: max(half.when[0] - t, t - half.when[1], 0.0))
@@ -114,13 +117,14 @@ def _leaves(case: Case, at: Node) -> Outcome:
     return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
 
 
-def _gains_fail(case: Case, section: Node) -> Outcome:
+def _gains_fail(result: Result, name: str) -> Outcome:
     """No margin of the section that is printed is proven; its upper end is not positive."""
-    if is_certified(section):
+    assert result.sections is not None
+    section = result.sections.by_name[name]
+    if section.verdict == "certified":
         return metric.stated(False, "the section is certified")
-    margins = [item["margin"] for item in section["shortfalls"].entries()]
-    ends = [margin.pair()[1] for margin in margins]
-    refused = any(end.value is not None and exact(end.number()) <= arb(0) for end in ends)
+    ends = [item.margin.above for item in section.shortfalls]
+    refused = any(end is not None and exact(end) <= arb(0) for end in ends)
     why = "the shortfalls rest on the lower sides of constants, which are not examined"
     return (
         Outcome(verdict="undecided", why=why) if refused else metric.stated(False, "no shortfall is stated")

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
-from tubecert.recheck.claims import Case, Claim, Memory, of_certified
-from tubecert.recheck.consistency import unread
+from tubecert.recheck.certificate import Certificate, read_certificate
+from tubecert.recheck.claims import Case, Claim, Memory, of_certified, of_every
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node, digest, read, wrong
+from tubecert.recheck.document import read
 from tubecert.recheck.metric import stated
+from tubecert.recheck.orientation import NOT_EXAMINED
 
 BUDGET = 200_000
 Report = Callable[[str], None]  # the name of the claim that is being examined
@@ -75,26 +76,25 @@ def recheck(
 
     `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed.
     """
-    document = read(text, file)
-    result = document["result"]
-    document["run"].mapping()
-    verdict = result["verdict"].text()
-    if verdict not in ("certified", "refuted", "undecided"):
-        raise wrong("TC603", f"{result.path}.verdict is {verdict!r}, which is not known")
+    certificate = read_certificate(read(text, file))
     found = []
-    for claim in _claims(document, result, verdict, budget):
+    for claim in _claims(certificate, budget):
         if report is not None:
             report(claim.name)
         found.append(Examined(claim.name, claim.outcome(memory)))
         if to_first_failure and not found[-1].outcome.holds:
             break
     return Recheck(
-        stated=verdict, hash=document["hash"].text(), claims=tuple(found), unread=tuple(unread(result))
+        stated=certificate.result.verdict,
+        hash=certificate.stated_hash,
+        claims=tuple(found),
+        unread=NOT_EXAMINED,
     )
 
 
-def _claims(document: Node, result: Node, verdict: str, budget: int) -> Iterator[Claim]:
-    same = document["hash"].text() == digest(result.value)
+def _claims(certificate: Certificate, budget: int) -> Iterator[Claim]:
+    same, result = certificate.stated_hash == certificate.hash, certificate.result
     yield Claim("the hash is that of the result", (same,), lambda: stated(same, "something was changed"))
     case = Case(result, budget)
-    yield from of_certified(case) if verdict == "certified" else refuted.of_others(case)
+    yield from of_every(result)
+    yield from of_certified(case) if result.verdict == "certified" else refuted.of_others(case)

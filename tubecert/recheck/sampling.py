@@ -15,7 +15,7 @@ from tubecert.recheck.conditions import Setting, margin, risen, speed_needed
 from tubecert.recheck.filtering import Distance
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SampledGains:
     """The gains of C: Ts, omega, g, R_H."""
 

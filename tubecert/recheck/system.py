@@ -1,8 +1,4 @@
-"""The specification inside a certificate (`result.spec.effective`, canonical) as the exact terms of a system.
-
-The reader knows the canonical form only: every number is a text, every expression is in the grammar, all that the
-certificate rests on is written out. Whatever is not of this form is an error (TC603).
-"""
+"""The exact terms of a system, and its plan as a curve, made of a specification that was read."""
 
 from __future__ import annotations
 
@@ -11,30 +7,32 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
+from tubecert.recheck.certificate import Plan
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
-from tubecert.recheck.document import Node, wrong
-from tubecert.recheck.reading import TIME, Duty, Reader, rows_of, sized
+from tubecert.recheck.document import wrong
+from tubecert.recheck.grammar import Owed
+from tubecert.recheck.reading import TIME, upright
+from tubecert.recheck.specification import (
+    Expressed,
+    Metric,
+    Numbers,
+    Range,
+    Resting,
+    Rows,
+    Specification,
+    Uncertainty,
+)
 from tubecert.recheck.terms import (
     Matrix,
     all_zero,
     matrix_slopes,
+    number,
     plus,
     scaled,
     times,
     turned,
     variable,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """x' = f + B u on a box; all exact."""
-
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    f: Matrix  # (n, 1)
-    B: Matrix
-    safe_set: dict[str, tuple[Fraction, Fraction]]
 
 
 @dataclass(frozen=True)
@@ -47,18 +45,27 @@ class System:
     B: Matrix
     W: Matrix
     rate: Fraction
-    h: Matrix | None  # (m, 1)
-    declared: dict[str, Fraction]  # bounds of h, h_x, h_t
-    safe_set: dict[str, tuple[Fraction, Fraction]]
-    x0: list[Fraction] | None
+    uncertainty: Uncertainty
+    safe_set: dict[str, Range]
+    x0: Numbers | None
     within: Fraction | None
     epsilon: Fraction
     rho_a: Fraction
-    A_m: list[list[Fraction]] | None  # None: auto
+    A_m: Rows | None  # None: auto
     smooth: Fraction | None
     kernel: str
     horizon: Fraction | None
-    duties: tuple[Duty, ...]
+    duties: tuple[Owed, ...]  # of f, B and W, on the safe set
+
+    @property
+    def h(self) -> Matrix | None:
+        """The uncertainty as expressions, (m, 1)."""
+        return None if self.uncertainty.h is None else upright(self.uncertainty.h)
+
+    @property
+    def declared(self) -> dict[str, Fraction]:
+        """Bounds of h, h_x, h_t that the specification declares."""
+        return self.uncertainty.declared
 
     @cached_property
     def f_x(self) -> Matrix:
@@ -107,152 +114,62 @@ def along(slopes_by_state: list[Matrix], direction: Matrix) -> Matrix:
     return total
 
 
-def read_plant(spec: Node) -> Plant:
-    """What a canonical specification says of the system alone."""
-    return _plant(spec)[0]
-
-
-def _plant(spec: Node) -> tuple[Plant, Reader]:
-    _known(spec)
-    system = spec["system"]
-    states, inputs = tuple(system["states"].texts()), tuple(system["inputs"].texts())
-    n, m = len(states), len(inputs)
-    if not (0 < m <= n) or len({*states, *inputs, TIME}) != n + m + 1:
-        raise wrong("TC603", f"{system.path} must name states, and at most as many inputs, all different")
-    reader = Reader(states)
-    plant = Plant(
-        states=states,
-        inputs=inputs,
-        f=reader.column(system["f"], n, "set"),
-        B=[[reader.term(e, "set") for e in row] for row in rows_of(system["B"], n, m)],
-        safe_set=_safe_set(spec["safe_set"], states),
+def system_of(spec: Specification) -> System:
+    """The system of a specification with a metric."""
+    metric, loop = spec.metric, spec.loop
+    assert isinstance(metric, Metric), "a certificate without a metric has no system to examine"
+    return System(
+        states=spec.plant.states,
+        inputs=spec.plant.inputs,
+        f=upright(spec.plant.f),
+        B=spec.plant.B,
+        W=metric.dual,
+        rate=metric.rate,
+        uncertainty=spec.uncertainty,
+        safe_set=spec.plant.safe_set,
+        x0=spec.start.at,
+        within=spec.start.within,
+        epsilon=spec.epsilon,
+        rho_a=spec.rho_a,
+        A_m=loop.A_m,
+        smooth=loop.smooth,
+        kernel=loop.kernel,
+        horizon=spec.trajectory.horizon,
+        duties=(*spec.plant.duties, *metric.duties),
     )
-    return plant, reader
 
 
-def read_system(spec: Node) -> System:
-    """The system of a canonical specification."""
-    plant, reader = _plant(spec)
-    n, m = len(plant.states), len(plant.inputs)
-    adaptation = spec["adaptation"]
-    uncertainty = spec["uncertainty"]
-    bounds = uncertainty.get("bounds")
-    start, metric = spec["initial_state"], spec["metric"]
-    within, at = start.get("within"), start.get("at")
-    A_m, projection = adaptation["A_m"], adaptation["projection"]
-    h = uncertainty.get("h")
-    horizon = spec["trajectory"].get("horizon")
-    found = System(
-        states=plant.states,
-        inputs=plant.inputs,
-        f=plant.f,
-        B=plant.B,
-        W=[[reader.term(e, "set") for e in row] for row in rows_of(metric["dual_metric"], n, n)],
-        rate=metric["rate"].number(),
-        h=None if h is None else reader.column(h, m, "time", time=True, kinks=True),
-        declared={} if bounds is None else {key: value.number() for key, value in bounds.items()},
-        safe_set=plant.safe_set,
-        x0=None if at is None else [item.number() for item in sized(at, n)],
-        within=None if within is None else within.number(),
-        epsilon=spec["tube"]["epsilon"].number(),
-        rho_a=spec["tube"]["rho_a"].number(),
-        A_m=None if A_m.value == "auto" else [[e.number() for e in row] for row in rows_of(A_m, n, n)],
-        smooth=None if projection.value == "hard" else projection["smooth"].number(),
-        kernel=_kernel(spec),
-        horizon=None if horizon is None else horizon.number(),
-        duties=tuple(reader.duties),
-    )
-    return _sane(spec, found)
-
-
-def _known(spec: Node) -> None:
-    version = spec["tubecert"]
-    if version.value != 1 or isinstance(version.value, bool):
-        raise wrong(
-            "TC602", f"{version.path} is {version.value!r}; this version reads 1", "use a newer tubecert"
-        )
-
-
-def _safe_set(node: Node, states: tuple[str, ...]) -> dict[str, tuple[Fraction, Fraction]]:
-    if set(node.mapping()) != set(states):
-        raise wrong("TC603", f"{node.path} must give a range for every state")
-    found = {}
-    for name in states:
-        low, high = node[name].pair()
-        found[name] = low.number(), high.number()
-    return found
-
-
-def _kernel(spec: Node) -> str:
-    options = spec["conditions"]
-    chosen = options.get("kernel")
-    kernel = "tight" if chosen is None else chosen.text()
-    if kernel not in ("tight", "paper"):
-        raise wrong("TC603", f"{options.path}.kernel is {kernel!r}, which is not known")
-    return kernel
-
-
-def _sane(spec: Node, s: System) -> System:
-    """Signs without which nothing below means what it says."""
-    positive = {"metric.rate": s.rate, "tube.epsilon": s.epsilon, "tube.rho_a": s.rho_a}
-    if s.horizon is not None:
-        positive["trajectory.horizon"] = s.horizon
-    for key, value in positive.items():
-        if value <= 0:
-            raise wrong("TC603", f"{spec.path}.{key} is not positive")
-    least: dict[str, Fraction] = {
-        **{f"uncertainty.bounds.{k}": v for k, v in s.declared.items()},
-        "initial_state.within": s.within or Fraction(0),
-    }
-    for key, value in least.items():
-        if value < 0:
-            raise wrong("TC603", f"{spec.path}.{key} is negative")
-    if (s.x0 is None) == (s.within is None):
-        raise wrong("TC603", f"{spec.path}.initial_state must be `at` or `within`")
-    if any(low >= high for low, high in s.safe_set.values()):
-        raise wrong("TC603", f"{spec.path}.safe_set has an empty range")
-    if not set(s.declared) <= {"h", "h_x", "h_t"} or (s.h is None and set(s.declared) != {"h", "h_x", "h_t"}):
-        raise wrong("TC603", f"{spec.path}.uncertainty must give h, or bounds for h, h_x and h_t")
-    if s.smooth is not None and s.smooth <= 0:
-        raise wrong("TC603", f"{spec.path}.adaptation.projection.smooth is not positive")
-    if any(s.W[i][j] is not s.W[j][i] for i in range(len(s.W)) for j in range(i)):
-        raise wrong("TC603", f"{spec.path}.metric.dual_metric is not symmetric")
-    return s
-
-
-def read_curve(spec: Node, plan: Node, s: System) -> tuple[Curve, list[Duty]]:
+def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     """The plan: expressions of the specification, or the knots that the certificate holds."""
-    trajectory = spec["trajectory"]
-    kind = trajectory["kind"].text()
-    if kind not in ("equilibrium", "expressions", "csv", "ilqr"):
-        raise wrong("TC603", f"{trajectory.path}.kind is {kind!r}, which is not known")
-    if kind in ("csv", "ilqr"):
-        knots = _knots(trajectory, plan, s)
-        horizon = knots.t[-1] if s.horizon is None else s.horizon
-        drift = [row[0] for row in s.drift]
-        return hermite(knots, drift, s.states, s.inputs, horizon), []
-    reader = Reader(())
-    keys = ("at", "input") if kind == "equilibrium" else ("x", "u")
-    sizes = len(s.states), len(s.inputs)
-    x, u = (
-        [row[0] for row in reader.column(trajectory[key], size, "time", time=kind == "expressions")]
-        for key, size in zip(keys, sizes, strict=True)
+    trajectory = spec.trajectory
+    if isinstance(trajectory, Resting):
+        return expressed(
+            [number(q) for q in trajectory.at],
+            [number(q) for q in trajectory.input],
+            TIME,
+            trajectory.horizon,
+        )
+    if isinstance(trajectory, Expressed):
+        return expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon)
+    return hermite(
+        _knots(plan, trajectory.held, trajectory.horizon),
+        [row[0] for row in s.drift],
+        s.states,
+        s.inputs,
+        trajectory.horizon,
     )
-    return expressed(x, u, TIME, s.horizon), reader.duties
 
 
-def _knots(trajectory: Node, plan: Node, s: System) -> Knots:
-    data = plan["knots"]
-    t, n, m = data["t"].numbers(), len(s.states), len(s.inputs)
+def _knots(plan: Plan, held: bool, horizon: Fraction) -> Knots:
+    """Knots that span the horizon, in order, filled as the specification says."""
+    path, knots = "certificate.result.plan", plan.knots
+    if knots is None:
+        raise wrong("TC603", f"{path} lacks its knots", "write the certificate again")
+    t = knots.t
     if len(t) < 2 or t[0] != 0 or any(b <= a for a, b in pairwise(t)):
-        raise wrong("TC603", f"{data.path}.t must begin at 0 and increase")
-    if s.horizon is not None and t[-1] < s.horizon:
-        raise wrong("TC603", f"{data.path}.t ends before the horizon")
-    rows = {
-        key: [[e.number() for e in sized(row, size)] for row in sized(data[key], len(t))]
-        for key, size in (("x", n), ("u", m))
-    }
-    interpolation = plan["interpolation"].text()
-    if interpolation not in ("hold", "linear") or interpolation != trajectory["interpolation"].text():
-        raise wrong("TC603", f"{plan.path}.interpolation is not that of the specification")
-    return Knots(t=t, x=rows["x"], u=rows["u"], held=interpolation == "hold")
+        raise wrong("TC603", f"{path}.knots.t must begin at 0 and increase")
+    if t[-1] < horizon:
+        raise wrong("TC603", f"{path}.knots.t ends before the horizon")
+    if plan.interpolation != ("hold" if held else "linear"):
+        raise wrong("TC603", f"{path}.interpolation is not that of the specification")
+    return Knots(t=t, x=knots.x, u=knots.u, held=held)

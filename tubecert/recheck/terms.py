@@ -1,6 +1,6 @@
 """Expressions of this room: hash-consed terms with derivative rules of their own, evaluated on balls.
 
-A term is built from a parsed expression node by node. Derivatives are sums over the arguments of a node of its partial
+A term is built by `grammar` from a text. Derivatives are sums over the arguments of a node of its partial
 derivative times theirs; the partial derivatives stand in one table.
 """
 
@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from itertools import count
 from weakref import WeakValueDictionary
-
-from tubecert.expression import Expression, topological
 
 Rows = Sequence[Sequence["Term"]]
 Matrix = list[list["Term"]]
@@ -23,7 +21,7 @@ _serial = count()
 class Term:
     """An operation `op` on other terms; `value` is a number, a name, an exponent or an index.
 
-    The operations are those of `tubecert.expression.Expression`.
+    The operations are `const`, `symbol`, `pi`, and those of `_PARTIAL`.
     """
 
     __slots__ = ("__weakref__", "args", "op", "serial", "value")
@@ -51,6 +49,10 @@ class Term:
             return other
         if other is UNIT:
             return self
+        for q, rest in ((self, other), (other, self)):  # one coefficient for a product
+            if q.op == "const" and rest.op == "mul" and "const" in (own := [arg.op for arg in rest.args]):
+                k = own.index("const")
+                return number(number_of(q) * number_of(rest.args[k])) * rest.args[1 - k]
         return _make("mul", *sorted((self, other), key=_age))
 
     def __neg__(self) -> Term:
@@ -112,6 +114,13 @@ def function(op: str, *args: Term, value: int | None = None) -> Term:
     return _make(op, *args, value=value)
 
 
+def operation(op: str, *args: Term) -> Term:
+    """An operation of the grammar on terms: `pi`, or a function; its value where the argument is the constant 0."""
+    if args and args[0] is NOUGHT and op in _AT_ZERO:
+        return number(_AT_ZERO[op])
+    return _make(op, *args)
+
+
 def remade(term: Term, args: tuple[Term, ...]) -> Term:
     """The operation of a term on other arguments."""
     match term.op:
@@ -129,18 +138,6 @@ def remade(term: Term, args: tuple[Term, ...]) -> Term:
 
 
 _AT_ZERO = {"sin": 0, "tan": 0, "cos": 1, "exp": 1}
-
-
-def from_expressions(expressions: Iterable[Expression]) -> list[Term]:
-    """Parsed expressions as terms."""
-    expressions = list(expressions)
-    found: dict[Expression, Term] = {}
-    for node in topological(expressions):
-        leaf = _make(node.op, value=node.value)
-        found[node] = remade(leaf, tuple(found[arg] for arg in node.args)) if node.args else leaf
-        if node.args and found[node].op not in _PARTIAL and found[node].op not in ("const", "symbol", "pi"):
-            raise ValueError(f"{node.op} is not an operation that is known here")
-    return [found[e] for e in expressions]
 
 
 def in_order(roots: Iterable[Term]) -> list[Term]:

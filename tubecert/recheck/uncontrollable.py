@@ -16,37 +16,34 @@ from flint import fmpq, fmpq_mat
 
 from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.reading import constants
-from tubecert.recheck.system import Plant, read_plant
+from tubecert.recheck.reading import upright
+from tubecert.recheck.specification import Planned, Plant, Resting, Specification, Wanted
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, matrix_slopes, number, number_of
 
 
-def excludes(spec: Node) -> Outcome:
+def excludes(spec: Specification) -> Outcome:
     """Whether the rate that the specification asks for is excluded at one of the points that suggest themselves."""
-    plant = read_plant(spec)
-    wanted = spec["metric"]["synthesise"].get("rate")
-    if wanted is None:
+    plant = spec.plant
+    if not isinstance(spec.metric, Wanted) or spec.metric.rate is None:
         return Outcome(verdict="undecided", why="no rate is asked for")
-    for point in _points(spec, plant):
+    for point in _points(spec):
         if all(low <= x <= high for x, (low, high) in zip(point, plant.safe_set.values(), strict=True)):
             linear = _linearised(plant, point)
-            if linear is not None and _has_slow_mode(*linear, wanted.number()):
+            if linear is not None and _has_slow_mode(*linear, spec.metric.rate):
                 return CONFIRMED
     return Outcome(verdict="undecided", why="no uncontrollable mode was found that excludes the rate")
 
 
-def _points(spec: Node, plant: Plant) -> Iterator[list[Fraction]]:
+def _points(spec: Specification) -> Iterator[Sequence[Fraction]]:
     """Rational points that may be equilibria: the plan's, its target, the centre of the set, the origin."""
-    trajectory = spec["trajectory"]
-    task = trajectory.get("task")
-    named = trajectory.get("at") if task is None else task.get("target")
-    at = None if named is None else constants(named)
-    if at is not None and len(at) == len(plant.states):
-        yield at
-    yield [(low + high) / 2 for low, high in plant.safe_set.values()]
-    yield [Fraction(0)] * len(plant.states)
+    trajectory = spec.trajectory
+    if isinstance(trajectory, Resting):
+        yield trajectory.at
+    if isinstance(trajectory, Planned):
+        yield trajectory.target
+    yield [(low + high) / 2 for low, high in spec.plant.safe_set.values()]
+    yield [Fraction(0)] * len(spec.plant.states)
 
 
 def _linearised(plant: Plant, point: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq_mat] | None:
@@ -60,8 +57,9 @@ def _linearised(plant: Plant, point: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq
         entries = [number_of(e) for row in there for e in row]
         return fmpq_mat(len(rows), len(rows[0]), [fmpq(q.numerator, q.denominator) for q in entries])
 
-    f, B = rational(plant.f), rational(plant.B)
-    slopes = [[rational(matrix_slopes(rows, name)) for name in plant.states] for rows in (plant.f, plant.B)]
+    drift = upright(plant.f)
+    f, B = rational(drift), rational(plant.B)
+    slopes = [[rational(matrix_slopes(rows, name)) for name in plant.states] for rows in (drift, plant.B)]
     if f is None or B is None or any(column is None for columns in slopes for column in columns):
         return None
     n, m = B.nrows(), B.ncols()

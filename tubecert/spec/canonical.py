@@ -36,7 +36,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
     if spec.metric is not None:
         data["metric"] = _metric(spec)
     elif spec.synthesis is not None:
-        data["metric"] = {"synthesise": _synthesis(spec.synthesis)}
+        data["metric"] = {"synthesise": synthesis_data(spec.synthesis)}
     if spec.expect is not None:
         data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
         if spec.expect.verdict is not None:
@@ -106,7 +106,8 @@ def _metric(spec: Spec) -> dict[str, Any]:
     return data
 
 
-def _synthesis(wanted: Synthesis) -> dict[str, Any]:
+def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
+    """What metric is asked for."""
     data: dict[str, Any] = {
         "objective": wanted.objective,
         "degree": "auto" if wanted.degree is None else str(wanted.degree),

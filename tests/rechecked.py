@@ -1,0 +1,80 @@
+"""Certificates for the tests of the checker: made once, changed, sealed again, examined."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import proven
+
+from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.claims import Case
+from tubecert.recheck.document import Node
+from tubecert.recheck.grammar import read
+from tubecert.recheck.run import Recheck, recheck
+from tubecert.recheck.terms import Term, variable
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+Document = dict[str, Any]
+
+
+def certified(text: str, **options: object) -> Document:
+    """The certificate of a specification; by default with all conditions."""
+    return proven.proven(text, **{"conditions": "all", **options})
+
+
+def shipped(name: str) -> Document:
+    """The certificate of a shipped configuration."""
+    return certified((CONFIGS / f"{name}.yaml").read_text("utf-8"))
+
+
+def digest(data: object) -> str:
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return "sha256:" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def sealed(document: Document) -> Document:
+    """The hashes made right again, and what repeats the specification or says what is claimed with it."""
+    document = copy.deepcopy(document)
+    if "result" not in document:
+        return document
+    inner = document["result"].get("spec")
+    if isinstance(inner, dict) and {"effective", "effective_hash"} <= inner.keys():
+        inner["effective_hash"] = digest(inner["effective"])
+    return {**document, "hash": digest(document["result"])}
+
+
+def respecified(document: Document, change: Any) -> Document:
+    """The specification inside changed, with everything that repeats it, and both hashes."""
+    document = copy.deepcopy(document)
+    result = document["result"]
+    effective = result["spec"]["effective"]
+    change(effective)
+    if "dual_metric" in effective["metric"]:
+        result["metric"]["dual_metric"] = effective["metric"]["dual_metric"]
+    claim, start = result["claim"], effective["initial_state"]
+    claim |= {"start": start, "domain": effective["safe_set"]}
+    if "horizon" in effective["trajectory"]:
+        claim |= {"horizon": effective["trajectory"]["horizon"], "for_all_time": None, "period": None}
+    return sealed(document)
+
+
+def examine(document: Document, budget: int = 20_000, memory: Any = None, **options: Any) -> Recheck:
+    return recheck(json.dumps(document), "certificate", budget, memory=memory, **options)
+
+
+def failing(found: Recheck) -> list[tuple[str, str]]:
+    return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
+
+
+def case_of(document: Document, budget: int = 400) -> Case:
+    return Case(read_certificate(Node(document, "certificate")).result, budget)
+
+
+def terms(expressions: list[str], names: str | list[str]) -> list[Term]:
+    """Texts as terms of the checker."""
+    symbols = {name: variable(name) for name in names}
+    return [read(text, symbols, kinks=True)[0] for text in expressions]

@@ -1,0 +1,44 @@
+"""The claim in the certificate's own words, derived again from this room's reading of the specification.
+
+`claim`: the state stays within the tube around the plan, over which time (and why for all of it, if there is no
+horizon), on which set the metric is one, from which start, against which uncertainty.
+"""
+
+from __future__ import annotations
+
+from tubecert.recheck.certificate import Claim, Result
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.metric import stated
+from tubecert.recheck.specification import Resting, Specification
+from tubecert.recheck.times import period_of
+
+TUBE = "tube"
+
+
+def own_claim(spec: Specification) -> Claim:
+    """What a certificate of this specification claims; raises `ValueError` where it can claim nothing."""
+    horizon = spec.trajectory.horizon
+    for_all_time = period = None
+    if horizon is None:
+        assert isinstance(spec.trajectory, Resting), "every other plan has a horizon"
+        found = period_of(spec.uncertainty)
+        for_all_time = "periodic" if found.length else "autonomous"
+        period = found.text if found.length else None
+    return Claim(
+        id=TUBE,
+        horizon=horizon,
+        for_all_time=for_all_time,
+        period=period,
+        domain=spec.plant.safe_set,
+        start=(spec.start.at, spec.start.within),
+        uncertainty=spec.uncertainty.words,
+    )
+
+
+def agrees(result: Result) -> Outcome:
+    """Whether `claim` is what follows from the specification."""
+    own = own_claim(result.specification)
+    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty"):
+        if getattr(own, key) != getattr(result.claim, key):
+            return stated(False, f"claim.{key} is not that of the specification")
+    return stated(True, "")

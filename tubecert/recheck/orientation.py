@@ -1,0 +1,111 @@
+"""Members of a certificate that claim nothing, read all the same: known keys, known kinds, and nothing beside them.
+
+What of them is a statement after all (points of the plan, margins around the gains) is handed on to be examined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from fractions import Fraction
+
+from tubecert.recheck.document import Node
+from tubecert.recheck.reasons import read_outcome, read_reason
+from tubecert.recheck.specification import Numbers, Rows, Wanted, read_wanted
+
+NOT_EXAMINED = (
+    "effort",
+    "elasticities",
+    "synthesis",
+    "conditions_26.bandwidth_infimum",
+    "conditions_26.binds",
+    "sampled.sample_time_limit",
+)
+"""By path: members that are shown and not verified."""
+
+
+def run(node: Node) -> None:
+    """How the certificate was made: no part of what is hashed."""
+    own = node.closed(optional=("command", "started", "seconds", "versions"))
+    own.get("command", Node.text)
+    own.get("started", Node.text)
+    own.get("seconds", Node.number)
+    for _, version in own["versions"].items() if "versions" in own else ():
+        version.text()
+
+
+def samples(node: Node, n: int) -> tuple[Numbers, Rows]:
+    """Times and points of the plan."""
+    own = node.closed("t", "x")
+    t = own["t"].numbers()
+    return t, tuple(tuple(e.number() for e in row) for row in own["x"].rows(len(t), n))
+
+
+def elasticities(node: Node, names: Collection[str]) -> None:
+    """How the least rates react to each constant."""
+    own = node.closed("conditions_26", "distance")
+    for key in ("conditions_26", "distance"):
+        own[key].closed(optional=names)
+        for _, slope in own[key].items():
+            slope.number()
+
+
+def around(
+    node: Node, claims: tuple[str, ...]
+) -> tuple[Numbers, Fraction, Fraction | None, dict[str, tuple[Fraction | None, ...]]]:
+    """Margins along the bandwidth: bandwidths, the rate and the predictor of the pair, and each margin there."""
+    own = node.closed("bandwidth", "adaptation_rate", "predictor_gain", *claims)
+    bandwidths = own["bandwidth"].decimals()
+    margins = {
+        claim: tuple(
+            None if item.value is None else item.number() for item in own[claim].sized(len(bandwidths))
+        )
+        for claim in claims
+    }
+    gain = own.known("predictor_gain", Node.decimal)
+    return bandwidths, own["adaptation_rate"].decimal(), gain, margins
+
+
+def synthesis(node: Node, n: int) -> Wanted:
+    """What metric was asked for; what was tried to find one is for orientation."""
+    texts, numbers = ("floor", "route"), ("rate", "condition_number")
+    own = node.closed(
+        "asked",
+        "objective",
+        "verdict",
+        "attempts",
+        optional=("rate", "table", "solver", "reason"),
+    )
+    for key in ("objective", "verdict"):
+        own[key].text()
+    own.get("rate", Node.decimal)
+    own.get("reason", lambda item: read_reason(item, n))
+    for item in own["attempts"].entries():
+        attempt = item.closed("rate", "degree", *texts, "outcome", optional=("condition_number",))
+        attempt["degree"].count()
+        read_outcome(attempt["outcome"])
+        for key in texts:
+            attempt[key].text()
+        for key in numbers:
+            attempt.get(key, Node.number)
+    if "table" in own:
+        for item in own["table"].entries():
+            _row(item)
+    if "solver" in own:
+        solver = own["solver"].closed("route", "degree", "variables", "digits")
+        solver["route"].text()
+        solver["variables"].texts()
+        for key in ("degree", "digits"):
+            solver[key].count()
+    return read_wanted(own["asked"])
+
+
+def _row(node: Node) -> None:
+    """A metric that was compared."""
+    numbers = ("condition_number", "input_gain", "rho", "ultimate_radius", "adaptation_rate")
+    row = node.closed("rate", "floor", "degree", "condition_number", optional=("verdict", *numbers[1:]))
+    row["rate"].decimal()
+    row["floor"].text()
+    row["degree"].count()
+    row.get("verdict", Node.text)
+    for key in numbers:
+        row.get(key, Node.number)

@@ -1,0 +1,53 @@
+"""A plan through knots: that it is the plan its task asks for, and that what is drawn of a plan lies on it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from fractions import Fraction
+
+from tubecert.recheck.balls import Ball, exact, length
+from tubecert.recheck.certificate import Plan
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.curve import Curve
+from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.specification import Planned
+
+_MISS = Fraction(1, 1000)  # of 1 + |target|: how far from its target a planned curve may end
+_DRAWN = Fraction(1, 10**5)  # of 1 + |x|: how far from the plan what is drawn of it may lie
+
+
+def serves(task: Planned, plan: Plan) -> Outcome:
+    """The knots begin at the start, end at the horizon, and there, if that is the goal, at the target."""
+    knots = plan.knots
+    assert knots is not None
+    if knots.x[0] != task.start:
+        return stated(False, "it does not begin at trajectory.start")
+    if knots.t[-1] != task.horizon:
+        return stated(False, "its last knot is not at the horizon")
+    if not task.goal:
+        return CONFIRMED
+    missed = _distance(knots.x[-1], task.target)
+    allowed = exact(_MISS) * (1 + _distance(task.target, (Fraction(0),) * len(task.target)))
+    return stated(bool(missed <= allowed), f"it ends {float(missed.mid()):.6g} away from its target")
+
+
+def _distance(a: tuple[Fraction, ...], b: tuple[Fraction, ...]) -> Ball:
+    return length([exact(x - y) for x, y in zip(a, b, strict=True)])
+
+
+def drawn(curve: Curve, plan: Plan) -> Outcome:
+    """The points that are there to draw the plan lie on it."""
+    if plan.samples is None:
+        return CONFIRMED
+    begins = [float(part.start.mid()) for part in curve.parts]
+    for t, x in zip(*plan.samples, strict=True):
+        if t < 0 or (curve.horizon is not None and t > curve.horizon):
+            return stated(False, f"a sample at t = {float(t):.6g} is outside of the horizon")
+        part = curve.parts[max(0, bisect_right(begins, float(t)) - 1)]
+        field = curve.field.with_values(part.values)
+        own = field.at([exact(t) - part.start] if field.variables else [])[: len(x)]
+        size = length([exact(value) for value in x])
+        missed = length([exact(value) - y for value, y in zip(x, own, strict=True)])
+        if not missed <= exact(_DRAWN) * (1 + size):
+            return stated(False, f"a sample at t = {float(t):.6g} is not on the plan")
+    return CONFIRMED

@@ -1,0 +1,242 @@
+"""Reasons, assumptions and advice of a certificate: ids with parameters, each id with the parameters that it has.
+
+What a reason says of gains is a statement and is compared; advice (`relax`), failures and outcomes of a synthesis are
+for orientation, and known all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.recheck.document import Members, Node
+from tubecert.recheck.specification import Numbers
+
+VERDICTS = ("certified", "refuted", "undecided")
+
+Reads = Callable[[Node], object]
+Form = tuple[Mapping[str, Reads], Mapping[str, Reads]]  # members that must be there, and those that may
+Parameters = dict[str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class Enclosure:
+    """[below, above]; None where there is no bound."""
+
+    below: Fraction | None
+    above: Fraction | None
+
+    @property
+    def is_interval(self) -> bool:
+        """Whether its ends, as far as there are any, are in order."""
+        return self.below is None or self.above is None or self.below <= self.above
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """A claim by its id and parameters, its verdict, and the point that shows it: (time, if there is one; state)."""
+
+    claim: str
+    parameters: Parameters
+    verdict: str
+    at: tuple[Fraction | None, Numbers] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """What is not proven, by its id and parameters."""
+
+    id: str
+    parameters: Parameters
+
+
+def maybe(node: Node) -> Fraction | None:
+    """A number, or null."""
+    return None if node.value is None else node.number()
+
+
+def enclosure(node: Node) -> Enclosure:
+    """[below, above]; either may be null."""
+    low, high = node.pair()
+    return Enclosure(maybe(low), maybe(high))
+
+
+def _word(*words: str) -> Reads:
+    return lambda node: node.word(*words)
+
+
+def _margins(node: Node) -> dict[str, Fraction]:
+    return {key: value.number() for key, value in node.items()}
+
+
+def _read(
+    node: Node, key: str, forms: Mapping[str, Form], beside: tuple[str, ...] = ()
+) -> tuple[str, Parameters, Members]:
+    """An object whose member `key` names its form; members `beside` may be there whatever it names."""
+    named = node.mapping().get(key)
+    if not isinstance(named, str) or named not in forms:
+        raise node.refused(f"must have {key}, one of {', '.join(forms)}")
+    required, optional = forms[named]
+    own = node.closed(key, *required, optional=(*optional, *beside))
+    found: Parameters = {name: read(own[name]) for name, read in required.items()}
+    found |= {name: read(own[name]) for name, read in optional.items() if name in own}
+    return named, found, own
+
+
+def read_reason(node: Node, n: int) -> Reason:
+    """One of `result.reasons`."""
+    claim, parameters, own = _read(node, "claim", _CLAIMS, ("verdict", "at", "relax"))
+    own.get("relax", _advice)
+    return Reason(claim, parameters, own["verdict"].word(*VERDICTS), own.get("at", lambda at: _at(at, n)))
+
+
+def read_assumption(node: Node) -> Assumption:
+    """One of `result.assumptions`."""
+    named, parameters, _ = _read(node, "id", _ASSUMPTIONS)
+    return Assumption(named, parameters)
+
+
+def read_outcome(node: Node) -> None:
+    """What became of an attempt to find a metric: for orientation."""
+    _read(node, "id", _OUTCOMES)
+
+
+def _at(node: Node, n: int) -> tuple[Fraction | None, Numbers]:
+    own = node.closed("x", optional=("t",))
+    if len(own["x"].entries()) not in (0, n):  # where the curve is not known there is no point of it
+        raise own["x"].refused(f"must have {n} entries")
+    return own.get("t", Node.number), own["x"].numbers()
+
+
+def _claim(node: Node) -> str:
+    return _read(node, "claim", _CLAIMS)[0]
+
+
+def _advice(node: Node) -> None:
+    for item in node.entries():
+        _read(item, "id", _RELAX)
+
+
+def _texts(node: Node) -> object:
+    return node.texts()
+
+
+_SIDE = _word("lower", "upper")
+_NONE: Form = ({}, {})
+
+_CLAIMS: Mapping[str, Form] = {
+    "rank_of_B": _NONE,
+    "metric_found": ({"failure": lambda node: _read(node, "id", _FAILURES)[0]}, {}),
+    "metric_definite": _NONE,
+    "metric_killing": ({"input": Node.text}, {"residual": Node.number}),
+    "metric_contraction": ({"rate": Node.decimal, "largest_rate": enclosure}, {}),
+    "metric_bound": ({"side": _SIDE, "declared": Node.decimal, "reaches": maybe}, {}),
+    "tube_radius": (
+        {"obstacle": _word("out_of_range", "metric_unbounded", "not_settled"), "radius": Node.decimal},
+        {},
+    ),
+    "plan_bounded": _NONE,
+    "tube_in_safe_set": (
+        {"radius": Node.decimal, "state": Node.text, "side": _SIDE, "excess": Node.number},
+        {},
+    ),
+    "constant_bounded": ({"constant": Node.text}, {}),
+    "uncertainty_bound": ({"constant": Node.text, "declared": Node.number, "reaches": maybe}, {}),
+    "gains_suffice": (
+        {"section": Node.text, "margins": _margins},
+        {"binds": Node.text, "below_twice_rate": Node.flag, "predictor_gain": Node.decimal},
+    ),
+    "condition_holds": (
+        {"section": Node.text, "condition": Node.text},
+        {
+            "constant": Node.text,
+            "margin": enclosure,
+            "needed": Node.number,
+            "allowed": Node.number,
+            "beyond": Node.flag,
+            "blocked_by": Node.text,
+            "predictor_gain": Node.decimal,
+        },
+    ),
+}
+
+_FAILURES: Mapping[str, Form] = {
+    "rank_of_B": _NONE,
+    "uncontrollable_mode": (
+        {"mode": lambda node: [item.number() for item in node.pair()], "limit": Node.decimal},
+        {},
+    ),
+    "variable_forbidden": ({"variable": Node.text, "permitted": _texts}, {}),
+    "no_frame": _NONE,
+    "not_writable": ({"code": Node.text}, {}),
+    "not_proven_as_written": ({"condition": _claim}, {}),
+    "condition_number": ({"rate": Node.decimal, "condition_number": Node.number}, {}),
+    "nothing_found": (
+        {
+            "attempts": Node.count,
+            "routes": _texts,
+            "degrees": lambda node: [item.count() for item in node.entries()],
+            "last": lambda node: None if node.value is None else read_outcome(node),
+        },
+        {},
+    ),
+}
+
+_OUTCOMES: Mapping[str, Form] = {
+    "proven": _NONE,
+    "no_proposal": ({"route": Node.text, "status": Node.text}, {}),
+    "wrong_shape": ({"route": Node.text}, {}),
+    "not_proven": ({"route": Node.text, "condition": _claim, "verdict": _word(*VERDICTS)}, {}),
+    "condition_unbounded": ({"route": Node.text}, {}),
+}
+
+_REMEDIES: Mapping[str, Form] = {
+    "correct_plan": _NONE,
+    "other_interpolation": ({"interpolation": _word("hold", "linear"), "defect": Node.number}, {}),
+    "more_knots": _NONE,
+}
+
+_RELAX: Mapping[str, Form] = {
+    "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
+    "mend_plan": (
+        {
+            "defect": Node.number,
+            "share": Node.number,
+            "remedy": lambda node: _read(node, "id", _REMEDIES)[0],
+        },
+        {"t": Node.number},
+    ),
+    "raise_budget": ({}, {"proof": Node.flag}),
+    "shrink_tube": _NONE,
+    "reduce_radii": _NONE,
+    "reduce_initial_error": _NONE,
+    "enlarge_safe_set": _NONE,
+    "shrink_safe_set": ({}, {"factor": Node.number, "rate": Node.decimal}),
+    "lower_rate": ({}, {"to": Node.number}),
+    "other_metric": _NONE,
+    "declare_metric_bound": ({}, {"side": _SIDE, "value": Node.number}),
+    "declare_uncertainty_bound": ({"constant": Node.text, "value": maybe}, {}),
+    "ask_for_rate_below": ({"rate": Node.decimal}, {}),
+    "ask_for_rate_up_to": ({"rate": Node.decimal}, {}),
+    "give_input": _NONE,
+    "other_variables": _NONE,
+    "lower_degree": _NONE,
+    "higher_degree": ({"degree": Node.count}, {}),
+    "raise_condition_number": ({"to": Node.number}, {}),
+}
+
+_ASSUMPTIONS: Mapping[str, Form] = {
+    "least_feedback": _NONE,
+    "straight_geodesics": _NONE,
+    "exact_geodesics": ({"uniqueness": _word("proven", "assumed")}, {"value": enclosure}),
+    "start_at_rest": _NONE,
+    "hard_projection": _NONE,
+    "smooth_projection": ({"layer": Node.decimal}, {}),
+    "perfect_state": _NONE,
+    "first_order_filter": _NONE,
+    "for_all_time": _NONE,
+    "up_to_horizon": ({"horizon": Node.decimal}, {}),
+    "uncertainty_as_declared": _NONE,
+    "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),
+}
