@@ -13,6 +13,7 @@ from fractions import Fraction
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.specification import Numbers
 
+_CONDITIONS = ("26a", "26b", "26c", "distance", "sampled")
 VERDICTS = ("certified", "refuted", "undecided")
 
 Reads = Callable[[Node], object]
@@ -67,6 +68,7 @@ def _word(*words: str) -> Reads:
 
 
 def _margins(node: Node) -> dict[str, Fraction]:
+    node.closed(optional=_CONDITIONS)
     return {key: value.number() for key, value in node.items()}
 
 
