@@ -23,6 +23,7 @@ from tubecert.expression import number_text
 
 T = TypeVar("T")
 Json = Any  # what `json` reads and writes
+OPEN: set[Any] = set()  # records that are views of part of what is there: other members are left alone
 INLINE: Mapping[str, bool] = {"inline": True}  # metadata: the members stand beside those of the record
 
 
@@ -236,7 +237,7 @@ def _record(kind: Any, data: dict[str, Json], path: str) -> Any:
             values[item.name] = _read(hint, left.pop(item.name), f"{path}.{item.name}")
         elif _required(item):
             raise FormError(f"{path}.{item.name}", "is missing")
-    if left:
+    if left and kind not in OPEN:
         raise FormError(f"{path}.{sorted(left)[0]}", "is not known")
     try:
         return kind(**values)

@@ -29,7 +29,7 @@ from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
 from tubecert.conditions.rates import RateRecipe, rate_margins
 from tubecert.conditions.verdict import Verdict
-from tubecert.kinds.kind import recipe_json
+from tubecert.records import to_json
 from tubecert.search.distance import least_rate
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
 from tubecert.search.sampled import serves
@@ -451,21 +451,21 @@ def test_no_uncertainty_needs_next_to_no_gain():
 def test_results_are_json_and_recipes_are_decimals():
     for problem in (alive(), alive(A_m=None), alive(values={"initial_distance": 0.9})):
         for result in (judged_26(problem), judged_distance(problem), judged_sampled(problem)):
-            text = json.dumps(result.to_json(), allow_nan=False, sort_keys=True)
+            text = json.dumps(to_json(result.data()), allow_nan=False, sort_keys=True)
             assert json.loads(text)["verdict"] == str(result.verdict)
     result = judged_26(alive())
-    data = result.to_json()
+    data = to_json(result.data())
     assert data["A_m"] == [[-3.5, 0.0], [0.0, -3.5]]
     assert data["Q"] == [[7.0, 0.0], [0.0, 7.0]]
     assert Fraction(repr(data["bandwidth"])) == result.pair.recipe.bandwidth
-    recipe = recipe_json(judged_distance(alive()).least_adaptation.recipe)
+    recipe = to_json(judged_distance(alive()).least_adaptation.recipe)
     again = theorem_b.DistanceRecipe(**{k: Fraction(repr(x)) for k, x in recipe.items()})
     assert margin_distance(alive(), again).lo > 0
 
 
 def test_recipes_as_printed_decimals_are_what_is_verified():
     recipe = judged_26(two_state(A_m=None)).pair.recipe
-    again = RateRecipe(**{k: Fraction(repr(x)) for k, x in recipe_json(recipe).items()})
+    again = RateRecipe(**{k: Fraction(repr(x)) for k, x in to_json(recipe).items()})
     assert again == recipe
 
 
@@ -528,7 +528,7 @@ def test_random_problems_end_in_a_verdict_that_says_why(seed):
         for asked in ({}, {"bandwidth": wish}):
             for search in (judged_26, judged_distance, judged_sampled):
                 result = search(problem, **asked)
-                json.dumps(result.to_json(), allow_nan=False)
+                json.dumps(to_json(result.data()), allow_nan=False)
                 assert bool(result.shortfalls) == (result.verdict is not Verdict.CERTIFIED)
 
 

@@ -19,7 +19,9 @@ import yaml
 import tubecert
 from tubecert import certificate, pipeline, spec
 from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
+from tubecert.records import to_json
 from tubecert.spec.load import load, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.spec.reader import Field
@@ -284,6 +286,8 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     )
     assert not [f"{error.json_path}: {error.message}" for error in CLOSED.iter_errors(sealed)]
     assert not errors("spec", sealed["result"]["spec"]["effective"])
+    again = to_json(Certificate.from_json(sealed))
+    assert certificate.dump(again) == certificate.dump(sealed), "read and written again, byte for byte"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,104 @@
+"""The specification in a certificate: kept as it is, with what readers need of it typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from tubecert.records import OPEN, FormError, Json, foreign, from_json
+
+Tree = Any  # texts, lists and mappings of them, as canonical data holds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SystemView:
+    """States, inputs, units and equations, as texts."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    units: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    f: tuple[str, ...] = ()
+    B: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UncertaintyView:
+    """The expressions of h, and the bounds that are declared."""
+
+    h: tuple[str, ...] = ()
+    bounds: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrajectoryView:
+    """The kind of plan and its end in s, None if it has none."""
+
+    kind: str
+    horizon: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiscView:
+    """A disc."""
+
+    center: tuple[Fraction, Fraction]
+    radius: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstacleView:
+    """An obstacle in the plane of two states: a disc or a polygon."""
+
+    states: tuple[str, str]
+    disc: DiscView | None = None
+    polygon: tuple[tuple[Fraction, Fraction], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _View:
+    name: str
+    system: SystemView
+    trajectory: TrajectoryView
+    uncertainty: UncertaintyView = field(default_factory=UncertaintyView)
+    obstacles: tuple[ObstacleView, ...] = ()
+
+
+for _kind in (_View, SystemView, UncertaintyView, TrajectoryView, ObstacleView, DiscView):
+    OPEN.add(_kind)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effective:
+    """The effective specification: canonical data, itself a specification (`data`), and typed views of it."""
+
+    data: Mapping[str, Tree] = field(repr=False)
+    name: str
+    system: SystemView
+    trajectory: TrajectoryView
+    uncertainty: UncertaintyView
+    obstacles: tuple[ObstacleView, ...]
+
+    @classmethod
+    def of(cls, data: Mapping[str, Tree], path: str = "effective") -> Effective:
+        """The views of canonical data; raises `FormError`."""
+        view = from_json(_View, data, path)
+        return cls(
+            data=data,
+            name=view.name,
+            system=view.system,
+            trajectory=view.trajectory,
+            uncertainty=view.uncertainty,
+            obstacles=view.obstacles,
+        )
+
+
+def _read(data: Json, path: str) -> Effective:
+    if not isinstance(data, dict):
+        raise FormError(path, "is not an object")
+    return Effective.of(data, path)
+
+
+foreign(Effective, lambda value: dict(value.data), _read)

@@ -1,0 +1,285 @@
+"""The certificate as values: every key of the JSON is a field, every id a type.
+
+In: JSON of the format, or the values of a certification. Out: a `Certificate`, and JSON again, byte for byte. Reading
+is strict: what is missing, not known, or of another kind is a `FormError` that says where. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Literal
+
+from tubecert.certificate.effective import Effective
+from tubecert.claims import Assumption, Outcome, Reason
+from tubecert.conditions.theorem import Recipe
+from tubecert.enclosure.constant import Constant, Witness
+from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.table import KINDS
+from tubecert.records import from_json, keyed, to_json
+from tubecert.spec import Interpolation, Knots
+from tubecert.verdict import Verdict
+
+Json = Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """What the claim is about: the specification after overrides, and the hashes of it and of the file's text."""
+
+    effective: Effective
+    effective_hash: str
+    file_hash: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overrides:
+    """What the command line changed."""
+
+    rho_a: Fraction | None = None
+    epsilon: Fraction | None = None
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    metric: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What bounded the work: the relative width at which a constant is sharp enough, and boxes per claim."""
+
+    gap: Fraction
+    budget: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnotTexts:
+    """Exact knots as texts: times (K,), states (K, n), inputs (K, m) or one row less."""
+
+    t: tuple[str, ...]
+    x: tuple[tuple[str, ...], ...]
+    u: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """Points of the plan, to draw it: times (K,) and states (K, n)."""
+
+    t: tuple[float, ...]
+    x: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanData:
+    """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps."""
+
+    kind: Literal["equilibrium", "expressions", "csv", "ilqr"]
+    interpolation: Literal["exact", "hold", "linear"] | None = None
+    curve: Literal["hermite"] | None = None
+    knots: KnotTexts | None = None
+    samples: Samples | None = None
+    file: str | None = None
+    file_hash: str | None = None
+
+    def exact_knots(self) -> Knots | None:
+        """The knots as numbers; None for a plan of expressions."""
+        if self.knots is None or self.interpolation is None or self.interpolation == "exact":
+            return None
+        interpolation: Interpolation = self.interpolation
+        x, u = (tuple(tuple(map(Fraction, row)) for row in rows) for rows in (self.knots.x, self.knots.u))
+        return Knots(t=tuple(map(Fraction, self.knots.t)), x=x, u=u, interpolation=interpolation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Geodesics:
+    """The test for unique geodesics: `value` encloses G rho + L_G rho^2/8, unique below 1."""
+
+    value: Constant
+    holds: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricData:
+    """The metric, what C1-C3 on the safe set tell of it, and its bounds over the tube."""
+
+    rate: Fraction
+    dual_metric: tuple[tuple[str, ...], ...]
+    verdict: Verdict
+    margin: Constant | None = None
+    largest_rate: Constant | None = None
+    lower_on_set: Constant | None = None
+    upper_on_set: Constant | None = None
+    lower: Constant | None = None
+    upper: Constant | None = None
+    unique_geodesics: Geodesics | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TubeData:
+    """The radii; `rho_r` and the half-widths, by state, once the tube is proven to lie in the safe set."""
+
+    epsilon: Fraction
+    rho_a: Fraction
+    rho: Fraction
+    rho_r: Fraction | None = None
+    half_widths: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bound:
+    """A constant over the tube, enclosed; None where no bound was found. `at` is where it is attained."""
+
+    below: float | None
+    above: float | None
+    symbol: str
+    equation: str
+    unit: str
+    at: Witness | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttemptData:
+    """One proposal of a synthesis and what became of it."""
+
+    rate: float
+    degree: int
+    floor: Literal["identity", "input"]
+    route: str
+    outcome: Outcome
+    condition_number: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricRow:
+    """One metric of a comparison; `input_gain` is beta/sqrt(a), `adaptation_rate` the least of the distance form."""
+
+    rate: Fraction
+    floor: Literal["identity", "input"]
+    degree: int
+    condition_number: float
+    verdict: Verdict | None = None
+    input_gain: float | None = None
+    rho: float | None = None
+    ultimate_radius: float | None = None
+    adaptation_rate: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolverData:
+    """How a metric was found."""
+
+    route: str
+    degree: int
+    variables: tuple[str, ...]
+    digits: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisData:
+    """What was asked of a synthesis, what was tried, and why there is no metric where there is none."""
+
+    objective: str
+    verdict: Verdict
+    attempts: tuple[AttemptData, ...]
+    rate: Fraction | None = None
+    table: tuple[MetricRow, ...] = ()
+    solver: SolverData | None = None
+    reason: Reason | None = None
+
+
+def _sections() -> dict[str, type[SectionData]]:
+    return {kind.key: kind.form for kind in KINDS}
+
+
+def _recipes() -> dict[str, Any]:
+    return {kind.key: kind.theorem.recipe for kind in KINDS}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipes:
+    """What proves the gains of each kind that is certified, by the name of its section."""
+
+    of: Mapping[str, Recipe] = field(default_factory=dict, metadata=keyed(_recipes))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What was proven: a pure function of the specification and the options.
+
+    What was not reached is None or empty. `sections` are those of the kinds, by their names; those in `decided_by`
+    decide the verdict.
+    """
+
+    verdict: Verdict
+    formulas: Literal["corrected", "as-printed"]
+    spec: Source
+    overrides: Overrides
+    effort: Work
+    plan: PlanData
+    safe_set: Mapping[str, tuple[Fraction, Fraction]]
+    assumptions: tuple[Assumption, ...]
+    declared: Mapping[str, float]
+    reasons: tuple[Reason, ...]
+    proof: Recipes
+    synthesis: SynthesisData | None = None
+    metric: MetricData | None = None
+    tube: TubeData | None = None
+    constants: Mapping[str, Bound] = field(default_factory=dict)
+    sections: Mapping[str, SectionData] = field(default_factory=dict, metadata=keyed(_sections))
+    elasticities: Mapping[str, Mapping[str, float]] | None = None
+    decided_by: tuple[str, ...] = ()
+
+    @property
+    def asked(self) -> bool:
+        """Whether the command asked for gains."""
+        return self.overrides.bandwidth is not None
+
+    @property
+    def reason(self) -> Reason | None:
+        """The reason that decided: the first with the verdict's own word, else the first."""
+        own = [reason for reason in self.reasons if reason.verdict is self.verdict]
+        return next(iter([*own, *self.reasons]), None)
+
+    def deciding(self) -> Mapping[str, Pair]:
+        """The gains that the verdict is about, by section."""
+        found = {
+            key: self.sections[key].decisive(asked=self.asked)
+            for key in self.decided_by
+            if key in self.sections
+        }
+        return {key: pair for key, pair in found.items() if pair is not None}
+
+    def to_json(self) -> dict[str, Json]:
+        """What `result` holds."""
+        data: dict[str, Json] = to_json(self)
+        return data
+
+    @classmethod
+    def from_json(cls, data: Json) -> Result:
+        """What `result` says; raises `FormError`."""
+        return from_json(cls, data, "result")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """How it was made; not hashed."""
+
+    command: str | None = None
+    started: str | None = None
+    seconds: float | None = None
+    versions: Mapping[str, str] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """A sealed result: `hash` is that of its canonical bytes."""
+
+    format: str
+    hash: str
+    result: Result
+    run: Run
+
+    @classmethod
+    def from_json(cls, data: Json) -> Certificate:
+        """What a file says; raises `FormError`. The hash is not compared."""
+        return from_json(cls, data, "certificate")
