@@ -21,7 +21,11 @@ from tubecert.kinds.distance import DistanceSection
 from tubecert.kinds.rates import RatesSection
 from tubecert.kinds.sampled import SampledSection
 from tubecert.kinds.table import kind_of
+from tubecert.pipeline import Options, question_of
+from tubecert.pipeline.certification import answer
 from tubecert.search.proposers import PROPOSERS
+from tubecert.spec import Spec
+from tubecert.stages.judged import Judged
 
 W_CONSTANT = np.array(
     [[0.20365, 0.00015, -0.00566], [0.00015, 0.21671, -0.00566], [-0.00566, -0.00566, 0.21607]]
@@ -218,3 +222,10 @@ def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
 def margin_sampled(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
     """The margin of one recipe."""
     return margin_sampled_along(problem, [recipe])[0]
+
+
+def problem_of(spec: Spec, options: Options) -> TubeProblem:
+    """The problem that a certification comes to, with proven constants."""
+    end = answer(question_of(spec, options))
+    assert isinstance(end, Judged), end
+    return end.bounded.problem

@@ -37,6 +37,7 @@ ROOMS = [
     "lint",
     "kinds",
     "certificate",
+    "stages",
     "words",
     "simulate",
     "pipeline",

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from problems import judged_26, judged_distance, judged_sampled
+from problems import judged_26, judged_distance, judged_sampled, problem_of
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import exit_code, seal
@@ -16,7 +16,7 @@ from tubecert.claims import Reason
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.errors import SpecError
-from tubecert.pipeline import Options, certification, certify, gains
+from tubecert.pipeline import Options, certify
 from tubecert.records import from_json
 from tubecert.spec import load_text
 from tubecert.words.claims import message
@@ -48,17 +48,9 @@ def run(text, **options):
     return certify(load_text(text, "spec.yaml"), Options(**options))
 
 
-def captured_problem(text, monkeypatch, **options):
+def captured_problem(text, **options):
     """The `TubeProblem` that the pipeline builds."""
-    seen = []
-
-    def keep(problem, options):
-        seen.append(problem)
-        return gains.gains(problem, options)
-
-    monkeypatch.setattr(certification, "gains", keep)
-    run(text, **options)
-    return seen[0]
+    return problem_of(load_text(text, "spec.yaml"), Options(**options))
 
 
 def declared(text):
@@ -95,7 +87,7 @@ def test_three_state_tube_is_the_fixed_point_of_its_own_metric_bounds(three):
 
 @pytest.mark.slow
 def test_gains_of_the_reference_rows(monkeypatch):
-    problem = captured_problem(declared(THREE), monkeypatch)
+    problem = captured_problem(declared(THREE))
     worst_start = dataclasses.replace(problem.constants, h_initial=problem.constants.h)
     row = dataclasses.replace(problem, constants=worst_start, kernel=Kernel.PAPER, drift=Drift.SUM)
     a = judged_26(row)

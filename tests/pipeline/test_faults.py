@@ -13,11 +13,14 @@ import pytest
 from problems import ALIVE, alive, three_state
 
 from tubecert import certificate
-from tubecert.conditions.proposal import Proposal
+from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.verdict import Verdict
 from tubecert.kernel import NotProvenError, Proof, Unproven, check, judge
 from tubecert.kinds.table import KINDS
-from tubecert.pipeline import Options, certification, certify, gains
+from tubecert.pipeline import Options, certify, question_of
+from tubecert.pipeline.certification import answer
+from tubecert.pipeline.certification import judge as judge_gains
+from tubecert.pipeline.certification import result as result_of_answer
 from tubecert.recheck.run import recheck
 from tubecert.search.elasticities import elasticities_26
 from tubecert.search.proposers import PROPOSERS, Proposer
@@ -61,13 +64,14 @@ CASES = [(key, name) for key, lies in LIES.items() for name in lies]
 
 
 @pytest.fixture(scope="module")
-def problem():
-    """The problem of a shipped specification, with proven constants."""
-    seen = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(certification, "gains", lambda p, o: seen.append(p) or gains.gains(p, o))
-        certify(load(str(CONFIG)), Options())
-    return seen[0]
+def bounded():
+    """A shipped specification, up to its proven constants."""
+    return answer(question_of(load(str(CONFIG)), Options(conditions="all"))).bounded
+
+
+@pytest.fixture(scope="module")
+def problem(bounded):
+    return bounded.problem
 
 
 def lying(key, lie, monkeypatch):
@@ -88,10 +92,10 @@ def lying(key, lie, monkeypatch):
 
 
 @pytest.mark.parametrize(("key", "name"), CASES)
-def test_a_search_that_lies_certifies_nothing(key, name, problem, monkeypatch):
-    honest = gains.gains(problem, Options(conditions="all"))
+def test_a_search_that_lies_certifies_nothing(key, name, bounded, monkeypatch):
+    honest = result_of_answer(judge_gains(bounded))
     lying(key, LIES[key][name], monkeypatch)
-    result = gains.gains(problem, Options(conditions="all"))
+    result = result_of_answer(judge_gains(bounded))
     assert honest["verdict"] == honest[key]["verdict"] == "certified"
     assert result[key]["verdict"] != "certified"
     assert result["verdict"] != "certified"
@@ -116,7 +120,7 @@ def test_points_beside_the_decisive_gains_are_checked_too(key, problem, monkeypa
         )
 
     monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose))
-    section = kind.section(problem, propose(problem, gains.Asked()))
+    section = kind.section(problem, propose(problem, Asked()))
     assert section.verdict is Verdict.CERTIFIED
     assert not section.curve
     assert not section.judgement.beside
@@ -124,7 +128,7 @@ def test_points_beside_the_decisive_gains_are_checked_too(key, problem, monkeypa
 
 def test_an_ultimate_radius_needs_a_companion_at_the_same_gains_that_is_proven(problem):
     kind = KINDS[0]
-    told = PROPOSERS[kind.theorem.recipe].propose(problem, gains.Asked())
+    told = PROPOSERS[kind.theorem.recipe].propose(problem, Asked())
     honest = kind.section(problem, told).judgement.ultimate_radius
     assert honest is not None
     for companion in (
@@ -147,11 +151,11 @@ def test_an_ultimate_radius_needs_a_companion_at_the_same_gains_that_is_proven(p
     ],
     ids=["no numbers", "absurd", "turned round"],
 )
-def test_elasticities_that_lie_change_no_claim(slopes, problem, monkeypatch):
+def test_elasticities_that_lie_change_no_claim(slopes, bounded, monkeypatch):
     recipe = KINDS[0].theorem.recipe
-    honest = gains.gains(problem, Options())
+    honest = result_of_answer(judge_gains(bounded))
     monkeypatch.setitem(PROPOSERS, recipe, replace(PROPOSERS[recipe], slopes=slopes))
-    result = gains.gains(problem, Options())
+    result = result_of_answer(judge_gains(bounded))
     for key in ("conditions_26", "distance", "sampled", "proof", "verdict", "constants"):
         assert result[key] == honest[key]
 
@@ -182,7 +186,7 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.key)
 def test_a_proof_has_one_maker_and_cannot_be_changed(kind):
     problem = three_state()
-    recipe = PROPOSERS[kind.theorem.recipe].propose(problem, gains.Asked()).decisive
+    recipe = PROPOSERS[kind.theorem.recipe].propose(problem, Asked()).decisive
     proof = check(problem, recipe)
     assert isinstance(proof, Proof)
     assert all(margin.lo > 0 for margin in proof.margins.values())
@@ -198,7 +202,7 @@ def test_a_proof_has_one_maker_and_cannot_be_changed(kind):
 @pytest.mark.parametrize("travel", [copy.deepcopy, lambda proof: pickle.loads(pickle.dumps(proof))])
 def test_a_proof_that_travels_is_proven_anew(travel):
     problem = three_state()
-    recipe = PROPOSERS[KINDS[1].theorem.recipe].propose(problem, gains.Asked()).decisive
+    recipe = PROPOSERS[KINDS[1].theorem.recipe].propose(problem, Asked()).decisive
     again = travel(check(problem, recipe))
     assert isinstance(again, Proof)
     assert again.recipe == recipe
@@ -207,7 +211,7 @@ def test_a_proof_that_travels_is_proven_anew(travel):
 def test_gains_that_stand_for_others_prove_nothing():
     for kind in KINDS:
         problem = alive()
-        found = PROPOSERS[kind.theorem.recipe].propose(problem, gains.Asked()).decisive
+        found = PROPOSERS[kind.theorem.recipe].propose(problem, Asked()).decisive
         judgement = judge(problem, kind.theorem, Proposal(hopeless=found))
         assert judgement.verdict is Verdict.UNDECIDED
         assert judgement.decisive is None
@@ -216,7 +220,7 @@ def test_gains_that_stand_for_others_prove_nothing():
 
 def test_a_constant_without_a_bound_proves_nothing():
     for kind in KINDS:
-        recipe = PROPOSERS[kind.theorem.recipe].propose(alive(), gains.Asked()).decisive
+        recipe = PROPOSERS[kind.theorem.recipe].propose(alive(), Asked()).decisive
         for name in kind.theorem.needs(alive()):
             endless = alive(values={name: (0.9 * ALIVE[name], float("inf"))})
             assert isinstance(check(endless, recipe), Unproven), name

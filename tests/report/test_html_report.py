@@ -16,7 +16,7 @@ import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import margins_26
+from problems import margins_26, problem_of
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
@@ -24,7 +24,7 @@ from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
 from tubecert.expression import to_text
-from tubecert.pipeline import Options, certification, certify, gains
+from tubecert.pipeline import Options, certify
 from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
 from tubecert.report.figures_tube import Plane
@@ -62,22 +62,9 @@ def orbit():
 
 
 @pytest.fixture(scope="module")
-def problems():
-    """The problems for which margins were asked, as `regulated` comes into being."""
-    return []
-
-
-@pytest.fixture(scope="module")
-def regulated(problems):
+def regulated():
     """A real certificate of three states at an equilibrium."""
-
-    def keep(problem, options):
-        problems.append(problem)
-        return gains.gains(problem, options)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(certification, "gains", keep)
-        result = certify(load(str(CONFIGS / "three_state.yaml")), Options())
+    result = certify(load(str(CONFIGS / "three_state.yaml")), Options())
     return json.loads(certificate.dump(sealed(result)))
 
 
@@ -486,13 +473,14 @@ def test_margins_around_are_those_of_each_bandwidth(regulated):
     )
 
 
-def test_a_margin_around_is_the_margin_of_those_gains(regulated, problems):
+def test_a_margin_around_is_the_margin_of_those_gains(regulated):
+    problem = problem_of(load(str(CONFIGS / "three_state.yaml")), Options())
     data = regulated["result"]["conditions_26"]["margins_around"]
     recipe = regulated["result"]["proof"]["conditions_26"]
     for i in (0, 17, 40):
         gain = recipe["predictor_gain"]
         margins = margins_26(
-            problems[0],
+            problem,
             RateRecipe(
                 bandwidth=Fraction(str(data["bandwidth"][i])),
                 adaptation_rate=Fraction(str(data["adaptation_rate"])),

@@ -95,10 +95,6 @@ class DistanceSection(Section[DistanceRecipe]):
 
     name = DISTANCE
 
-    def at(self, role: str) -> Checked[DistanceRecipe] | None:
-        """The gains in a role."""
-        return self.decisive if role == self.judgement.role else self.judgement.beside.get(role)
-
     @property
     def split(self) -> Checked[DistanceRecipe] | None:
         """The gains of least bandwidth."""

@@ -35,6 +35,10 @@ class Section(ABC, Generic[R]):
         """The gains that the verdict is about, with their margins."""
         return self.judgement.decisive
 
+    def at(self, role: str) -> Checked[R] | None:
+        """The gains in a role, if there are any."""
+        return self.decisive if role == self.judgement.role else self.judgement.beside.get(role)
+
     @property
     def proof(self) -> Proof[R] | None:
         """What a verdict `certified` rests on."""

@@ -136,7 +136,7 @@ class RatesSection(Section[RateRecipe]):
     @property
     def least_adaptation(self) -> Checked[RateRecipe] | None:
         """The gains of least adaptation rate."""
-        return self.judgement.beside.get("least_adaptation")
+        return self.at("least_adaptation")
 
     @property
     def A_m(self) -> Matrix | None:

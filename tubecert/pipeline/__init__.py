@@ -4,10 +4,9 @@ In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every
 
 | module | what it does |
 |---|---|
-| `options` | what a command asks for beside the specification |
 | `checks` | what makes the question meaningless, as findings |
-| `certification` | the claims in their order, up to the constants |
-| `gains` | gains of A, B and C, and the verdict |
+| `certification` | stage after stage, with what planners and searches propose |
+| `reasons` | why a verdict about gains is what it is |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, the sweep over rates, why there is none |
 """
 
@@ -17,15 +16,20 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.findings import Severity
 from tubecert.model import domain_findings
-from tubecert.pipeline.certification import Certification, Result
-from tubecert.pipeline.checks import inspect, missing_parts, time_of
-from tubecert.pipeline.options import Options, Progress, Step, overridden
+from tubecert.pipeline.certification import answer, result
+from tubecert.pipeline.checks import inspect, missing_parts
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
+from tubecert.stages.memory import Memory
+from tubecert.stages.options import Options, Progress, Step, overridden
+from tubecert.stages.question import Question, Stopped
+from tubecert.stages.result import Result, Stage
+from tubecert.stages.time import time_of
 from tubecert.synthesis.bridge import required
 
 __all__ = [
+    "Memory",
     "Options",
     "Progress",
     "Result",
@@ -38,8 +42,25 @@ __all__ = [
 ]
 
 
-def certify(spec: Spec, options: Options, progress: Progress | None = None) -> Result:
-    """The result for a specification; raises `SpecError` for what makes the question meaningless."""
+def certify(
+    spec: Spec, options: Options, progress: Progress | None = None, memory: Memory | None = None
+) -> Result:
+    """The result for a specification; raises `SpecError` for what makes the question meaningless.
+
+    With a `memory` that is shared between calls, what does not depend on what changed is not proven again.
+    """
+    question = question_of(spec, options, progress, memory)
+    if question.spec.metric is not None or spec.synthesis is None:
+        return result(answer(question))
+    found = synthesise(spec, spec.synthesis, options, progress)
+    question = replace(question, spec=found.spec or question.spec, synthesis=found.data())
+    return result(answer(question) if found.reason is None else Stopped(at=question, reason=found.reason))
+
+
+def question_of(
+    spec: Spec, options: Options, progress: Progress | None = None, memory: Memory | None = None
+) -> Question:
+    """The question that options make of a specification; raises `SpecError` if it is meaningless."""
     spec = overridden(spec, options)
     findings, time = time_of(spec)
     findings += missing_parts(spec)
@@ -47,10 +68,13 @@ def certify(spec: Spec, options: Options, progress: Progress | None = None) -> R
         findings = domain_findings(spec, time, Effort(budget=options.budget))
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
-    if spec.metric is None and spec.synthesis is not None:
-        found = synthesise(spec, spec.synthesis, options, progress)
-        return Certification(found.spec or spec, options, time, progress, found).run()
-    return Certification(spec, options, time, progress).run()
+    return Question(
+        spec=spec,
+        options=options,
+        time=time,
+        progress=progress,
+        memory=Memory() if memory is None else memory,
+    )
 
 
 def synthesise(
@@ -66,4 +90,9 @@ def synthesise(
     findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
-    return SynthesisRun(spec, wanted, options, certify, progress).run(sweep=sweep)
+    return SynthesisRun(spec, wanted, options, _answered, progress).run(sweep=sweep)
+
+
+def _answered(spec: Spec, options: Options) -> Stage | Stopped:
+    """How a certification of a candidate ends."""
+    return answer(question_of(spec, options))

@@ -9,10 +9,10 @@ Trusted: `_proven`, nothing else.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import sqrt
+from math import isfinite, sqrt
 from typing import Any
 
 from tubecert.certificate.sections import decimal_data, metric_data, safe_set_data
@@ -41,12 +41,16 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
+from tubecert.kinds import DISTANCE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
-from tubecert.pipeline.options import Options, Progress, Step
 from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
+from tubecert.stages.judged import Judged
+from tubecert.stages.options import Options, Progress, Step
+from tubecert.stages.question import Stopped
+from tubecert.stages.result import Stage
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, suggested
 from tubecert.synthesis.ladder import Ladder, Request, digits_below
@@ -61,16 +65,16 @@ _ROUGH = 1.25  # factor to which the largest rate is known for a sweep: the best
 _SHARE = 0.97  # of the largest rate: where the sweep ends
 _COARSE = Options(gap=Fraction(1, 20), conditions="distance", budget=200_000)
 
-Certify = Callable[[Spec, Options], Mapping[str, Any]]
+Answer = Callable[[Spec, Options], Stage | Stopped]
 
 
 class SynthesisRun:
     """One synthesis: its ladder, and the certifications that metrics are compared by."""
 
     def __init__(
-        self, spec: Spec, wanted: Synthesis, options: Options, certify: Certify, progress: Progress | None
+        self, spec: Spec, wanted: Synthesis, options: Options, answer: Answer, progress: Progress | None
     ) -> None:
-        self.spec, self.wanted, self.options, self.certify = spec, wanted, options, certify
+        self.spec, self.wanted, self.options, self.answer = spec, wanted, options, answer
         self.model = build(replace(spec, metric=None))
         self.progress = progress
         self.effort = Effort(gap=float(options.gap), budget=options.budget)
@@ -213,17 +217,7 @@ class SynthesisRun:
         except SpecError:  # too long to be written: the last choice, see `_written`
             return row
         self._tell(f"rate {float(metric.rate):.4g}: certifying")
-        result = self.certify(spec, _COARSE)
-        distance = result.get("distance", {})
-        least = distance.get("least_adaptation") or {}
-        return replace(
-            row,
-            verdict=str(result["verdict"]),
-            input_gain=_input_gain(result),
-            rho=_float(result.get("tube", {}).get("rho")),
-            ultimate_radius=_float(distance.get("ultimate_radius")),
-            adaptation_rate=_float(least.get("adaptation_rate")),
-        )
+        return _judged(row, self.answer(spec, _COARSE))
 
     # -- outcomes ---------------------------------------------------------------------------------------------------
 
@@ -347,14 +341,20 @@ def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
     }
 
 
-def _input_gain(result: Mapping[str, Any]) -> float | None:
-    """beta/sqrt(a), from a result."""
-    gain = result.get("constants", {}).get("metric_input_gain")
-    lower = result.get("metric", {}).get("lower")
-    if not gain or not lower or gain["above"] is None or not lower[0]:
-        return None
-    return float(gain["above"]) / sqrt(float(lower[0]))
-
-
-def _float(value: object) -> float | None:
-    return None if value is None else float(Fraction(str(value)))
+def _judged(row: Row, end: Stage | Stopped) -> Row:
+    """The row with what a certification with its metric came to."""
+    if isinstance(end, Stopped):
+        return replace(row, verdict=str(end.reason.verdict))
+    if not isinstance(end, Judged):
+        raise TypeError("a certification ends in a verdict")
+    problem, distance = end.bounded.problem, end.sections[DISTANCE.key]
+    least = distance.at("least_adaptation")
+    gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
+    return replace(
+        row,
+        verdict=str(end.verdict),
+        input_gain=gain / sqrt(lower) if isfinite(gain) else None,
+        rho=float(problem.rho),
+        ultimate_radius=distance.judgement.ultimate_radius,
+        adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
+    )

@@ -17,7 +17,7 @@ from tubecert.search.elasticities import elasticities_26, elasticities_distance,
 from tubecert.search.rates import propose_rates
 from tubecert.search.sampled import propose_sampled
 
-_LEAST = "least_adaptation"
+LEAST = "least_adaptation"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,15 +27,15 @@ class Proposer:
     propose: Callable[[TubeProblem, Asked], Proposal[Any]]
     slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
 
-    def explain(self, problem: TubeProblem, proposal: Proposal[Any]) -> Explained:
-        """What the least adaptation rate depends on, in numbers that no claim rests on."""
+    def explain(self, problem: TubeProblem, least: Any) -> Explained:
+        """What the least adaptation rate, that of the recipe `least`, depends on; no claim rests on these numbers."""
         if self.slopes is None:
             return Explained()
-        slopes = self.slopes(problem, proposal.at(_LEAST))
+        slopes = self.slopes(problem, least)
         return Explained(slopes=slopes, halved=halving(problem, slopes, self._least))
 
     def _least(self, problem: TubeProblem) -> Fraction | None:
-        recipe = self.propose(problem, Asked()).at(_LEAST)
+        recipe = self.propose(problem, Asked()).at(LEAST)
         return None if recipe is None else Fraction(recipe.adaptation_rate)
 
 

@@ -1,0 +1,174 @@
+"""Every constant over the tube, enclosed from both sides, and the problem that the theorems are asked about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from tubecert.bounds.compute import bound_constants
+from tubecert.bounds.constants import BoundConstants
+from tubecert.bounds.suprema import Suprema
+from tubecert.claims import (
+    ConstantBounded,
+    DeclareUncertaintyBound,
+    RaiseBudget,
+    ShrinkTube,
+    UncertaintyBound,
+)
+from tubecert.conditions.kernels import Kernel
+from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.enclosure.constant import printable_above
+from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.kinds.table import needed_by_all
+from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
+from tubecert.model import TIME
+from tubecert.stages.metric import finite
+from tubecert.stages.question import Question, Stopped, stopped
+from tubecert.stages.tube import TubeFound, radii
+from tubecert.tube import Tube
+
+
+@dataclass(frozen=True, kw_only=True)
+class Enclosed:
+    """The constants over the tube; some may have no finite bound, and declared ones may be broken."""
+
+    tube: TubeFound
+    suprema: Suprema
+    problem: TubeProblem
+
+    @property
+    def question(self) -> Question:
+        """What is asked."""
+        return self.tube.question
+
+    @property
+    def constants(self) -> BoundConstants:
+        """Every constant, by name."""
+        return self.problem.constants
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounded:
+    """What every kind needs is bounded, and what was declared holds.
+
+    `half_widths`: |x_i - x_i*| is below, per state. `geodesics`: whether minimising geodesics are proven unique.
+    """
+
+    enclosed: Enclosed
+    half_widths: Mapping[str, float]
+    geodesics: GeodesicTest
+
+    def __post_init__(self) -> None:
+        if _endless(self.enclosed) is not None:
+            raise ValueError("a constant that every kind needs has no bound")
+
+    @property
+    def question(self) -> Question:
+        """What is asked."""
+        return self.enclosed.question
+
+    @property
+    def problem(self) -> TubeProblem:
+        """What the theorems are asked about."""
+        return self.enclosed.problem
+
+
+def enclose(tube: TubeFound) -> Enclosed:
+    """Every constant over the tube."""
+    question = tube.question
+    suprema = question.suprema(tube.plan).with_radius(tube.rho)
+    constants = bound_constants(
+        suprema, question.start, (tube.lower, tube.upper), question.declared_uncertainty
+    )
+    return Enclosed(tube=tube, suprema=suprema, problem=_problem(tube, suprema, constants))
+
+
+def bound(enclosed: Enclosed) -> Bounded | Stopped:
+    """The constants, if they are bounded and as declared; then what else is told of the tube."""
+    return _unbounded(enclosed) or _undeclared(enclosed) or _bounded(enclosed)
+
+
+def _bounded(enclosed: Enclosed) -> Bounded:
+    return Bounded(enclosed=enclosed, half_widths=_half_widths(enclosed), geodesics=_geodesics(enclosed))
+
+
+def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> TubeProblem:
+    question = tube.question
+    spec, adaptation = question.spec, question.spec.adaptation
+    epsilon, rho_a = radii(question)
+    formulas = Formulas(question.options.formulas)
+    return TubeProblem(
+        constants=constants,
+        rate=question.model.rate,
+        epsilon=epsilon,
+        rho_a=rho_a,
+        rho_r=tube.rho - rho_a,
+        rho=tube.rho,
+        initial_offset=question.start.offset(suprema),
+        horizon=spec.trajectory.horizon,
+        states=len(spec.states),
+        A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
+        smooth=adaptation.smooth,
+        formulas=formulas,
+        kernel=None if spec.kernel is None else Kernel(spec.kernel),
+        drift=Drift.SUM if formulas is Formulas.AS_PRINTED else Drift.PLAN,
+    )
+
+
+def _endless(enclosed: Enclosed) -> str | None:
+    """A constant without a bound that every kind needs; what only some of them need is for those to say."""
+    needed = needed_by_all(enclosed.problem)
+    return next(
+        (
+            name
+            for name, value, _ in enclosed.constants.items()
+            if name in needed and not isfinite(value.above)
+        ),
+        None,
+    )
+
+
+def _unbounded(enclosed: Enclosed) -> Stopped | None:
+    name = _endless(enclosed)
+    if name is None:
+        return None
+    at = getattr(enclosed.constants, name).at
+    relax = (RaiseBudget(), ShrinkTube())
+    return stopped(enclosed, ConstantBounded(constant=name), "undecided", where=at, relax=relax)
+
+
+def _undeclared(enclosed: Enclosed) -> Stopped | None:
+    """Declared bounds of h must cover the h that is given as expressions."""
+    declared = enclosed.question.declared_uncertainty
+    if not declared or enclosed.question.model.h is None:
+        return None
+    for name, derived in zip(("h", "h_x", "h_t"), enclosed.suprema.uncertainty(), strict=True):
+        if name in declared and derived.above > declared[name].above:
+            broken = derived.below > declared[name].above
+            claim = UncertaintyBound(
+                constant=name, declared=declared[name].above, reaches=finite(derived.below)
+            )
+            relax = (DeclareUncertaintyBound(constant=name, value=finite(derived.above)),)
+            verdict = "refuted" if broken else "undecided"
+            return stopped(enclosed, claim, verdict, where=derived.at, relax=relax)
+    return None
+
+
+def _half_widths(enclosed: Enclosed) -> dict[str, float]:
+    """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho."""
+    tube = enclosed.tube
+    reach = sqrt(Interval(tube.lower.below)) * Interval.of(tube.rho)
+    most = fraction_bounds(tube.rho)[1]
+    return {
+        name: printable_above(min(float((Interval(width.above) * reach).hi), most))
+        for name, width in zip(tube.question.spec.states, enclosed.suprema.half_widths(), strict=True)
+    }
+
+
+def _geodesics(enclosed: Enclosed) -> GeodesicTest:
+    """Whether minimising geodesics are proven unique; if not, that stays an assumption."""
+    question, plan, rho = enclosed.question, enclosed.tube.plan, enclosed.suprema.rho
+    model = question.model
+    tube = Tube(plan, rho, states=model.states, inputs=model.inputs, time=plan.time.get(TIME))
+    return unique_geodesics(model, tube, rho, question.effort_of("geodesics"))

@@ -1,0 +1,66 @@
+"""The verdict: what the kernel decides about the gains that searches propose, kind by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tubecert.bounds.constants import DERIVED, Meaning
+from tubecert.conditions.problem import Formulas
+from tubecert.conditions.proposal import Proposal
+from tubecert.enclosure.constant import Constant
+from tubecert.kernel import overall
+from tubecert.kinds.kind import Section
+from tubecert.kinds.table import KINDS, kind_of
+from tubecert.stages.bounded import Bounded
+from tubecert.stages.question import Question
+from tubecert.verdict import Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """A section for every kind, by key."""
+
+    bounded: Bounded
+    sections: Mapping[str, Section[Any]]
+
+    @property
+    def question(self) -> Question:
+        """What is asked."""
+        return self.bounded.question
+
+    @property
+    def deciding(self) -> tuple[str, ...]:
+        """The kinds that the verdict is about, by key."""
+        chosen = self.question.options.conditions
+        return tuple(kind.key for kind in KINDS) if chosen == "all" else (kind_of(chosen).key,)
+
+    @property
+    def as_printed(self) -> bool:
+        """Whether the paper's own formulas are reproduced: they certify nothing."""
+        return self.bounded.problem.formulas is Formulas.AS_PRINTED
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of those that decide."""
+        if self.as_printed:
+            return Verdict.UNDECIDED
+        return overall([self.sections[key].verdict for key in self.deciding])
+
+    def derived(self) -> dict[str, tuple[Constant, Meaning]]:
+        """Constants at the gains found, that the certificate lists beside those of the tube."""
+        return {
+            name: (value.printable(), DERIVED[name])
+            for kind in KINDS
+            for name, value in kind.derived(self.sections[kind.key]).items()
+        }
+
+
+def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judged:
+    """The sections about what is proposed, by the recipe of each kind."""
+    sections = {
+        kind.key: kind.section(bounded.problem, proposals.get(kind.theorem.recipe, Proposal()))
+        for kind in KINDS
+    }
+    return Judged(bounded=bounded, sections=sections)

@@ -1,0 +1,31 @@
+"""What was proven before: claims that do not depend on a changed key are not proven again.
+
+A proof is found again under everything that it follows from, so that it cannot be taken for another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from tubecert.certificate.file import digest
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Memory:
+    """Values by what was computed and from what; `computed` counts what was not found, by name."""
+
+    kept: dict[tuple[str, str], Any] = field(default_factory=dict)
+    computed: dict[str, int] = field(default_factory=dict)
+
+    def recall(self, name: str, depends_on: Mapping[str, Any], compute: Callable[[], T]) -> T:
+        """The value that `compute` gives, which depends on `depends_on` (JSON data) and nothing else."""
+        key = name, digest(dict(depends_on))
+        if key not in self.kept:
+            self.kept[key] = compute()
+            self.computed[name] = self.computed.get(name, 0) + 1
+        value: T = self.kept[key]
+        return value

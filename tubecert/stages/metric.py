@@ -1,0 +1,110 @@
+"""The metric: B has full rank, C1-C3 hold on the whole safe set, and so do the bounds that were declared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isfinite
+from typing import Any
+
+from tubecert.claims import (
+    DeclareMetricBound,
+    LowerRate,
+    MetricBound,
+    MetricContraction,
+    MetricKilling,
+    OtherMetric,
+    RaiseBudget,
+    RankOfB,
+    Relax,
+)
+from tubecert.enclosure.branch_and_bound import Decision
+from tubecert.enclosure.constant import Constant, Witness
+from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.model import rank_decision
+from tubecert.spec import canonical
+from tubecert.stages.question import Question, Stopped, stopped
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProvenMetric:
+    """C1, C2 and C3 hold on the whole safe set, and M >= lower I there."""
+
+    question: Question
+    proof: MetricProof
+    lower: Constant
+
+    def __post_init__(self) -> None:
+        if self.proof.failed is not None or self.proof.lower_on_set is None:
+            raise ValueError("the metric is not proven")
+
+
+def prove_metric(question: Question) -> ProvenMetric | Stopped:
+    """The metric of the specification, proven; depends on system, safe set and metric alone."""
+    spec, model = question.spec, question.model
+    rank = question.memory.recall(
+        "rank", _on(question), lambda: rank_decision(model, spec.safe_set, question.effort)
+    )
+    if rank.verdict != "proven":
+        return _rank_lost(question, rank)
+    proof = question.memory.recall(
+        "metric", _on(question), lambda: verify_metric(model, spec.safe_set, question.effort_of("metric"))
+    )
+    if proof.failed is not None:
+        at = proof.at if proof.verdict == "refuted" else None
+        return stopped(question, proof.failed, proof.verdict, where=at, relax=_relax(proof), partial=proof)
+    if proof.lower_on_set is None or proof.upper_on_set is None:
+        raise ValueError("a proven metric has bounds")
+    broken = _declared(question, proof, proof.lower_on_set, proof.upper_on_set)
+    return broken or ProvenMetric(question=question, proof=proof, lower=proof.lower_on_set)
+
+
+def _on(question: Question) -> dict[str, Any]:
+    """Everything that a claim on the safe set follows from."""
+    whole = canonical(question.spec)
+    parts = {key: whole.get(key) for key in ("system", "safe_set", "metric", "owed")}
+    return parts | {"gap": str(question.options.gap), "budget": question.options.budget}
+
+
+def _rank_lost(question: Question, rank: Decision) -> Stopped:
+    x = tuple(rank.at.get(name, 0.0) for name in question.model.states)
+    return stopped(question, RankOfB(), rank.verdict, where=Witness(x=x))
+
+
+def _relax(proof: MetricProof) -> tuple[Relax, ...]:
+    if proof.verdict == "undecided" and not isinstance(proof.failed, MetricKilling):
+        return (RaiseBudget(), LowerRate())
+    if proof.largest_rate is None or not isinstance(proof.failed, MetricContraction):
+        return (OtherMetric(),)
+    return (LowerRate(to=proof.largest_rate.below), OtherMetric())
+
+
+def _declared(question: Question, proof: MetricProof, least: Constant, most: Constant) -> Stopped | None:
+    """The bounds a, A that a specification may declare must hold on the safe set."""
+    metric = question.spec.metric
+    if metric is None:
+        raise ValueError("there is no metric")
+    if metric.lower is not None and Fraction(least.below) < metric.lower:
+        return stopped(
+            question,
+            MetricBound(side="lower", declared=metric.lower, reaches=finite(least.above)),
+            "refuted" if Fraction(least.above) < metric.lower else "undecided",
+            where=least.at,
+            relax=(DeclareMetricBound(side="lower", value=finite(least.below)),),
+            partial=proof,
+        )
+    if metric.upper is not None and Fraction(most.above) > metric.upper:
+        return stopped(
+            question,
+            MetricBound(side="upper", declared=metric.upper, reaches=finite(most.below)),
+            "refuted" if Fraction(most.below) > metric.upper else "undecided",
+            where=most.at,
+            relax=(DeclareMetricBound(side="upper", value=finite(most.above)),),
+            partial=proof,
+        )
+    return None
+
+
+def finite(value: float) -> float | None:
+    """A number, None where there is no bound."""
+    return value if isfinite(value) else None

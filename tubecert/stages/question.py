@@ -1,0 +1,120 @@
+"""The question of a certification, and how an answer may end early."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from tubecert.bounds.start import InitialState, KnownStart, StartWithin
+from tubecert.bounds.suprema import Suprema
+from tubecert.certificate.sections import declared_metric, declared_uncertainty
+from tubecert.claims import Claim, Reason, Relax
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import Constant, Witness
+from tubecert.enclosure.domain import Range
+from tubecert.model import ControlAffineModel, build
+from tubecert.spec import Spec
+from tubecert.stages.memory import Memory
+from tubecert.stages.options import Options, Progress, Step
+from tubecert.trajectory import Plan
+from tubecert.verdict import Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """What is to be certified: a specification with its radii, the options, the range of time that matters for h.
+
+    `synthesis` is what the certificate says of a metric that was synthesised for this question. `memory` may be shared
+    between questions; nothing that comes out depends on it.
+    """
+
+    spec: Spec
+    options: Options
+    time: Range | None
+    synthesis: Mapping[str, Any] | None = None
+    progress: Progress | None = field(default=None, repr=False, compare=False)
+    memory: Memory = field(default_factory=Memory, repr=False, compare=False)
+
+    @property
+    def question(self) -> Question:
+        """Itself: every stage knows its question."""
+        return self
+
+    @cached_property
+    def model(self) -> ControlAffineModel:
+        """The expressions of the system and its metric."""
+        return build(self.spec)
+
+    @cached_property
+    def start(self) -> InitialState:
+        """Where the state starts."""
+        within = self.spec.within
+        return KnownStart(self.spec.x0) if within is None else StartWithin(within)
+
+    @cached_property
+    def effort(self) -> Effort:
+        """The gap and the budget of every search."""
+        return Effort(gap=float(self.options.gap), budget=self.options.budget)
+
+    @cached_property
+    def declared_metric(self) -> tuple[Constant, Constant] | None:
+        """(a, A) if both are declared."""
+        return declared_metric(self.spec)
+
+    @cached_property
+    def declared_uncertainty(self) -> Mapping[str, Constant]:
+        """Declared bounds of h, h_x, h_t by name."""
+        return declared_uncertainty(self.spec)
+
+    def effort_of(self, name: str) -> Effort:
+        """The effort for a search by name, which tells its progress."""
+        show = self.progress
+        if show is None:
+            return self.effort
+        return replace(
+            self.effort,
+            progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
+        )
+
+    def suprema(self, plan: Plan) -> Suprema:
+        """Suprema along a plan, which tell their progress."""
+        show, report = self.progress, None
+        if show is not None:
+            told = show
+
+            def report(name: str, boxes: int, below: float, above: float) -> None:
+                told(Step(name=name, boxes=boxes, below=below, above=above))
+
+        return Suprema(self.model, plan, 0.0, self.time, self.effort, report)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stopped:
+    """A claim that is not proven: no stage follows. `partial` is what was found on the way to the stage that failed."""
+
+    at: Any
+    reason: Reason
+    partial: object = None
+
+    @property
+    def question(self) -> Question:
+        """The question that has this answer."""
+        question: Question = self.at.question
+        return question
+
+
+def stopped(
+    at: Any,
+    claim: Claim,
+    verdict: str,
+    *,
+    where: Witness | None = None,
+    relax: tuple[Relax, ...] = (),
+    partial: object = None,
+) -> Stopped:
+    """The end of a certification at a claim that is refuted or undecided."""
+    return Stopped(
+        at=at, reason=Reason(claim=claim, verdict=Verdict(verdict), at=where, relax=relax), partial=partial
+    )
