@@ -38,9 +38,12 @@ class MetricProof:
     """The outcome of C1-C3.
 
     `largest_rate` encloses the supremum of the rates that C2 supports; `margin` is it minus the rate asked for, in 1/s.
-    `failed` is the condition that is not proven (C1, C2 or C3), `at` a point where it is refuted.
+    `failed` is the condition that is not proven (C1, C2 or C3), `at` a point where it is refuted. It is about the
+    metric of `model` on `safe_set` and nothing else: see `is_about`.
     """
 
+    model: ControlAffineModel
+    safe_set: Box
     verdict: str
     failed: MetricDefinite | MetricContraction | MetricKilling | None = None
     at: Witness | None = None
@@ -48,6 +51,11 @@ class MetricProof:
     upper_on_set: Constant | None = None
     largest_rate: Constant | None = None
     margin: Constant | None = None
+
+    def is_about(self, model: ControlAffineModel, safe_set: Box) -> bool:
+        """Whether this is what `verify_metric` found for that metric there; equal expressions are the same nodes."""
+        own, other = ((m.states, m.inputs, m.f, m.B, m.W, m.rate) for m in (self.model, model))
+        return own == other and self.safe_set == safe_set
 
 
 def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> MetricProof:
@@ -61,12 +69,20 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
 
     positive = decide(Definite(model.W), domain, 0.0, effort)
     if positive.verdict != "proven":
-        return MetricProof(verdict=positive.verdict, failed=MetricDefinite(), at=place(positive.at))
+        return MetricProof(
+            model=model,
+            safe_set=safe_set,
+            verdict=positive.verdict,
+            failed=MetricDefinite(),
+            at=place(positive.at),
+        )
     fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
     largest = supremum(Pencil(model.W, eye), domain, fine)
     upper = supremum(Pencil(eye, model.W), domain, fine)
     inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
     proof = MetricProof(
+        model=model,
+        safe_set=safe_set,
         verdict="certified",
         lower_on_set=Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
         upper_on_set=Constant(below=upper.below, above=upper.above, at=place(upper.at)),

@@ -35,7 +35,9 @@ class ProvenMetric:
     lower: Constant
 
     def __post_init__(self) -> None:
-        if self.proof.failed is not None or self.proof.lower_on_set is None:
+        question = self.question
+        about = self.proof.is_about(question.model, question.spec.safe_set)
+        if self.proof.failed is not None or self.proof.lower_on_set is None or not about:
             raise ValueError("the metric is not proven")
 
 
