@@ -55,7 +55,7 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
         return lower_bound(place.system, limit, place.tube(), place.budget)
     if name == "upper":
         return upper_bound(place.system, limit, place.tube(), place.budget)
-    if limit < 0:
+    if limit < 0 and name != "contraction_excess":  # an eigenvalue: all others are norms, gains and lengths
         return stated(False, "it is negative")
     if name == "feedback_gain":
         if largest is None:

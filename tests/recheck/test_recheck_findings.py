@@ -1,0 +1,144 @@
+"""Findings of part R that have no other place: what plans owe (R6), which file a certificate is of (R4, R5), R7."""
+
+from __future__ import annotations
+
+import copy
+from fractions import Fraction
+
+import pytest
+from rechecked import certified, digest, examine, failing, respecified, sealed, shipped
+from systems import SMALL
+
+from tubecert import spec
+from tubecert.cli.belonging import ForeignError, belongs
+from tubecert.errors import ExitCode
+from tubecert.recheck.document import Node
+
+GIVEN = 'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}'
+
+
+def belongs_to(document, text, folder):
+    path = folder / "plant.yaml"
+    path.write_text(text, encoding="utf-8")
+    return belongs(Node(document, "certificate"), "certificate", str(path))
+
+
+@pytest.mark.parametrize(
+    ("where", "owes"),
+    [("-x + y", "-x + y + 0*sqrt(x - 5)"), ("-x + y", "-x + y + 0/x"), ("0.05*x", "0.05*x + 0*abs(x)/x")],
+    ids=["a root", "a divisor", "a divisor in h"],
+)
+def test_what_folding_drops_is_owed_and_makes_another_system(where, owes, tmp_path):
+    """R4: such a file had the hash of the one without; certify refuses it, and recheck said that it belongs."""
+    document, text = certified(SMALL), SMALL.replace(where, owes)
+    assert belongs_to(document, SMALL, tmp_path)
+    with pytest.raises(ForeignError):
+        belongs_to(document, text, tmp_path)
+    effective = spec.canonical(spec.load_text(text, "plant.yaml"))
+
+    def change(own):
+        own |= {key: effective[key] for key in ("system", "uncertainty")}
+
+    forged = respecified(document, change)
+    assert belongs_to(forged, text, tmp_path)
+    found = examine(forged, 2_000, to_first_failure=True)
+    assert [name for name, _ in failing(found)] == ["f, B, W, h and the plan are smooth"]
+
+
+def test_a_metric_that_was_asked_for_is_not_any_metric(tmp_path):
+    """R5: a certificate with a metric written by hand, at another rate, was taken for the one that was synthesised."""
+    text = SMALL.replace(GIVEN, "metric: {synthesise: {rate: 0.5}}")
+    made = certified(text, conditions="distance")
+    assert "the metric was synthesised for it" in belongs_to(made, text, tmp_path)
+    assert failing(examine(made)) == []
+    with pytest.raises(ForeignError):
+        belongs_to(certified(SMALL), text, tmp_path)
+    with pytest.raises(ForeignError):
+        belongs_to(made, SMALL.replace(GIVEN, "metric: {synthesise: {rate: 1.7}}"), tmp_path)
+    for asked in ({"rate": "0.6"}, {"condition_number": "1"}):
+        forged = copy.deepcopy(made)
+        forged["result"]["synthesis"]["asked"] |= asked
+        assert examine(sealed(forged), 100).exit_code == ExitCode.NOT_CERTIFIED
+
+
+def planned():
+    return shipped("two_state")
+
+
+def scaled(document, factor, rows):
+    """The plan pulled towards its first knot, so that it misses its target."""
+    knots = document["result"]["plan"]["knots"]
+    first = [Fraction(x) for x in knots["x"][0]]
+    for k in rows:
+        knots["x"][k] = [
+            str(a + factor * (Fraction(x) - a)) for a, x in zip(first, knots["x"][k], strict=True)
+        ]
+    return sealed(document)
+
+
+def names(found):
+    return {name for name, _ in failing(found)}
+
+
+def test_a_plan_with_a_goal_ends_there():
+    """R6: inputs from a forged cache gave a plan that ends elsewhere, and it was confirmed."""
+    document = planned()
+    assert document["result"]["spec"]["effective"]["trajectory"]["goal"] == "true"
+    last = len(document["result"]["plan"]["knots"]["t"]) - 1
+    found = examine(scaled(document, Fraction(99, 100), [last]), 20, to_first_failure=False)
+    assert "the plan serves its task" in names(found)
+
+
+def test_a_plan_begins_where_its_task_does():
+    document = planned()
+    document["result"]["spec"]["effective"]["trajectory"]["start"] = ["3.4", "-2.3"]
+    assert "the plan serves its task" in names(examine(sealed(document), 20))
+
+
+def test_a_plan_spans_its_horizon():
+    document = planned()
+    knots = document["result"]["plan"]["knots"]
+    knots["t"][-1] = "5.01"
+    assert "the plan serves its task" in names(examine(sealed(document), 20))
+
+
+def test_what_is_drawn_of_a_plan_lies_on_it():
+    document = planned()
+    document["result"]["plan"]["samples"]["x"][70][0] += 0.01
+    assert names(examine(sealed(document), 20)) >= {"what is drawn of the plan lies on it"}
+    document = certified(SMALL)
+    document["result"]["plan"]["samples"]["x"][0][0] = 0.2
+    assert "what is drawn of the plan lies on it" in names(examine(sealed(document), 20))
+
+
+def test_margins_drawn_around_the_gains_are_proven():
+    """A figure shows them: they must not be better than they are."""
+    for section, key in (("conditions_26", "26a"), ("distance", "margin")):
+        document = certified(SMALL)
+        margins = document["result"][section]["margins_around"][key]
+        k = next(k for k, value in enumerate(margins) if value is not None)
+        margins[k] += 0.01
+        (name,) = names(examine(sealed(document), 2_000))
+        assert name.endswith("margins around")
+
+
+def test_a_contraction_that_exceeds_its_rate_is_confirmed():
+    """R7: a largest eigenvalue may be negative; a true certificate was contradicted."""
+    text = (
+        SMALL.replace('"-y + 0.3*sin(x)"', '"-y"')
+        .replace(GIVEN, "metric: {rate: 0.3, dual_metric: [[1, 0], [0, 1]]}")
+        .replace("0.1*sin(t) + 0.05*x", "0.1*sin(t)")
+    )
+    document = certified(text, conditions="distance")
+    excess = document["result"]["constants"]["contraction_excess"]
+    assert excess["above"] < 0
+    assert failing(examine(document)) == []
+    excess |= {"below": excess["above"] * 1.2, "above": excess["above"] * 1.1}
+    assert any("contraction_excess" in name for name in names(examine(sealed(document), 500)))
+
+
+def test_the_hash_of_the_specification_is_compared():
+    document = certified(SMALL)
+    document["result"]["spec"]["effective"]["name"] = "other"
+    document["hash"] = digest(document["result"])
+    assert "the specification and what repeats it" in names(examine(document, 20))
