@@ -58,6 +58,10 @@ KINDS = {
     "declared bounds only": (SMALL, (H, "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")),
     "declared beside derived": (SMALL, (H, H + ", bounds: {h: 0.2}")),
     "an h with a kink": (SMALL, (H, 'h: ["0.1*norm(x, y) + 0.05*abs(x)"]')),
+    "two kinks": (SMALL, (H, 'h: ["0.05*abs(x) + 0.05*abs(y)"]')),
+    "a product of kinks": (SMALL, (H, 'h: ["0.1*abs(x)*abs(y)"]')),
+    "a kink in a kink": (SMALL, (H, 'h: ["0.1*abs(x + 0.5*abs(y))"]')),
+    "a kink in time": (SMALL, (H, 'h: ["0.1*abs(sin(t))*abs(x) + 0.02*x"]')),
     "the paper's kernel": (SMALL, (LOOP, LOOP + "}\nconditions: {kernel: paper")),
     "declared bounds of the metric": (SMALL, ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1.2}, ")),
     "a plan of expressions": (

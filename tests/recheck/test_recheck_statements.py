@@ -21,7 +21,10 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.errors import ExitCode
 from tubecert.recheck import boxes
 from tubecert.recheck.boxes import Field
+from tubecert.recheck.branches import norms_below
 from tubecert.recheck.claims import of_certified
+from tubecert.recheck.cover import Boxed, prove
+from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.pencils import GainBelow
 from tubecert.recheck.run import recheck
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
@@ -218,3 +221,28 @@ def test_nothing_rests_on_a_constant_without_a_bound():
         result["constants"][name]["above"] = None
         found = recheck(json.dumps(sealed(result)), "certificate", 2_000, to_first_failure=True)
         assert found.verdict != "confirmed", name
+
+
+# -- terms with kinks
+
+# h in x and y on [-1, 1], the exact supremum of |h|, and its Lipschitz constant
+KINKED = {
+    "one": ("abs(x)", Fraction(1), Fraction(1)),
+    "two": ("3*abs(x) + 4*abs(y)", Fraction(7), Fraction(5)),
+    "a product": ("abs(x)*abs(y)", Fraction(1), Fraction(1414213562373096, 10**15)),
+    "nested": ("abs(3*x - 4*abs(y))", Fraction(7), Fraction(5)),
+    "a difference": ("abs(x) - x", Fraction(2), Fraction(2)),
+    "a curve": ("abs(x**2 - 0.25)", Fraction(3, 4), Fraction(2)),
+}
+
+
+@pytest.mark.parametrize("name", KINKED)
+def test_every_branch_of_a_kink_counts(name):
+    """Just above the truth it is proven, also over boxes that hold the kink; just below it never is."""
+    text, top, slope = KINKED[name]
+    h = [[term(text)]]
+    domain = Boxed({"x": (Fraction(-1), Fraction(1)), "y": (Fraction(-1), Fraction(1))})
+    for more, holds in ((LITTLE, True), (-LITTLE, False)):
+        assert prove(norms_below([h], top * (1 + more)), domain, 3_000).holds is holds
+        lipschitz = LipschitzBelow([h[0][0]], ["x", "y"], slope * (1 + more))
+        assert prove(lipschitz, domain, 3_000).holds is holds

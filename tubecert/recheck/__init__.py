@@ -12,7 +12,7 @@ formula or rounding in the producer must not pass both.
 | `identity`, `angles` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
 | `boxes`, `expansion` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
 | `statements` | norms, definiteness and signs at those vertices |
-| `pencils`, `multiplier`, `lipschitz` | statements of other kinds: pencils, columns over a ball, an h with kinks |
+| `pencils`, `multiplier`, `branches`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
 | `document`, `reading` | JSON and expressions, read and checked for form |

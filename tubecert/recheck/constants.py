@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from tubecert.recheck.boxes import Test
+from tubecert.recheck.branches import norms_below, slopes_below
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.lipschitz import LipschitzBelow
@@ -65,7 +66,7 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
 
 
 def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
-    test = NormsBelow(matrices, limit)
+    test = norms_below(matrices, limit)
     found = prove(test, place.tube(), min(place.budget, _FIRST))
     if found.verdict != "undecided" or place.budget <= _FIRST:
         return found
@@ -184,7 +185,9 @@ def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     if name == "h_x":
         test: Test = LipschitzBelow([row[0] for row in s.h], s.states, limit)
         return prove(test, place.tube(), place.budget)
-    return _norms(place, [s.h if name == "h" else matrix_slopes(s.h, TIME)], limit)
+    if name == "h_t":
+        return prove(slopes_below(s.h, TIME, limit), place.tube(), place.budget)
+    return _norms(place, [s.h], limit)
 
 
 _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {

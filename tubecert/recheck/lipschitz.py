@@ -1,8 +1,8 @@
 """A Lipschitz constant of h in x, for an h that may have kinks (norms, absolute values).
 
-Two bounds, and the smaller one counts on each box: the generalised Jacobian; and, since a norm is 1-Lipschitz in its
-arguments, |J_0| + sum_k |dh/dn_k| L_k with J_0 the Jacobian while the norms n_k are kept fixed and L_k that of n_k's
-arguments. Implements: Dhx of theory (2.3).
+With absolute values only: the Jacobians of all branches. Else two bounds, and the smaller one counts on each box: the
+generalised Jacobian; and, since a norm is 1-Lipschitz in its arguments, |J_0| + sum_k |dh/dn_k| L_k with J_0 the
+Jacobian while the norms n_k are kept fixed and L_k that of n_k's arguments. Implements: Dhx of theory (2.3).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.boxes import Box, Found
+from tubecert.recheck.branches import BranchesBelow, apart
 from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import (
     Matrix,
@@ -53,6 +54,10 @@ class LipschitzBelow:
         back = {name: variable(name) for name in norms}
         for name, (whole, _) in norms.items():
             back[name] = whole
+        smooth = apart(h)
+        self._branches = None
+        if smooth is not None and not any(e.op == "norm" for e in in_order(smooth[0])):
+            self._branches = BranchesBelow([_jacobian(smooth[0], states)], smooth[1], limit)
         direct = _jacobian(h, states)
         levels: list[tuple[Matrix, list[Matrix]]] = []
         earlier: list[str] = []
@@ -62,7 +67,8 @@ class LipschitzBelow:
             if len(earlier) < len(norms):
                 earlier.append(list(norms)[len(earlier)])
         every = [direct, *(m for own, gains in levels for m in (own, *gains))]
-        self.variables = tuple(sorted(names(e for m in every for row in m for e in row)))
+        more = () if self._branches is None else self._branches.variables
+        self.variables = tuple(sorted({*names(e for m in every for row in m for e in row), *more}))
         self._direct = _Bound(direct, self.variables)
         self._levels = [
             (_Bound(own, self.variables), [_Bound(gain, self.variables) for gain in gains])
@@ -75,6 +81,13 @@ class LipschitzBelow:
         if self._smooth is not None:
             return self._smooth.over(box)
         wide = [hi - lo for lo, hi in box]
+        if self._branches is not None:
+            columns = [self.variables.index(v) for v in self._branches.variables]
+            found = self._branches.over([box[i] for i in columns])
+            if not found.proven:
+                for c, i in enumerate(columns):
+                    wide[i] = max(wide[i], found.caused[c])
+            return Found(found.proven, wide, wide)
         total = arb(0)
         lengths: list[Ball] = []
         for own, gains in self._levels:
@@ -85,7 +98,9 @@ class LipschitzBelow:
         return Found(bool(total <= self._limit or self._direct.over(box) <= self._limit), wide, wide)
 
     def broken(self, point: Sequence[Ball]) -> bool:
-        """Known for smooth h only: the Jacobian is too large at a point."""
+        """Known for smooth h and its branches: the Jacobian is too large at a point."""
+        if self._branches is not None:
+            return self._branches.broken([point[self.variables.index(v)] for v in self._branches.variables])
         return self._smooth is not None and self._smooth.broken(point)
 
 

@@ -19,13 +19,15 @@ from tubecert.recheck.boxes import Box, Found
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
-from tubecert.recheck.terms import NOUGHT, Term, names, number, slopes, variable
+from tubecert.recheck.terms import NOUGHT, Term, in_order, names, number, slopes, variable
 
 _ASCENTS = 60
 
 
 def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
     """|G| <= limit over O(rho) of a plan that stays where it is; None if there is no multiplier that helps."""
+    if any(e.op in ("norm", "direction") for e in in_order(column)):
+        return None  # no curvature
     square = sum((e * e for e in column), start=NOUGHT)
     variables = tuple(sorted(names([square])))
     centre = dict(zip(place.system.states, place.curve.start, strict=True))

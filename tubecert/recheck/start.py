@@ -11,13 +11,13 @@ from fractions import Fraction
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root
+from tubecert.recheck.branches import norms_below
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
 from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import NOUGHT, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube
@@ -166,8 +166,8 @@ def uncertainty(place: Place, limit: Fraction) -> Outcome:
     at_start = matrix_replaced(s.h, {TIME: NOUGHT})
     if s.x0 is not None:
         fixed = matrix_replaced(at_start, dict(zip(s.states, map(number, s.x0), strict=True)))
-        return prove(NormsBelow([fixed], limit), Boxed({}), 1)
+        return prove(norms_below([fixed], limit), Boxed({}), 1)
     assert s.within is not None
     curve = place.curve
     still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
-    return prove(NormsBelow([at_start], limit), Tube(still, s.within, s.states, ()), place.budget)
+    return prove(norms_below([at_start], limit), Tube(still, s.within, s.states, ()), place.budget)
