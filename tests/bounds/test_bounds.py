@@ -294,6 +294,7 @@ def test_constants_along_a_moving_plan_enclose_sampled_ones_within_a_hundredth(t
     check_all(two, two_truth)
 
 
+@pytest.mark.slow
 def test_a_norm_has_its_slope_exactly(two):
     assert two.h_x.above == pytest.approx(0.1, rel=1e-9)
     assert two.h_x.above >= 0.1
@@ -301,6 +302,7 @@ def test_a_norm_has_its_slope_exactly(two):
     assert two.h_x.below <= 0.1
 
 
+@pytest.mark.slow
 def test_the_initial_distance_is_the_length_of_the_segment(three):
     _, constants, _, spec = three
     end = np.array([float(q) for q in spec.x0])
@@ -321,6 +323,7 @@ def test_half_widths_are_the_roots_of_the_diagonal(three):
         check_above(width, truth, "half width")
 
 
+@pytest.mark.slow
 def test_the_closed_form_of_the_feedback_gain_is_above_the_exact_one(three, three_truth):
     closed = three[0].feedback_gain_closed_form()
     assert closed >= three_truth["feedback_gain"]

@@ -81,6 +81,7 @@ def test_every_proven_side_is_above_the_samples_and_within_a_hundredth(result, s
         assert constant["below"] >= 0.99 * seen, name
 
 
+@pytest.mark.slow
 def test_the_supremum_of_f_is_above_what_a_grid_sees(result):
     # a 400 x 400 grid says 19.846 and finer ones 19.870
     f = result["constants"]["f"]

@@ -687,6 +687,7 @@ def test_check_mathematics(folder, monkeypatch):
 # the real thing
 
 
+@pytest.mark.slow
 def test_a_real_certificate(folder):
     first, second = run("certify", SPEC, "-o", "1.json"), run("certify", SPEC, "-o", "2.json", "-q")
     assert (first.exit_code, second.exit_code) == (0, 0)

@@ -60,6 +60,7 @@ pipeline.certify = certify
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("status", [0, 1, 2, 4, 130])
 def test_a_library_does_not_decide_on_the_exit_code(status):
     body = f"ctypes.CDLL(None).exit({status})"
@@ -68,6 +69,7 @@ def test_a_library_does_not_decide_on_the_exit_code(status):
     assert errors.startswith("tubecert: internal error: a library ended the process")
 
 
+@pytest.mark.slow
 def test_a_library_that_gets_no_memory_refutes_nothing():
     """OpenBLAS ends the process with 1 when it gets no memory for its threads."""
     codes = set()
@@ -81,6 +83,7 @@ def test_a_library_that_gets_no_memory_refutes_nothing():
     assert codes <= {0, 3, 130}, "where it gets no thread, OpenBLAS interrupts the process"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "before",
     [
@@ -107,6 +110,7 @@ def test_out_of_memory_is_no_defect():
     assert "defect" not in errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "said"),
     [

@@ -38,6 +38,7 @@ def test_it_is_certified(result):
     assert result["verdict"] == "certified"
 
 
+@pytest.mark.slow
 def test_constants_agree_with_closed_forms(result):
     rho = result["tube"]["rho"]
     exact = {

@@ -225,6 +225,7 @@ def test_markdown_shows_a_text_as_it_is(text):
     assert "".join(child.content for child in tokens[1].children) == wanted
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(MARKUP)
 def test_nothing_in_a_certificate_is_markup_of_its_page(text):
@@ -240,6 +241,7 @@ def test_nothing_in_a_certificate_is_markup_of_its_page(text):
 # names that are not UTF-8
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="file names are text there")
 def test_names_that_are_not_utf_8_work():
     def name(data: bytes) -> str:

@@ -91,6 +91,7 @@ def lying(key, lie, monkeypatch):
     monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose, slopes=honest.slopes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "name"), CASES)
 def test_a_search_that_lies_certifies_nothing(key, name, bounded, monkeypatch):
     honest = result_of_answer(judge_gains(bounded))
@@ -142,6 +143,7 @@ def test_an_ultimate_radius_needs_a_companion_at_the_same_gains_that_is_proven(p
         assert section.judgement.ultimate_radius is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "slopes",
     [
@@ -160,6 +162,7 @@ def test_elasticities_that_lie_change_no_claim(slopes, bounded, monkeypatch):
         assert result[key] == honest[key]
 
 
+@pytest.mark.slow
 def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
     """All three kinds lie about other gains than the decisive ones: the certificate stands without them."""
     for key, lies in LIES.items():

@@ -115,6 +115,7 @@ def test_no_kind_of_certificate_may_claim_more(kind):
         assert failing(found), name
 
 
+@pytest.mark.slow
 def test_gains_that_were_asked_for():
     enough = certified(SMALL, bandwidth=Fraction(300), adaptation_rate=Fraction(10**12))
     assert enough["result"]["verdict"] == "certified"
@@ -354,6 +355,7 @@ def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
     assert failing(examine(document)) == []
 
 
+@pytest.mark.slow
 def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     """No more is concluded where the addition theorems do not reach."""
     document = wiggling()

@@ -105,6 +105,7 @@ def test_well_formed_with_unique_anchors_that_resolve(any_certificate):
     assert page.tags.count("h1") == 1
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_and_nothing_runs(any_certificate):
     source = html.render(any_certificate)
     page = pages.Page(source)
@@ -652,6 +653,7 @@ def test_a_certificate_that_is_not_there_or_no_text(folder):
     assert "it is not UTF-8" in run("report", "c.json").output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["verdict", "spec", "safe_set", "plan", "reasons", "assumptions", "formulas"])
 @pytest.mark.parametrize("value", [None, "absent", 7, [], {}, "text"])
 def test_a_sealed_result_that_lacks_something_is_an_error_and_no_traceback(folder, key, value):

@@ -85,12 +85,14 @@ def test_the_same_command_gives_the_same_bytes(files, drawn):
     assert "<dc:date>" not in svg
 
 
+@pytest.mark.slow
 def test_the_example_of_the_help_runs():
     result = command("--runs", "0", "--controllers", "ccm,l1,sampled", "--control-rate", "500")
     assert result.exit_code == 0, result.output
     assert "cut to" in " ".join(result.stdout.split())
 
 
+@pytest.mark.slow
 def test_json_and_quiet():
     data = json.loads(command("--runs", "0", "--json").stdout)
     assert data["format"] == "tubecert-simulation/1"
@@ -187,6 +189,7 @@ def test_a_folder_that_stays_empty_does_not_stay(files):
     assert not (files / "new").exists()
 
 
+@pytest.mark.slow
 def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
     real = campaigns.integrate
 

@@ -80,6 +80,7 @@ def test_a_certificate_of_another_system_is_refused_by_what_differs():
     assert finding.location is not None
 
 
+@pytest.mark.slow
 def test_overrides_of_the_certificate_are_adopted_and_other_radii_refused():
     spec = load(str(CONFIGS / "two_state.yaml"))
     _, result = certified("two_state", "0.4")

@@ -68,6 +68,7 @@ def test_flat_metrics_in_curved_coordinates_keep_their_distances():
     assert np.allclose(found.covectors[1], J.T @ (z[1] - z[0]), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_distances_of_the_hyperbolic_plane_converge_with_the_degree():
     p, q = [0.0, 1.0], [0.5, 1.2]
     exact = hyperbolic(p, q)
