@@ -1,6 +1,7 @@
 """The constants of the certificates as values, and the table of what each one is.
 
-Console, JSON and docs read names, symbols, equations and units from `TABLE` and nowhere else.
+Console, JSON, docs and formulas read names, symbols, equations, units and sides from `TABLE` and nowhere else. A new
+constant is a line here, what bounds it (`bounds.compute`), its name in `conditions.problem.Numbers`, and recheck's own.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from typing import Literal
 
 from tubecert.enclosure.constant import Constant, Witness
 
+Side = Literal["below", "above"]
+
 __all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "Witness"]
 
 
@@ -17,20 +20,42 @@ __all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "Witness"]
 class Meaning:
     """What a constant is: symbol of the paper or of docs/theory, equation tag, unit, and words.
 
-    `side` is the one that the certificate uses: `below` for an infimum, `above` for a supremum.
+    `side` is the one that the certificate uses: `below` for an infimum, `above` for a supremum. `number` is its name in
+    the formulas (`conditions.problem.Numbers`), empty if they do not contain it. `given`: its size is that of the
+    metric or of the actuators, which nobody can relax alone.
     """
 
     symbol: str
     equation: str
     unit: str
     words: str
-    side: Literal["below", "above"] = "above"
+    side: Side = "above"
+    number: str = ""
+    given: bool = False
 
 
 def _of(
-    symbol: str, equation: str, unit: str, words: str, side: Literal["below", "above"] = "above"
+    symbol: str,
+    equation: str,
+    unit: str,
+    words: str,
+    *,
+    side: Side = "above",
+    number: str | None = None,
+    given: bool = False,
 ) -> dict[str, Meaning]:
-    return {"meaning": Meaning(symbol=symbol, equation=equation, unit=unit, words=words, side=side)}
+    """The registry entry of a constant; in formulas it has its symbol for a name, unless said otherwise."""
+    return {
+        "meaning": Meaning(
+            symbol=symbol,
+            equation=equation,
+            unit=unit,
+            words=words,
+            side=side,
+            number=symbol if number is None else number,
+            given=given,
+        )
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,16 +65,22 @@ class BoundConstants:
     The units are those of the states and inputs of the specification; "1" is dimensionless.
     """
 
-    lower: Constant = field(metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M", "below"))
-    upper: Constant = field(metadata=_of("A", "CCM_1", "1", "largest eigenvalue of the metric M"))
+    lower: Constant = field(
+        metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M", side="below", given=True)
+    )
+    upper: Constant = field(metadata=_of("A", "CCM_1", "1", "largest eigenvalue of the metric M", given=True))
     f: Constant = field(metadata=_of("Df", "assumption 3", "x/s", "sup |f|"))
     f_x: Constant = field(metadata=_of("Dfx", "assumption 3", "1/s", "sup |df/dx|"))
-    B: Constant = field(metadata=_of("DB", "assumption 3", "x/(u s)", "sup |B|"))
-    B_x: Constant = field(metadata=_of("DBx", "assumption 3", "1/(u s)", "sup of the sum of |dB/dx_i|"))
-    b_x: Constant = field(metadata=_of("Dbx", "assumption 3", "1/(u s)", "sup of the sum of |db_j/dx|"))
-    B_pinv: Constant = field(metadata=_of("DBp", "assumption 5", "u s/x", "sup |B^+|"))
+    B: Constant = field(metadata=_of("DB", "assumption 3", "x/(u s)", "sup |B|", given=True))
+    B_x: Constant = field(
+        metadata=_of("DBx", "assumption 3", "1/(u s)", "sup of the sum of |dB/dx_i|", given=True)
+    )
+    b_x: Constant = field(
+        metadata=_of("Dbx", "assumption 3", "1/(u s)", "sup of the sum of |db_j/dx|", given=True)
+    )
+    B_pinv: Constant = field(metadata=_of("DBp", "assumption 5", "u s/x", "sup |B^+|", given=True))
     B_pinv_x: Constant = field(
-        metadata=_of("DBpx", "assumption 5", "u s/x^2", "sup of the sum of |dB^+/dx_i|")
+        metadata=_of("DBpx", "assumption 5", "u s/x^2", "sup of the sum of |dB^+/dx_i|", given=True)
     )
     M_x: Constant = field(metadata=_of("DMx", "bounds:M_x", "1/x", "sup of the sum of |dM/dx_i|"))
     u_star: Constant = field(metadata=_of("Dus", "assumption 2", "u", "sup |u*|"))
@@ -61,13 +92,17 @@ class BoundConstants:
         metadata=_of("du", "bounds:delta_u, corrected", "u/d", "|feedback| per Riemannian distance")
     )
     metric_input_gain: Constant = field(
-        metadata=_of("beta", "theory 4", "d/(u s)", "largest singular value of Theta B on the plan")
+        metadata=_of(
+            "beta", "theory 4", "d/(u s)", "largest singular value of Theta B on the plan", given=True
+        )
     )
     drift_on_plan: Constant = field(metadata=_of("phi", "theory 4", "x/s", "sup |f + B u*| over the tube"))
     initial_distance: Constant = field(
         metadata=_of("d0", "theory 4", "d", "length of the segment from x*(0) to x(0)")
     )
-    plan_defect: Constant = field(metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|"))
+    plan_defect: Constant = field(
+        metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|", number="")
+    )
     plan_defect_metric: Constant = field(
         metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
     )
@@ -77,12 +112,17 @@ class BoundConstants:
             "bounds:delta_u",
             "d/(u s)",
             "inf of the smallest singular value of Theta B",
-            "below",
+            side="below",
+            number="smin",
         )
     )
     contraction_excess: Constant = field(
         metadata=_of(
-            "lmax(F~)", "bounds:delta_u", "1/s", "sup of the largest eigenvalue of the pencil (F, W)"
+            "lmax(F~)",
+            "bounds:delta_u",
+            "1/s",
+            "sup of the largest eigenvalue of the pencil (F, W)",
+            number="excess",
         )
     )
 

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
-from typing import Generic
+from typing import Final, Generic
 
 import numpy as np
 
-from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions.arithmetic import Array, T
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.kernels import Kernel
@@ -80,32 +80,9 @@ class Numbers(Generic[T]):
     horizon: T | None
 
 
-# symbol -> field of BoundConstants; `a` and `smin` are infima, the others suprema
-FIELDS = {
-    "a": "lower",
-    "A": "upper",
-    "Df": "f",
-    "Dfx": "f_x",
-    "DB": "B",
-    "DBx": "B_x",
-    "Dbx": "b_x",
-    "DBp": "B_pinv",
-    "DBpx": "B_pinv_x",
-    "DMx": "M_x",
-    "Dus": "u_star",
-    "Dh": "h",
-    "Dhx": "h_x",
-    "Dht": "h_t",
-    "H0": "h_initial",
-    "du": "feedback_gain",
-    "beta": "metric_input_gain",
-    "phi": "drift_on_plan",
-    "d0": "initial_distance",
-    "delta": "plan_defect_metric",
-    "smin": "input_gain_least",
-    "excess": "contraction_excess",
-}
-_INFIMA = {"a", "smin"}
+# the name of a constant in the formulas -> its field of `BoundConstants`
+FIELDS: Final = {meaning.number: name for name, meaning in TABLE.items() if meaning.number}
+_INFIMA: Final = {meaning.number for meaning in TABLE.values() if meaning.side == "below"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

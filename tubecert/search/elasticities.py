@@ -12,7 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from tubecert.bounds.constants import Constant
+from tubecert.bounds.constants import TABLE, Constant
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.derived import rate_terms
 from tubecert.conditions.distance import DistanceRecipe
@@ -23,7 +23,6 @@ from tubecert.search.distance import least_rate
 from tubecert.search.rates import gains_along, needed_rate
 
 _STEP = 1e-4
-_GIVEN = frozenset({"lower", "upper", "B", "B_x", "b_x", "B_pinv", "B_pinv_x", "metric_input_gain"})
 
 
 def elasticities_distance(problem: TubeProblem, least: DistanceRecipe | None) -> dict[str, float]:
@@ -80,7 +79,7 @@ def halving(
     Searched anew, not extrapolated. The metric and the actuators are left out: nobody can relax their size alone.
     """
     now = least(problem)
-    named = sorted((-slope, name) for name, slope in slopes.items() if slope > 0 and name not in _GIVEN)
+    named = sorted((-slope, name) for name, slope in slopes.items() if slope > 0 and not TABLE[name].given)
     factors = {}
     for _, name in named[:2]:
         value: Constant = getattr(problem.constants, name)
