@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.expression import constant, parse, symbol
+from tubecert.expression import constant, graph, parse, substitute, symbol
 from tubecert.expression.matrix import Matrix, multiply, transpose
 from tubecert.model import ControlAffineModel, domain_findings, rank_decision
 from tubecert.spec import load_text
@@ -83,6 +85,49 @@ def test_one_minor_among_several_refutes_nothing() -> None:
     """x changes its sign, and so does 1 - 3 x, but not where x does."""
     assert verdict([["x"], ["1 - 3*x"]]) == "proven"
     assert verdict([["x", "0"], ["1 - 3*x", "0"], ["0", "1"]]) == "proven"
+
+
+def affine(n: int, m: int) -> ControlAffineModel:
+    """A dense B, affine in the states, of full rank about the origin."""
+    rng = np.random.default_rng(n * m)
+    states = tuple(f"x{i}" for i in range(n))
+    B = tuple(
+        tuple(
+            constant(int(rng.integers(1, 9))) + int(rng.integers(1, 9)) * symbol(states[rng.integers(n)])
+            for _ in range(m)
+        )
+        for _ in range(n)
+    )
+    inputs = tuple(f"u{j}" for j in range(m))
+    return replace(model([["1"]]), states=states, inputs=inputs, f=(constant(0),) * n, B=B)
+
+
+@pytest.mark.parametrize(("n", "m"), [(6, 5), (8, 6), (9, 7), (32, 16)])
+@pytest.mark.parametrize("half", ["1/1000", "1"])
+def test_the_rank_of_a_large_B_has_a_budget(n: int, m: int, half: str) -> None:
+    """Of its minors there may be billions, of m! terms each: work is counted in nodes of expressions and in boxes."""
+    before = next(graph._serial)
+    found = rank_decision(affine(n, m), [(-Fraction(half), Fraction(half))] * n, Effort())
+    assert next(graph._serial) - before < 60_000
+    assert found.boxes < 25_000
+    assert found.verdict == ("proven" if half != "1" else "undecided")
+
+
+def test_a_dependence_of_many_columns_is_shown_with_its_point() -> None:
+    """A point of few digits, evaluated exactly, where nothing was written out."""
+    plant = affine(9, 7)
+    zero = {name: constant(0) for name in plant.states}
+    last = [substitute([row[0]], zero)[0] + symbol("x3") for row in plant.B]
+    B = tuple((*row[:-1], e) for row, e in zip(plant.B, last, strict=True))
+    found = rank_decision(replace(plant, B=B), [(Fraction(-1, 2), Fraction(1, 2))] * 9, Effort())
+    assert found.verdict == "refuted"
+    assert set(found.at.values()) == {0}
+
+
+def test_a_constant_minor_is_exact() -> None:
+    """Of a size that floats do not hold: its square is 1e-600."""
+    assert verdict([["1e-300"], ["x"]]) == "proven"
+    assert verdict([["1e-300*x + 1e-300"], ["0"]]) != "proven"
 
 
 def test_the_gram_matrix_is_that_of_the_columns() -> None:

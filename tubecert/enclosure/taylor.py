@@ -25,7 +25,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression, derivatives, free_symbols, topological
 
 Matrix = Sequence[Sequence[Expression]]
-_MOST_VERTICES = 8  # variables expanded into vertices; more are bounded by their slopes
+MOST_VERTICES = 8  # variables expanded into vertices; more are bounded by their slopes
 _LEAST_RADIUS = 1e-140  # a larger radius is a valid one, and the product of two must not underflow
 
 
@@ -87,7 +87,7 @@ class MatrixFunction:
         """Variables in which every entry is affine, and the others."""
         if self._order < 2:
             return (), free
-        affine = tuple(v for v in free if all(e is ZERO for e in derivatives(first[v], v)))[:_MOST_VERTICES]
+        affine = tuple(v for v in free if all(e is ZERO for e in derivatives(first[v], v)))[:MOST_VERTICES]
         return affine, tuple(v for v in free if v not in affine)
 
     @property
@@ -122,7 +122,7 @@ class MatrixFunction:
                 end = lo[:, i] if sign < 0 else hi[:, i]
                 point[a, :, i] = box_lo[a, :, i] = box_hi[a, :, i] = end
         point, box_lo, box_hi = (x.reshape(len(choices) * count, dim) for x in (point, box_lo, box_hi))
-        expanded = curved[: max(0, _MOST_VERTICES - len(corners))] if self._order == 2 else []
+        expanded = curved[: max(0, MOST_VERTICES - len(corners))] if self._order == 2 else []
         flips = np.array(list(product((-1.0, 1.0), repeat=len(expanded))))
         thin = self._of(point, box_lo, box_hi, self._fixed)
         base = self._unpack(self._values.run(thin), self.shapes)

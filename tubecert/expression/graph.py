@@ -168,6 +168,10 @@ def add(a: Expression, b: Expression) -> Expression:
 
 def mul(a: Expression, b: Expression) -> Expression:
     """The product a b; rational factors are collected in front, equal factors become powers."""
+    if a is ONE or b is ONE:
+        return b if a is ONE else a
+    if a is ZERO or b is ZERO:
+        return ZERO
     (p, a), (q, b) = coefficient(a), coefficient(b)
     factor = p * q
     if factor == 0:

@@ -34,7 +34,8 @@ def multiply(a: Rows, b: Rows) -> Matrix:
 
 def dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
     """sum_i a_i b_i."""
-    return sum((x * y for x, y in zip(a, b, strict=True)), start=ZERO)
+    pairs = zip(a, b, strict=True)
+    return sum((x * y for x, y in pairs if x is not ZERO and y is not ZERO), start=ZERO)
 
 
 def combine(p: Expression | int | Fraction, a: Rows, q: Expression | int | Fraction, b: Rows) -> Matrix:
@@ -63,23 +64,56 @@ def along(a: Rows, field: Sequence[Expression], names: Sequence[str]) -> Matrix:
     """The derivative of `a` along a vector field: sum_i field_i da/dx_i."""
     total = matrix([[ZERO] * len(a[0])] * len(a))
     for speed, name in zip(field, names, strict=True):
-        if speed is not ZERO:
-            total = combine(1, total, speed, differentiate(a, name))
+        slope = differentiate(a, name) if speed is not ZERO else ()
+        if any(e is not ZERO for row in slope for e in row):
+            total = combine(1, total, speed, slope)
     return total
 
 
-def determinant(a: Rows) -> Expression:
-    """The determinant by expansion along the first row (meant for as many rows as a system has inputs)."""
-    if not a:
-        return ONE
-    if len(a) > 2 and all(e.is_constant for row in a for e in row):
-        return constant(_rational_determinant([[e.fraction for e in row] for row in a]))
-    total = ZERO
-    for j, entry in enumerate(a[0]):
-        if entry is not ZERO:
-            minor = [[*row[:j], *row[j + 1 :]] for row in a[1:]]
-            total = total + (-1) ** j * entry * determinant(minor)
-    return total
+class TooLargeError(ValueError):
+    """A determinant has more terms than asked for."""
+
+
+def determinant(a: Rows, most: int | None = None) -> Expression:
+    """The determinant by expansion along the first row (meant for as many rows as a system has inputs).
+
+    A dense one of n rows takes n 2**(n - 1) products; beyond `most` of them `TooLargeError` is raised.
+    """
+    expansion = _Expansion(a, most)
+    return expansion.minor(0, tuple(range(len(a))))
+
+
+class _Expansion:
+    """Determinants of the last rows of a matrix in some of its columns, each computed once."""
+
+    def __init__(self, a: Rows, most: int | None) -> None:
+        self._rows, self._most = a, most
+        self._known: dict[tuple[int, ...], Expression] = {}
+        self._products = 0
+
+    def minor(self, first: int, columns: tuple[int, ...]) -> Expression:
+        """The determinant of the rows from `first` on."""
+        if not columns:
+            return ONE
+        if columns not in self._known:
+            self._known[columns] = self._expanded(first, columns)
+        return self._known[columns]
+
+    def _expanded(self, first: int, columns: tuple[int, ...]) -> Expression:
+        rows = [[row[j] for j in columns] for row in self._rows[first:]]
+        if len(columns) > 2 and all(e.is_constant for row in rows for e in row):
+            return constant(_rational_determinant([[e.fraction for e in row] for row in rows]))
+        total = ZERO
+        for k, entry in enumerate(rows[0]):
+            if entry is not ZERO:
+                self._spend()
+                total = total + (-1) ** k * entry * self.minor(first + 1, (*columns[:k], *columns[k + 1 :]))
+        return total
+
+    def _spend(self) -> None:
+        self._products += 1
+        if self._most is not None and self._products > self._most:
+            raise TooLargeError(f"a determinant has more than {self._most} products")
 
 
 def _rational_determinant(rows: list[list[Fraction]]) -> Fraction:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.findings import Finding, Location
+from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec
@@ -18,17 +18,25 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
         findings = domain_findings(spec, time, effort)
     if findings:
         return [*findings, *name_findings(spec)]
+    return [*_rank_findings(spec, effort), *lint(spec, time, effort)]
+
+
+def _rank_findings(spec: Spec, effort: Effort) -> list[Finding]:
+    """An error where B loses rank, a warning where that is not known."""
     decision = rank_decision(build(spec), spec.safe_set, effort)
-    if decision.verdict == "refuted":
-        findings.append(
-            Finding(
-                code="TC203",
-                message=f"B loses rank in the safe set, at {place(decision.at)}",
-                location=spec.location("system.B"),
-                help="shrink the safe set, or remove an input that does nothing there",
-            )
+    if decision.verdict == "proven":
+        return []
+    refuted = decision.verdict == "refuted"
+    place_of = f"B loses rank in the safe set, at {place(decision.at)}"
+    return [
+        Finding(
+            code="TC203" if refuted else "TC209",
+            severity=Severity.ERROR if refuted else Severity.WARNING,
+            message=place_of if refuted else "B could not be proven to have full rank on the safe set",
+            location=spec.location("system.B"),
+            help="shrink the safe set, or remove an input that does nothing there",
         )
-    return findings + lint(spec, time, effort)
+    ]
 
 
 def missing_parts(spec: Spec) -> list[Finding]:
