@@ -226,9 +226,9 @@ def test_a_control_period_longer_than_the_sample_time_is_located():
 
 def test_kinds_are_named_alike_everywhere():
     assert set(KINDS) == {item.value for item in Source} == set(GAINS) == set(PREFERRED)
-    assert all(kind.key == key for key, kind in KINDS.items())
+    assert all(kind.name.option == key for key, kind in KINDS.items())
     _, result = certified("two_state", "0.4")
-    assert {kind.section for kind in KINDS.values()} == set(result["proof"])
+    assert {kind.name.key for kind in KINDS.values()} == set(result["proof"])
 
 
 @pytest.mark.parametrize(
@@ -244,12 +244,12 @@ def test_kinds_are_named_alike_everywhere():
     ],
 )
 def test_a_loop_takes_the_gains_of_a_kind_that_is_about_it(controller, wanted, taken):
-    assert kind_for(controller, wanted).key == taken
+    assert kind_for(controller, wanted).name.option == taken
     where = setting("two_state", "0.4")
     loop = loop_of(where, controller, Choice(source=wanted))
-    recipe = where.certified.sections[KINDS[taken].section].recipe
+    recipe = where.certified.sections[KINDS[taken].name.key].recipe
     assert loop.problem.gains.bandwidth == recipe["bandwidth"]
-    assert loop.origin == f"certified by {KINDS[taken].title}"
+    assert loop.origin == f"certified by {KINDS[taken].name}"
     assert (loop.promise is None) == (controller == "reference")
 
 

@@ -10,6 +10,7 @@ import typer
 
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Output, SpecFile, number_option, with_output
+from tubecert.kinds import NAMES
 
 _AFTER = """\b
 Examples:
@@ -24,12 +25,8 @@ left the tube; 2 invalid input; 4 no result, or no tube to leave; 130 interrupte
 """
 
 
-class Source(StrEnum):
-    """Whose gains."""
-
-    PAPER = "26"
-    DISTANCE = "distance"
-    SAMPLED = "sampled"
+# whose gains: one choice per kind
+Source = StrEnum("Source", [(name.key, name.option) for name in NAMES])  # type: ignore[misc]
 
 
 def register(app: typer.Typer) -> None:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.kinds import DISTANCE, RATES, SAMPLED, Name
 from tubecert.simulate.certified import Certified, Values
 from tubecert.simulate.problem import Controller
 
@@ -67,14 +68,11 @@ class Promise:
 class Kind:
     """All that simulation needs to know of a kind of certificate.
 
-    `key` names it on the command line (`--gains`), `section` in certificates, `title` in reports; `controller` is the
-    loop that it is about. `prediction_error` is the bound of |xtilde| and `decay` D(t), from what is certified and
-    the recipe of the section; either is None where the kind proves none.
+    `controller` is the loop that it is about. `prediction_error` is the bound of |xtilde| and `decay` D(t), from what
+    is certified and the recipe of the section; either is None where the kind proves none.
     """
 
-    key: str
-    section: str
-    title: str
+    name: Name
     controller: Controller
     prediction_error: Callable[[Certified, Values], float | None]
     decay: Callable[[Certified, Values], Decay | None]
@@ -90,7 +88,7 @@ def kind_for(controller: Controller, wanted: str) -> Kind:
 
 def promise(certified: Certified, kind: Kind) -> Promise | None:
     """What a kind of certificate promises about its loop; None if it certifies nothing."""
-    section = certified.proven(kind.section)
+    section = certified.proven(kind.name.key)
     if section is None:
         return None
     recipe = section.recipe
@@ -107,7 +105,7 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
     if error is not None:
         bounds["xtilde"] = error
     return Promise(
-        title=kind.title,
+        title=str(kind.name),
         rho=certified.rho,
         reach=certified.reach,
         half_widths=certified.half_widths,
@@ -168,32 +166,30 @@ def _common(certified: Certified) -> dict[str, float]:
 
 
 KINDS: Final[Mapping[str, Kind]] = {
-    kind.key: kind
+    kind.name.option: kind
     for kind in (
         Kind(
-            key="26",
-            section="conditions_26",
-            title="A (26)",
+            name=RATES,
             controller="l1",
             prediction_error=_error_of_paper,
             decay=_nothing,  # A bounds the tube only
         ),
         Kind(
-            key="distance",
-            section="distance",
-            title="B distance",
+            name=DISTANCE,
             controller="l1",
             prediction_error=_error_of_speed,
             decay=_decay_of_distance,
         ),
         Kind(
-            key="sampled",
-            section="sampled",
-            title="C sampled",
+            name=SAMPLED,
             controller="sampled",
             prediction_error=_nothing,
             decay=_decay_of_sampled,
         ),
     )
 }
-PREFERRED: Final = ("distance", "sampled", "26")  # where the kind that was asked for is not about the loop
+PREFERRED: Final = (
+    DISTANCE.option,
+    SAMPLED.option,
+    RATES.option,
+)  # where the kind that was asked for is not about the loop

@@ -207,7 +207,7 @@ def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning
     if controller == "l1":
         wanted["adaptation_rate"] = choice.adaptation_rate
     replaced = {name: float(value) for name, value in wanted.items() if value is not None}
-    section = setting.certified.proven(kind.section)
+    section = setting.certified.proven(kind.name.key)
     found = {} if section is None else dict(section.recipe)
     missing = [name for name in wanted if name not in {**found, **replaced}]
     if missing:
@@ -222,7 +222,7 @@ def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning
         sample_time=numbers.get("sample_time") if controller == "sampled" else None,
     )
     same = all(found.get(name) == value for name, value in replaced.items())
-    words = f"certified by {kind.title}" if same else CHOSEN
+    words = f"certified by {kind.name}" if same else CHOSEN
     return _Tuning(gains=gains, kind=kind, certified=same, words=words)
 
 
@@ -290,7 +290,7 @@ def _no_gains(controller: Controller, kind: Kind, missing: list[str]) -> Finding
     options = " and ".join(f"--{name.replace('_', '-')}" for name in missing)
     return Finding(
         code="TC705",
-        message=f"{kind.title} certifies no gains for the controller {controller}",
+        message=f"{kind.name} certifies no gains for the controller {controller}",
         help=f"choose {options} (then nothing is covered by the certificate), or another --gains",
     )
 
