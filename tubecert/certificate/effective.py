@@ -81,6 +81,15 @@ class Effective:
     uncertainty: UncertaintyView
     obstacles: tuple[ObstacleView, ...]
 
+    def part(self, name: str) -> Mapping[str, Tree]:
+        """A section as it stands, to be shown; empty if there is none."""
+        return _mapping(self.data.get(name))
+
+    def parts(self, name: str) -> list[Mapping[str, Tree]]:
+        """The entries of a list of sections, to be shown."""
+        found = self.data.get(name)
+        return [_mapping(item) for item in found] if isinstance(found, list) else []
+
     @classmethod
     def of(cls, data: Mapping[str, Tree], path: str = "effective") -> Effective:
         """The views of canonical data; raises `FormError`."""
@@ -93,6 +102,10 @@ class Effective:
             uncertainty=view.uncertainty,
             obstacles=view.obstacles,
         )
+
+
+def _mapping(value: Tree) -> Mapping[str, Tree]:
+    return value if isinstance(value, Mapping) else {}
 
 
 def _read(data: Json, path: str) -> Effective:

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import tubecert
-from tubecert.checking.expectations import Claim, Outcome
+from tubecert.checking.expectations import Outcome
 from tubecert.files import keep, read_kept
 from tubecert.findings import Finding, Location, Severity
 from tubecert.libraries import versions
+from tubecert.records import FormError, from_json, to_json
 from tubecert.spec import Spec, canonical
 
 KIND = "checks"
@@ -80,19 +81,11 @@ def read_outcome(name: str) -> Outcome | None:
     """The outcome kept under a name."""
     data = read_kept(KIND, name)
     try:
-        return None if data is None else _outcome(data)
-    except (KeyError, TypeError, ValueError):
+        return None if data is None else from_json(Outcome, data, KIND)
+    except FormError:
         return None
 
 
 def write_outcome(name: str, found: Outcome) -> None:
     """Keep an outcome."""
-    keep(KIND, name, asdict(found))
-
-
-def _outcome(data: dict[str, Any]) -> Outcome:
-    return Outcome(
-        verdict=str(data["verdict"]),
-        numbers=tuple((str(key), value) for key, value in data["numbers"]),
-        claims=tuple(Claim(**claim) for claim in data["claims"]),
-    )
+    keep(KIND, name, to_json(found))

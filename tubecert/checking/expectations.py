@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
-from tubecert.claims import METRIC_CLAIMS, MetricFound, Reason
+from tubecert.certificate.result import Result
+from tubecert.claims import METRIC_CLAIMS, MetricFound
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
-from tubecert.records import from_json
+from tubecert.kinds import SAMPLED
 from tubecert.spec import Expectation, Spec
+from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, title
 from tubecert.words.conditions import SECTIONS
@@ -36,7 +37,7 @@ class Claim:
     """A claim of a certification with its verdict; `message` says what binds or fails."""
 
     name: str
-    verdict: str
+    verdict: Verdict
     message: str = ""
     relax: str = ""
 
@@ -45,50 +46,47 @@ class Claim:
 class Outcome:
     """A certification in short: the verdict, the numbers that can be expected, and every claim."""
 
-    verdict: str
+    verdict: Verdict
     numbers: tuple[tuple[str, float], ...]
     claims: tuple[Claim, ...]
 
 
-def outcome(result: Mapping[str, Any]) -> Outcome:
+def outcome(result: Result) -> Outcome:
     """What a `result` comes down to."""
-    return Outcome(verdict=result["verdict"], numbers=tuple(_numbers(result)), claims=tuple(_claims(result)))
+    return Outcome(verdict=result.verdict, numbers=tuple(_numbers(result)), claims=tuple(_claims(result)))
 
 
-def _numbers(result: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """rho, and the gains of the certificate that decides: A, else B; the sample time is that of C."""
-    if "rho" in result.get("tube", {}):
-        yield "rho", result["tube"]["rho"]
-    decided = result.get("decided_by", [])
-    name = next((name for name in decided if name in result), None)
-    section: Mapping[str, Any] = result.get(name or "", {})
-    if name == "distance":
-        section = section.get("asked") or section.get("least_adaptation") or {}
-    for key in ("bandwidth", "adaptation_rate"):
-        if section.get(key) is not None:
-            yield key, section[key]
-    if result.get("sampled", {}).get("sample_time") is not None:
-        yield "sample_time", result["sampled"]["sample_time"]
+def _numbers(result: Result) -> Iterator[tuple[str, float]]:
+    """rho, and the gains of the first certificate that decides; the sample time is that of C."""
+    if result.tube is not None:
+        yield "rho", float(result.tube.rho)
+    pair = next(iter(result.deciding().values()), None)
+    if pair is not None:
+        yield "bandwidth", float(pair.bandwidth)
+        if pair.adaptation_rate is not None:
+            yield "adaptation_rate", float(pair.adaptation_rate)
+    sampled = result.sections.get(SAMPLED.key)
+    gains = None if sampled is None else sampled.decisive(asked=result.asked)
+    if gains is not None and gains.sample_time is not None:
+        yield "sample_time", float(gains.sample_time)
 
 
-def _claims(result: Mapping[str, Any]) -> Iterator[Claim]:
+def _claims(result: Result) -> Iterator[Claim]:
     """A claim per reason, and one per certificate that has no reason among them."""
-    named = set()
-    reasons = [from_json(Reason, item, f"reasons[{i}]") for i, item in enumerate(result["reasons"])]
-    for reason in reasons:
-        named.add(getattr(reason.claim, "section", None))
+    named = {getattr(reason.claim, "section", None) for reason in result.reasons}
+    for reason in result.reasons:
         yield Claim(
             name=title(reason.claim),
             verdict=reason.verdict,
             message=message(reason),
             relax=advice(reason.relax),
         )
-    of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in reasons)
-    if "verdict" in result.get("metric", {}) and not of_metric:
-        yield Claim(name="metric", verdict=result["metric"]["verdict"])
-    for section in result.get("decided_by", ()):
-        if section in result and section not in named:
-            yield Claim(name=SECTIONS[section], verdict=result[section]["verdict"])
+    of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in result.reasons)
+    if result.metric is not None and not of_metric:
+        yield Claim(name="metric", verdict=result.metric.verdict)
+    for section in result.decided_by:
+        if section in result.sections and section not in named:
+            yield Claim(name=SECTIONS[section], verdict=result.sections[section].verdict)
 
 
 def compared(spec: Spec, found: Outcome) -> list[Finding]:
@@ -113,13 +111,13 @@ def compared(spec: Spec, found: Outcome) -> list[Finding]:
 
 
 def _not_certified(spec: Spec, found: Outcome) -> Iterator[Finding]:
-    if found.verdict == "certified":
+    if found.verdict is Verdict.CERTIFIED:
         return
     top = spec.location("name") or Location(file=spec.path, line=1, column=1)
     for claim in found.claims:
         if claim.verdict == found.verdict:
             yield Finding(
-                code=REFUTED if found.verdict == "refuted" else UNDECIDED,
+                code=REFUTED if found.verdict is Verdict.REFUTED else UNDECIDED,
                 message=f"{found.verdict}: {claim.name}: {claim.message}",
                 location=top,
                 help=claim.relax,

@@ -110,9 +110,10 @@ def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> 
     kept = cache.read_outcome(name) if options.cached else None
     if kept is None:
         from tubecert import pipeline
+        from tubecert.certificate.result import Result
 
         effort = pipeline.Options(gap=options.gap, budget=options.budget)
-        kept = outcome(pipeline.certify(spec, effort, progress))
+        kept = outcome(Result.from_json(pipeline.certify(spec, effort, progress)))
         if options.cached:
             cache.write_outcome(name, kept)
     return kept

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
-from tubecert.cli.report import check_pages, write_pages
+from tubecert.cli.report import check_pages, read_certificate, write_pages
 from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
@@ -23,6 +23,7 @@ from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
+    from tubecert.certificate.result import Certificate
     from tubecert.spec import Spec
 
 
@@ -51,8 +52,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     if target != certificate.STDOUT:
         certificate.write(target, sealed)
     metric = _kept_metric(result, kept)
-    write_pages(pages, sealed)
-    _report(sealed, target, {"metric": metric, "pages": pages}, output)
+    told = read_certificate(sealed)
+    write_pages(pages, told)
+    _report(sealed, told, target, {"metric": metric, "pages": pages}, output)
     return certificate.exit_code(result)
 
 
@@ -146,14 +148,15 @@ def _record(started: datetime, seconds: float) -> dict[str, Any]:
     }
 
 
-def _report(sealed: Mapping[str, Any], target: str, files: Mapping[str, Any], output: Output) -> None:
+def _report(
+    sealed: Mapping[str, Any], told: Certificate, target: str, files: Mapping[str, Any], output: Output
+) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
-    result = sealed["result"]
     present(
         output,
-        console.verdict_line(result),
-        lambda: console.report(sealed, target=target, verbose=output.verbose, **files),
+        console.verdict_line(told.result),
+        lambda: console.report(told, target=target, verbose=output.verbose, **files),
         certificate.dump(sealed) if output.json or target == certificate.STDOUT else None,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
@@ -14,6 +14,10 @@ from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
 from tubecert.files import STDIN
 from tubecert.printable import printable_json, visible
+from tubecert.records import FormError
+
+if TYPE_CHECKING:
+    from tubecert.certificate.result import Certificate
 
 _HTML, _MARKDOWN = (".html", ".htm"), (".md", ".markdown")
 _REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
@@ -27,16 +31,23 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
     check_pages(pages, {"certificate": source})
     sealed = certificate.load(source)
     try:
-        texts = {page: _render(page, sealed) for page in pages}
-    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
-        # with a hash that is right: somebody sealed a result that lacks something, or has it of another kind
-        raise certificate.incomplete(source, _what(error)) from error
+        told = read_certificate(sealed)
+    except FormError as error:  # with a hash that is right: somebody sealed what is no result
+        raise certificate.incomplete(source, str(error)) from error
+    texts = {page: _render(page, told) for page in pages}
     for page, text in texts.items():
         certificate.write_text(page, text, _REMEDY)
     if output.json:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
         write_stdout("".join(f"page {visible(page)}\n" for page in pages))
+
+
+def read_certificate(sealed: Mapping[str, Any]) -> Certificate:
+    """The values of a certificate; raises `FormError`."""
+    from tubecert.certificate.result import Certificate
+
+    return Certificate.from_json(sealed)
 
 
 def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:
@@ -55,13 +66,13 @@ def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) ->
         kept[f"page {page}"] = page
 
 
-def write_pages(pages: Sequence[str], sealed: Mapping[str, Any]) -> None:
+def write_pages(pages: Sequence[str], sealed: Certificate) -> None:
     """Write the pages of a certificate. Raises `TargetError`."""
     for page in pages:
         certificate.write_text(page, _render(page, sealed), _REMEDY)
 
 
-def _render(page: str, sealed: Mapping[str, Any]) -> str:
+def _render(page: str, sealed: Certificate) -> str:
     if Path(page).suffix.lower() in _MARKDOWN:
         from tubecert.report import markdown
 
@@ -76,11 +87,6 @@ def _beside(source: str) -> str:
     path = Path(source)
     name = path.name.removesuffix(".json").removesuffix(".certificate")
     return str(path.with_name(f"{name or 'certificate'}.html")) if path.name else source
-
-
-def _what(error: BaseException) -> str:
-    words = f"no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
-    return words[:100] or type(error).__name__
 
 
 def _refused(page: str, why: str, remedy: str) -> TargetError:

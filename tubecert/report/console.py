@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tubecert.certificate.result import Certificate, Result
 from tubecert.report import sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled
 from tubecert.report.numbers import up
-from tubecert.report.reasons import reason_of
+from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-STYLES = {"certified": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
+STYLES = {verdict: f"bold {color}" for verdict, color in sections.VERDICTS.items()}
 
 
 def report(
-    certificate: Mapping[str, Any],
+    certificate: Certificate,
     *,
     target: str,
     verbose: bool,
@@ -32,7 +33,7 @@ def report(
 
     `target` is the file of the certificate, `pages` are those about it, `metric` that of a metric found for it.
     """
-    result = certificate["result"]
+    result = certificate.result
     parts: list[RenderableType] = [verdict_line(result), indented(meaning(result))]
     for title, body in sections.of(result, verbose=verbose):
         parts += titled(title, body)
@@ -42,15 +43,15 @@ def report(
     return parts
 
 
-def verdict_line(result: Mapping[str, Any]) -> Text:
+def verdict_line(result: Result) -> Text:
     """The verdict and the numbers (or the reason) that go with it, on one line."""
-    verdict = result["verdict"]
+    verdict = result.verdict
     line = Text(no_wrap=True, overflow="ignore")
-    line.append(verdict, style=STYLES[verdict])
+    line.append(str(verdict), style=STYLES[verdict])
     line.append(f" {name(result)}: ", style="bold")
-    if verdict == "certified":
+    if verdict is Verdict.CERTIFIED:
         chosen = deciding(result)
-        numbers = [f"rho = {up(result['tube']['rho'])}"]
+        numbers = [f"rho = {up(sections.radius(result))}"]
         numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))
     else:
@@ -58,51 +59,49 @@ def verdict_line(result: Mapping[str, Any]) -> Text:
     return line
 
 
-def name(result: Mapping[str, Any]) -> str:
+def name(result: Result) -> str:
     """The name of the specification."""
-    return str(result["spec"]["effective"]["name"])
+    return result.spec.effective.name
 
 
-def _because(result: Mapping[str, Any]) -> str:
+def _because(result: Result) -> str:
     """The reason that decided: the first with the verdict's own word."""
-    reasons = [item for item in result["reasons"] if item.get("verdict") == result["verdict"]]
-    reason = (reasons or result["reasons"])[0]
-    return sentence(reason_of(reason))
+    return "" if result.reason is None else sentence(result.reason)
 
 
-def meaning(result: Mapping[str, Any]) -> Text:
+def meaning(result: Result) -> Text:
     """One sentence: what the verdict says, and what it does not say."""
-    match result["verdict"]:
-        case "certified":
+    match result.verdict:
+        case Verdict.CERTIFIED:
             return _promise(result)
-        case "refuted" if _tube_is_known(result):
+        case Verdict.REFUTED if _tube_is_known(result):
             return Text(
                 "The condition below is proven not to hold. It is a sufficient one: that it fails does not "
                 "prove that the state leaves the tube."
             )
-        case "refuted":
+        case Verdict.REFUTED:
             return Text("The claim below is proven false, so nothing that rests on it is certified.")
         case _:
             return Text("This is neither proven nor refuted; it must not be relied on.")
 
 
-def _promise(result: Mapping[str, Any]) -> Text:
+def _promise(result: Result) -> Text:
     chosen = deciding(result)
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
-        f"With this metric, {loops}, the state stays within {up(result['tube']['rho'])} of the plan "
+        f"With this metric, {loops}, the state stays within {up(sections.radius(result))} of the plan "
         f"{sections.span(result)}, under the assumptions below."
     )
 
 
-def _tube_is_known(result: Mapping[str, Any]) -> bool:
-    return "rho_r" in result.get("tube", {})
+def _tube_is_known(result: Result) -> bool:
+    return result.tube is not None and result.tube.rho_r is not None
 
 
-def _closing(certificate: Mapping[str, Any], target: str, pages: Sequence[str]) -> list[RenderableType]:
+def _closing(certificate: Certificate, target: str, pages: Sequence[str]) -> list[RenderableType]:
     """Where the certificate is, and how to see again that it is right."""
     again = "To check it later: the same command gives the same hash on this machine with these versions."
-    sealed = [Text(certificate["hash"], style="dim"), Text(again, style="dim")]
+    sealed = [Text(certificate.hash, style="dim"), Text(again, style="dim")]
     return [_file("certificate", target), *map(indented, sealed), *(_file("page", page) for page in pages)]
 
 

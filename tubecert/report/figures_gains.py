@@ -6,53 +6,57 @@ In: `result` of a certificate. Out: figures. Curves and pairs are those of the c
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Any
 
+from tubecert.certificate.result import Result
+from tubecert.kinds import SAMPLED
+from tubecert.kinds.data import Around
+from tubecert.kinds.sampled import SampledData
 from tubecert.report.figures_axes import WIDTH, Axis, Chart, Point, blank, number, text
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.numbers import exact, short
 from tubecert.report.page import Figure
+from tubecert.words.conditions import equation
 
 STYLES = {"conditions_26": "a", "distance": "b", "sampled": "c"}
 _LOWEST = -0.5  # margins below are not drawn
 _MOST = 12  # constants shown
 
 
-def gain_figures(result: Mapping[str, Any]) -> list[Figure]:
+def gain_figures(result: Result) -> list[Figure]:
     """Every figure that the certificate has data for."""
     made = (_trade_off(result), _sample_time(result), *_margins(result), _elasticities(result))
     return [figure for figure in made if figure is not None]
 
 
-def _trade_off(result: Mapping[str, Any]) -> Figure | None:
+def _trade_off(result: Result) -> Figure | None:
     curves = {
-        section: [(float(p["bandwidth"]), float(p["adaptation_rate"])) for p in result[section]["curve"]]
-        for section in ("conditions_26", "distance")
-        if section in result
+        key: list(section.points())
+        for key, section in result.sections.items()
+        if key in NAMES and not isinstance(section, SampledData)
     }
-    chosen = [row for row in rows(result) if row.adaptation_rate is not None]
+    chosen = [(row, row.pair.adaptation_rate) for row in rows(result)]
     return _curves(
         "trade-off",
         "Adaptation rate against bandwidth",
         curves,
-        [(row, (_value(row.bandwidth), _value(row.adaptation_rate))) for row in chosen],
+        [(row, (float(row.pair.bandwidth), float(rate))) for row, rate in chosen if rate is not None],
         label="adaptation rate Γ",
         caption="Every point of a curve is a proven pair.",
     )
 
 
-def _sample_time(result: Mapping[str, Any]) -> Figure | None:
-    if "sampled" not in result:
+def _sample_time(result: Result) -> Figure | None:
+    section = result.sections.get(SAMPLED.key)
+    if section is None:
         return None
-    curve = [(float(p["bandwidth"]), float(p["sample_time"])) for p in result["sampled"]["curve"]]
-    chosen = [row for row in rows(result) if row.sample_time is not None]
+    chosen = [(row, row.pair.sample_time) for row in rows(result)]
     return _curves(
         "sample-time",
         "Sample time against bandwidth",
-        {"sampled": curve},
-        [(row, (_value(row.bandwidth), _value(row.sample_time))) for row in chosen],
+        {SAMPLED.key: list(section.points())},
+        [(row, (float(row.pair.bandwidth), float(time))) for row, time in chosen if time is not None],
         label="sample time (s)",
         caption="The longest sample time that is proven to serve at each bandwidth.",
     )
@@ -90,27 +94,20 @@ def _told(row: Gains) -> str:
     return f"{NAMES[row.section]}, {row.which}: {row.text()}"
 
 
-def _value(gain: float | int | str | None) -> float:
-    assert gain is not None
-    return float(gain)
-
-
 # -- margins
 
 
-def _margins(result: Mapping[str, Any]) -> Iterator[Figure]:
-    for section, claims in (("conditions_26", ("26a", "26b", "26c")), ("distance", ("margin",))):
-        data = result.get(section, {}).get("margins_around")
-        if data:
-            yield _margin_figure(result, section, claims, data)
+def _margins(result: Result) -> Iterator[Figure]:
+    for key in NAMES:
+        section = result.sections.get(key)
+        around = None if section is None else section.margins_along()
+        if around is not None:
+            yield _margin_figure(result, key, around)
 
 
-def _margin_figure(
-    result: Mapping[str, Any], section: str, claims: tuple[str, ...], data: Mapping[str, Any]
-) -> Figure:
-    omegas = [float(w) for w in data["bandwidth"]]
-    rate = exact(data["adaptation_rate"])
-    known = [v for claim in claims for v in data[claim] if v is not None]
+def _margin_figure(result: Result, section: str, around: Around) -> Figure:
+    omegas = [float(w) for w in around.bandwidth]
+    known = [v for values in around.margins.values() for v in values if v is not None]
     low, high = max(min([*known, -0.1]), _LOWEST), max([*known, 0.1])
     title = f"Margins of {NAMES[section]} against bandwidth"
     key = f"margins-{STYLES[section]}"
@@ -119,23 +116,24 @@ def _margin_figure(
     chart.box((x.low, chart.y.low), (x.high, 0.0), "fails")
     chart.rule(0.0, "zero", across=True)
     legend = []
-    for i, claim in enumerate(claims):
-        style = f"m{i + 1}" if len(claims) > 1 else STYLES[section]
-        for part in _known(omegas, data[claim]):
+    several = len(around.margins) > 1
+    for i, (condition, values) in enumerate(sorted(around.margins.items())):
+        style = f"m{i + 1}" if several else STYLES[section]
+        for part in _known(omegas, values):
             chart.line(part, style)
-        legend.append((style, f"({claim})" if claim != "margin" else NAMES[section]))
-    pair = next(row for row in rows(result) if row.section == section and _is_pair(row, data))
-    chart.rule(_value(pair.bandwidth), "chosen")
-    legend += [("chosen", f"{pair.which}: ω = {exact(pair.bandwidth)} rad/s"), ("fails", "does not hold")]
-    caption = f"With the adaptation rate kept at Γ = {rate}; each value is proven for its own bandwidth."
+        legend.append((style, equation(condition) if several else NAMES[section]))
+    rate = around.adaptation_rate
+    row = next(r for r in rows(result) if r.section == section and r.pair.adaptation_rate == rate)
+    chart.rule(float(row.pair.bandwidth), "chosen")
+    chosen = f"{row.which}: ω = {exact(row.pair.bandwidth)} rad/s"
+    legend += [("chosen", chosen), ("fails", "does not hold")]
+    caption = (
+        f"With the adaptation rate kept at Γ = {exact(rate)}; each value is proven for its own bandwidth."
+    )
     return Figure(key=key, title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
 
 
-def _is_pair(row: Gains, data: Mapping[str, Any]) -> bool:
-    return bool(row.adaptation_rate == data["adaptation_rate"])
-
-
-def _known(omegas: list[float], values: list[float | None]) -> list[list[Point]]:
+def _known(omegas: list[float], values: Sequence[float | None]) -> list[list[Point]]:
     """The stretches of a curve on which it is known, in per cent."""
     points = zip(omegas, values, strict=True)
     parts = (list(part) for known, part in groupby(points, key=lambda p: p[1] is not None) if known)
@@ -145,9 +143,9 @@ def _known(omegas: list[float], values: list[float | None]) -> list[list[Point]]
 # -- what binds
 
 
-def _elasticities(result: Mapping[str, Any]) -> Figure | None:
+def _elasticities(result: Result) -> Figure | None:
     """Bars: by how many per cent the least Gamma rises when a constant rises by one."""
-    slopes = {s: v for s, v in result.get("elasticities", {}).items() if v}
+    slopes = {s: v for s, v in (result.elasticities or {}).items() if v}
     largest: dict[str, float] = {}
     for values in slopes.values():
         for name, value in values.items():
@@ -164,7 +162,7 @@ def _elasticities(result: Mapping[str, Any]) -> Figure | None:
     zero = left + (34 if low < 0 else 0) - low * scale
     for row, name in enumerate(names):
         y = 24 * row + 6
-        symbol = result.get("constants", {}).get(name, {}).get("symbol", name)
+        symbol = result.constants[name].symbol if name in result.constants else name
         text(svg, (left - 8, y + 14), symbol, "tick end")
         for lane, (section, values) in enumerate(sorted(slopes.items())):
             value = values.get(name, 0.0)

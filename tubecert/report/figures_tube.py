@@ -6,14 +6,14 @@ In: `result` of a certificate. Out: one figure per pair of states. Nothing is de
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from typing import Any
 
+from tubecert.certificate.effective import ObstacleView
+from tubecert.certificate.result import Result
+from tubecert.enclosure.constant import Witness
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
 from tubecert.report.page import Figure
-from tubecert.report.reasons import reason_of
 from tubecert.report.sections import horizon, point
 from tubecert.words.claims import title as title_of
 
@@ -50,9 +50,9 @@ class Plane:
         return Axis.around([*shown, low, high] if near else shown, label, pad=0.06 if near else 0.25)
 
 
-def planes(result: Mapping[str, Any]) -> list[Plane]:
+def planes(result: Result) -> list[Plane]:
     """The planes to draw: all pairs of up to three states, else neighbours two by two."""
-    states = list(result["spec"]["effective"]["system"]["states"])
+    states = list(result.spec.effective.system.states)
     n = len(states)
     if n <= 3:
         pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
@@ -61,42 +61,41 @@ def planes(result: Mapping[str, Any]) -> list[Plane]:
     return [_plane(result, states, pair) for pair in pairs]
 
 
-def _plane(result: Mapping[str, Any], states: list[str], pair: tuple[int, int]) -> Plane:
+def _plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
     i, j = pair
-    units = result["spec"]["effective"]["system"].get("units", {})
-    tube = result.get("tube", {})
-    widths = tube.get("half_widths")
-    samples = result["plan"].get("samples", {}).get("x", [])
-    low, high = zip(*(map(_float, result["safe_set"][states[k]]) for k in pair), strict=True)
+    units = result.spec.effective.system.units
+    widths = None if result.tube is None else result.tube.half_widths
+    samples = () if result.plan.samples is None else result.plan.samples.x
+    low, high = zip(*(map(float, result.safe_set[states[k]]) for k in pair), strict=True)
     return Plane(
         names=(states[i], states[j]),
         units=(units.get(states[i], ""), units.get(states[j], "")),
         index=pair,
         plan=tuple((float(x[i]), float(x[j])) for x in samples),
-        rho=_float(tube["rho"]) if "rho" in tube else None,
+        rho=None if result.tube is None else float(result.tube.rho),
         sides=(float(widths[states[i]]), float(widths[states[j]])) if widths else None,
         safe=((low[0], low[1]), (high[0], high[1])),
     )
 
 
-def tube_figures(result: Mapping[str, Any]) -> list[Figure]:
+def tube_figures(result: Result) -> list[Figure]:
     """The tube in each plane, with the obstacles that lie in it and the witnesses of what was refuted."""
-    if len(result["spec"]["effective"]["system"]["states"]) == 1:
+    if len(result.spec.effective.system.states) == 1:
         return _over_time(result)
     return [_tube(result, plane) for plane in planes(result)]
 
 
-def _over_time(result: Mapping[str, Any]) -> list[Figure]:
+def _over_time(result: Result) -> list[Figure]:
     """The tube of a single state against time; a plan without an end is drawn for one second."""
-    (name,) = result["spec"]["effective"]["system"]["states"]
-    samples = result["plan"].get("samples")
-    if not samples or "rho" not in result.get("tube", {}):
+    (name,) = result.spec.effective.system.states
+    samples, tube = result.plan.samples, result.tube
+    if samples is None or tube is None:
         return []
-    end = _float(horizon(result) or 1)
-    x = [float(row[0]) for row in samples["x"]]
-    plan = list(zip(samples["t"], x, strict=True)) if len(x) > 1 else [(0.0, x[0]), (end, x[0])]
-    side = float(result["tube"].get("half_widths", {}).get(name, _float(result["tube"]["rho"])))
-    low, high = map(_float, result["safe_set"][name])
+    end = float(horizon(result) or 1)
+    x = [float(row[0]) for row in samples.x]
+    plan = list(zip(samples.t, x, strict=True)) if len(x) > 1 else [(0.0, x[0]), (end, x[0])]
+    side = float((tube.half_widths or {}).get(name, float(tube.rho)))
+    low, high = map(float, result.safe_set[name])
     time = Axis(label="t (s)", low=0.0, high=end)
     chart = Chart("tube-0", f"Plan and tube of {name}", time, Axis.around([low, high], name, pad=0.06))
     chart.box((time.low, chart.y.low), (time.high, chart.y.high), "outside")
@@ -107,14 +106,14 @@ def _over_time(result: Mapping[str, Any]) -> list[Figure]:
     return [Figure(key=chart.key, title=f"{name} over time", svg=chart.text(), legend=legend)]
 
 
-def _tube(result: Mapping[str, Any], plane: Plane) -> Figure:
+def _tube(result: Result, plane: Plane) -> Figure:
     title = f"{plane.names[0]}, {plane.names[1]}"
     witnesses = [
-        (plane.of(at["x"]), f"{title_of(reason_of(reason).claim)}: {point(result, at)}")
-        for reason in result["reasons"]
-        if (at := reason.get("at")) and len(at.get("x", ())) > max(plane.index)
+        (plane.of(at.x), f"{title_of(reason.claim)}: {point(result, at)}")
+        for reason in result.reasons
+        if (at := reason.at) is not None and len(at.x) > max(plane.index)
     ]
-    proven = "rho_r" in result.get("tube", {})
+    proven = result.tube is not None and result.tube.rho_r is not None
     chart, legend = _scene(
         f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven
     )
@@ -160,28 +159,29 @@ def _height(plane: Plane, x: Axis, y: Axis) -> int:
     return min(max(height, 200), 420)
 
 
-def _obstacles(result: Mapping[str, Any], plane: Plane, chart: Chart) -> list[tuple[str, str]]:
+def _obstacles(result: Result, plane: Plane, chart: Chart) -> list[tuple[str, str]]:
     shown = []
-    for obstacle in result["spec"]["effective"].get("obstacles", ()):
-        names = tuple(obstacle["states"])
-        if set(names) != set(plane.names):
-            continue
-        order = (0, 1) if names == plane.names else (1, 0)
-        if disc := obstacle.get("disc"):
-            center = [_float(value) for value in disc["center"]]
-            radius = _float(disc["radius"])
-            chart.ellipse((center[order[0]], center[order[1]]), (radius, radius), "obstacle")
-        else:
-            corners = [[_float(value) for value in corner] for corner in obstacle["polygon"]]
-            chart.area([(corner[order[0]], corner[order[1]]) for corner in corners], "obstacle")
-        shown = [("obstacle", "obstacle")]
+    for obstacle in result.spec.effective.obstacles:
+        if set(obstacle.states) == set(plane.names):
+            _obstacle(obstacle, plane, chart)
+            shown = [("obstacle", "obstacle")]
     return shown
+
+
+def _obstacle(obstacle: ObstacleView, plane: Plane, chart: Chart) -> None:
+    a, b = (0, 1) if obstacle.states == plane.names else (1, 0)
+    if obstacle.disc is not None:
+        center, radius = obstacle.disc.center, float(obstacle.disc.radius)
+        chart.ellipse((float(center[a]), float(center[b])), (radius, radius), "obstacle")
+    else:
+        corners = [(float(corner[a]), float(corner[b])) for corner in obstacle.polygon]
+        chart.area(corners, "obstacle")
 
 
 # -- suprema
 
 
-def suprema_figures(result: Mapping[str, Any]) -> list[Figure]:
+def suprema_figures(result: Result) -> list[Figure]:
     """Where on the tube the constants attain their suprema: numbered places, the numbers explained below."""
     symbols = _places(result)
     if not symbols:
@@ -203,22 +203,22 @@ def suprema_figures(result: Mapping[str, Any]) -> list[Figure]:
     return figures
 
 
-def places(result: Mapping[str, Any]) -> tuple[str, ...]:
+def places(result: Result) -> tuple[str, ...]:
     """What the numbers in the figures of suprema stand for."""
-    return tuple(f"{', '.join(s)} near {point(result, {'x': x})}" for x, s in _places(result).items())
+    return tuple(f"{', '.join(s)} near {point(result, Witness(x=x))}" for x, s in _places(result).items())
 
 
-def _places(result: Mapping[str, Any]) -> dict[tuple[float, ...], list[str]]:
+def _places(result: Result) -> dict[tuple[float, ...], list[str]]:
     """The symbols of the constants by the state at which they were found largest; those that vanish left out."""
-    n = len(result["spec"]["effective"]["system"]["states"])
-    near = _NEAR * _float(result.get("tube", {}).get("rho", 0))
+    n = len(result.spec.effective.system.states)
+    near = _NEAR * (0.0 if result.tube is None else float(result.tube.rho))
     found: dict[tuple[float, ...], list[str]] = {}
-    for item in result.get("constants", {}).values():
-        at = item.get("at")
-        if at and len(at.get("x", ())) == n and item["above"] != 0:
-            here = tuple(float(f"{value:.4g}") for value in at["x"])
+    for _, item in sorted(result.constants.items()):
+        at = item.at
+        if at is not None and len(at.x) == n and item.above != 0:
+            here = tuple(float(f"{value:.4g}") for value in at.x)
             place = next((x for x in found if math.dist(x, here) <= near), here)
-            found.setdefault(place, []).append(item["symbol"])
+            found.setdefault(place, []).append(item.symbol)
     return found
 
 
@@ -236,7 +236,3 @@ def _close(
 
 def _pair(plane: Plane, value: Point) -> str:
     return f"{plane.names[0]} = {value[0]:.4g}, {plane.names[1]} = {value[1]:.4g}"
-
-
-def _float(value: float | int | str) -> float:
-    return float(Fraction(value)) if isinstance(value, str) else float(value)

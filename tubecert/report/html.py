@@ -6,10 +6,10 @@ only the drawings, which `figures_axes` writes as well-formed SVG, and the style
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from tubecert.certificate.result import Certificate
 from tubecert.report.page import typeset
 from tubecert.report.page_sections import page_of
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def render(certificate: Mapping[str, Any]) -> str:
+def render(certificate: Certificate) -> str:
     """The page of a certificate."""
     environment = _environment()
     return environment.get_template("page.html").render(page=page_of(certificate)) + "\n"

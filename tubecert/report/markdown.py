@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
+from tubecert.certificate.result import Certificate
 from tubecert.printable import visible
 from tubecert.report.page import (
     Block,
@@ -28,7 +28,7 @@ _AT_START = re.compile(
 )  # of a heading, a list, the line below a heading
 
 
-def render(certificate: Mapping[str, Any]) -> str:
+def render(certificate: Certificate) -> str:
     """The page of a certificate."""
     return "\n".join(_lines(page_of(certificate))).rstrip() + "\n"
 

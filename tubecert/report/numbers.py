@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import Final
 
-Number = float | int | str
+from tubecert.records import exact_json
+
+Number = float | int | str | Fraction
 UNKNOWN: Final = "-"
 
 
@@ -28,22 +29,26 @@ def down(value: Number | None, digits: int = 4) -> str:
 
 def exact(value: Number | None) -> str:
     """A gain or another exact number: every digit of it."""
+    if isinstance(value, Fraction):
+        value = exact_json(value)
     if isinstance(value, str) and "/" in value:
         return value
     return _shown(value, None, ROUND_HALF_EVEN)
 
 
-def percent(margin: Sequence[float | None] | None) -> str:
+def percent(margin: float | None) -> str:
     """The side of a margin that is proven, rounded down: `1.23 %`."""
-    if not margin or margin[0] is None:
+    if margin is None:
         return UNKNOWN
-    return f"{_shown(100 * _decimal(margin[0]), 3, ROUND_FLOOR)} %"
+    return f"{_shown(100 * _decimal(margin), 3, ROUND_FLOOR)} %"
 
 
 def _decimal(value: Number | Decimal) -> Decimal:
     """The decimal that is written in the certificate (a float stands for its shortest text)."""
     if isinstance(value, Decimal):
         return value
+    if isinstance(value, Fraction):
+        value = exact_json(value)
     if isinstance(value, str) and "/" in value:
         ratio = Fraction(value)
         return Decimal(ratio.numerator) / Decimal(ratio.denominator)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator
+from math import isfinite
 
-from tubecert.report.gains import NAMES, rows
+from tubecert.certificate.result import Result
+from tubecert.enclosure.constant import Constant
+from tubecert.report.gains import NAMES
 from tubecert.report.numbers import UNKNOWN, down, up
 from tubecert.report.page import Block, Cell, Table, Words
-from tubecert.words.conditions import SAYS, condition_name, equation
+from tubecert.words.conditions import SAYS, SHOWN, condition_name, equation
 
 _MARGIN = (
     "A margin is (allowed - needed)/allowed: positive means that the condition holds. Its lower side is proven; the "
@@ -16,7 +18,7 @@ _MARGIN = (
 )
 
 
-def conditions(result: Mapping[str, Any]) -> Iterator[Block]:
+def conditions(result: Result) -> Iterator[Block]:
     """One row per condition and set of gains, then what is missing where there are no gains."""
     found = tuple(_rows(result))
     if found:
@@ -25,53 +27,32 @@ def conditions(result: Mapping[str, Any]) -> Iterator[Block]:
             rows=found,
             note=_MARGIN,
         )
-    for section, title in NAMES.items():
-        for item in result.get(section, {}).get("shortfalls", ()):
-            if item.get("needed") is not None and item.get("allowed") is not None:
-                told = f"{up(item['needed'])} is needed, {down(item['allowed'])} is allowed"
-                yield Words(text=f"{title}, {condition_name(item['condition'])}: {told}.")
+    for key, title in NAMES.items():
+        for item in result.sections[key].shortfalls if key in result.sections else ():
+            if item.needed is not None and item.allowed is not None:
+                told = f"{up(item.needed)} is needed, {down(item.allowed)} is allowed"
+                yield Words(text=f"{title}, {condition_name(item.condition)}: {told}.")
 
 
-def _rows(result: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
-    for section, pair in _pairs(result):
-        margins = pair.get("margins") or {_only(section): pair.get("margin")}
-        for name, margin in margins.items():
-            yield _row(NAMES[section], name, margin)
+def _rows(result: Result) -> Iterator[tuple[Cell, ...]]:
+    """The gains that each certificate stands for, by condition."""
+    for key, title in NAMES.items():
+        section = result.sections.get(key)
+        pair = None if section is None else section.decisive(asked=result.asked)
+        for condition, margin in pair.margins.items() if pair is not None else ():
+            yield _row(title, condition, margin)
 
 
-def _pairs(result: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The gains that each certificate stands for."""
-    for section in NAMES:
-        data = result.get(section)
-        if data is None or not any(row.section == section for row in rows(result)):
-            continue
-        if section == "distance":
-            pair = data.get("asked") or data.get("least_adaptation") or data.get("split")
-            yield section, pair
-        elif data.get("bandwidth") is not None:
-            yield section, data
-
-
-def _only(section: str) -> str:
-    """The name of the condition of a certificate that has one."""
-    return "sup D(t)" if section == "distance" else "sup D(t), sampled"
-
-
-def _row(title: str, name: str, margin: Sequence[float | None] | None) -> tuple[Cell, ...]:
-    low, high = margin or (None, None)
-    said = SAYS.get(name, SAYS["sampled" if name.endswith("sampled") else "distance"])
+def _row(title: str, condition: str, margin: Constant) -> tuple[Cell, ...]:
+    low, high = margin.below, margin.above
     return (
         Cell(text=title),
-        Cell(text=equation(name)),
-        Cell(text=said),
-        Cell(
-            text=_percent(low, down),
-            kind="number",
-            share=min(low, 1.0) if low is not None and low > 0 else None,
-        ),
+        Cell(text=SHOWN.get(condition, equation(condition))),
+        Cell(text=SAYS[condition]),
+        Cell(text=_percent(low, down), kind="number", share=min(low, 1.0) if low > 0 else None),
         Cell(text=_percent(high, up), kind="number"),
     )
 
 
-def _percent(share: float | None, shown: Any) -> str:
-    return UNKNOWN if share is None else f"{shown(100 * share, 3)} %"
+def _percent(share: float, shown: Callable[[float, int], str]) -> str:
+    return f"{shown(100 * share, 3)} %" if isfinite(share) else UNKNOWN

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
+from tubecert.certificate.result import Result
 from tubecert.report.gains import NAMES
 from tubecert.report.numbers import exact, up
+from tubecert.verdict import Verdict
 
 
-def proven(result: Mapping[str, Any]) -> Iterator[str]:
+def proven(result: Result) -> Iterator[str]:
     """Claims that are proven whatever the verdict."""
-    metric, tube = result.get("metric", {}), result.get("tube", {})
-    if "metric" in result:
+    metric, tube = result.metric, result.tube
+    if metric is not None:
         yield "B has full rank on the whole safe set."
-    if metric.get("verdict") == "certified":
-        yield (
-            f"The metric is positive definite, contracting at the rate {exact(metric['rate'])} 1/s (C2) and "
-            "compatible with the inputs (C3) on the whole safe set."
-        )
-    if "rho_r" in tube:
-        yield f"The tube of radius {up(tube['rho'])} around the plan lies in the safe set."
-    if metric.get("unique_geodesics", {}).get("holds"):
+        if metric.verdict is Verdict.CERTIFIED:
+            yield (
+                f"The metric is positive definite, contracting at the rate {exact(metric.rate)} 1/s (C2) and "
+                "compatible with the inputs (C3) on the whole safe set."
+            )
+    if tube is not None and tube.rho_r is not None:
+        yield f"The tube of radius {up(tube.rho)} around the plan lies in the safe set."
+    if metric is not None and metric.unique_geodesics is not None and metric.unique_geodesics.holds:
         yield "Minimising geodesics in the tube are unique."
-    if constants := result.get("constants"):
-        yield f"Each of the {len(constants)} constants below is enclosed from both sides by interval arithmetic."
-    if result["formulas"] == "as-printed":
+    if count := len(result.constants):
+        yield f"Each of the {count} constants below is enclosed from both sides by interval arithmetic."
+    if result.formulas == "as-printed":
         yield "Nothing about the gains: the formulas are those that the paper prints, and several of them are wrong."
         return
-    for section, words in _CLAIMS.items():
-        if result.get(section, {}).get("verdict") == "certified":
-            yield f"{NAMES[section]}: {words}"
+    for key, words in _CLAIMS.items():
+        section = result.sections.get(key)
+        if section is not None and section.verdict is Verdict.CERTIFIED:
+            yield f"{NAMES[key]}: {words}"
 
 
 _CLAIMS = {
@@ -41,7 +43,7 @@ _CLAIMS = {
 _DECLARED = {"h": "|h|", "h_x": "|dh/dx|", "h_t": "|dh/dt|"}
 
 
-def declared(result: Mapping[str, Any]) -> Iterator[str]:
+def declared(result: Result) -> Iterator[str]:
     """What the specification declares and nobody proves."""
-    for name, value in result["declared"].items():
+    for name, value in result.declared.items():
         yield f"{_DECLARED.get(name, name)} <= {up(value, 12)} on the tube"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from rich.console import Group
 from rich.padding import Padding
@@ -11,11 +12,17 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.bounds.constants import DERIVED, TABLE
-from tubecert.report.gains import NAMES, rows
+from tubecert.certificate.result import Bound, MetricData, Result, TubeData
+from tubecert.claims import Reason
+from tubecert.enclosure.constant import Witness
+from tubecert.kinds import SAMPLED
+from tubecert.kinds.sampled import SampledData
+from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
-from tubecert.report.numbers import UNKNOWN, Number, down, exact, short, up
-from tubecert.report.reasons import assumption_of, reason_of
+from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
+from tubecert.words.assumptions import assumed
 from tubecert.words.claims import message, title
 
 if TYPE_CHECKING:
@@ -23,69 +30,75 @@ if TYPE_CHECKING:
 
 Section = tuple[str, list["RenderableType"]]
 MEANINGS = {**TABLE, **DERIVED}
-VERDICTS = {"certified": "green", "refuted": "red", "undecided": "yellow"}
+VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 
-def of(result: Mapping[str, Any], *, verbose: bool) -> Iterator[Section]:
+def of(result: Result, *, verbose: bool) -> Iterator[Section]:
     """The sections that a result has something to say in."""
-    failed = [item for item in result["reasons"] if item.get("verdict") != "certified"]
-    holding = [item for item in result["reasons"] if item.get("verdict") == "certified"]
+    failed = [item for item in result.reasons if item.verdict is not Verdict.CERTIFIED]
+    holding = [item for item in result.reasons if item.verdict is Verdict.CERTIFIED]
     if failed:
         yield "Not certified", [_reason(result, item) for item in failed]
-    if any(name in result for name in NAMES):
+    if result.sections:
         yield "Gains", _gains(result)
     if holding:
         yield "What limits them", [_reason(result, item) for item in holding]
-    if "tube" in result:
-        yield "Tube", _tube(result)
-    if "metric" in result:
-        yield "Metric", _metric(result["metric"], result["safe_set"])
-    if verbose and "constants" in result:
+    if result.tube is not None:
+        yield "Tube", _tube(result, result.tube)
+    if result.metric is not None:
+        yield "Metric", _metric(result, result.metric)
+    if verbose and result.constants:
         yield "Constants over the tube", [_constants(result)]
     yield "Assumed, not proven", _assumptions(result, verbose)
 
 
-def span(result: Mapping[str, Any]) -> str:
+def span(result: Result) -> str:
     """The time that is claimed."""
     end = horizon(result)
     return "for all t >= 0" if end is None else f"for 0 <= t <= {short(end, 12)} s"
 
 
-def horizon(result: Mapping[str, Any]) -> Number | None:
+def horizon(result: Result) -> Fraction | None:
     """The end of the plan in s, None if it has none."""
-    end: Number | None = result["spec"]["effective"]["trajectory"].get("horizon")
-    return end
+    return result.spec.effective.trajectory.horizon
+
+
+def radius(result: Result) -> Fraction | None:
+    """The radius of the tube, None if there is none."""
+    return None if result.tube is None else result.tube.rho
 
 
 # -- why not
 
 
-def _reason(result: Mapping[str, Any], reason: Mapping[str, Any]) -> Group:
-    verdict = reason.get("verdict", "undecided")
-    told = reason_of(reason)
-    text = Text.assemble(
-        (f"{verdict} ", VERDICTS[verdict]), (title(told.claim), "bold"), f": {message(told)}"
-    )
+def _reason(result: Result, reason: Reason) -> Group:
+    verdict = reason.verdict
+    told = f": {message(reason)}"
+    text = Text.assemble((f"{verdict} ", VERDICTS[verdict]), (title(reason.claim), "bold"), told)
     more = []
-    if at := reason.get("at"):
-        more.append(Text(f"at {point(result, at)}"))
-    if relax := advice(told.relax):
+    if reason.at is not None:
+        more.append(Text(f"at {point(result, reason.at)}"))
+    if relax := advice(reason.relax):
         more.append(Text.assemble(("help: ", "green"), relax))
     return Group(text, *(Padding(line, (0, 0, 0, 2)) for line in more))
 
 
-def point(result: Mapping[str, Any], at: Mapping[str, Any]) -> str:
+def point(result: Result, at: Witness) -> str:
     """A witness: `t = 0.2 s, x1 = 0.1, ...`."""
-    states = result["spec"]["effective"]["system"]["states"]
-    parts = [] if at.get("t") is None else [f"t = {short(at['t'], 6)} s"]
-    parts += [f"{name} = {short(value, 6)}" for name, value in zip(states, at.get("x", ()), strict=False)]
+    return place(result.spec.effective.system.states, at)
+
+
+def place(states: Sequence[str], at: Witness) -> str:
+    """The same for any states."""
+    parts = [] if at.t is None else [f"t = {short(at.t, 6)} s"]
+    parts += [f"{name} = {short(value, 6)}" for name, value in zip(states, at.x, strict=False)]
     return ", ".join(parts)
 
 
 # -- gains
 
 
-def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
+def _gains(result: Result) -> list[RenderableType]:
     found = list(rows(result))
     body: list[RenderableType] = []
     if found:
@@ -96,9 +109,7 @@ def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
                 "" if row.section == before else NAMES[row.section],
                 f"{row.which} *" if row.decides else row.which,
                 Text(row.verdict, style=VERDICTS[row.verdict]),
-                exact(row.bandwidth),
-                "" if row.adaptation_rate is None else exact(row.adaptation_rate),
-                "" if row.sample_time is None else exact(row.sample_time),
+                *(exact(gain) if gain is not None else "" for gain in gain_columns(row)),
                 row.slack,
             )
             before = row.section
@@ -110,75 +121,106 @@ def _gains(result: Mapping[str, Any]) -> list[RenderableType]:
                     style="dim",
                 )
             )
-    missing = [NAMES[key] for key in NAMES if key in result and not any(row.section == key for row in found)]
+    missing = [
+        NAMES[key] for key in NAMES if key in result.sections and all(row.section != key for row in found)
+    ]
     body += [Text(f"{title}: no gains were found") for title in missing]
     return body + _limit(result)
 
 
-def _limit(result: Mapping[str, Any]) -> list[Text]:
+def gain_columns(row: Gains) -> tuple[Fraction | None, Fraction | None, Fraction | None]:
+    """Bandwidth, adaptation rate and sample time."""
+    return row.pair.bandwidth, row.pair.adaptation_rate, row.pair.sample_time
+
+
+def sample_time_limit(result: Result) -> float | None:
+    """What no sample time reaches, whatever the bandwidth."""
+    section = result.sections.get(SAMPLED.key)
+    return section.sample_time_limit if isinstance(section, SampledData) else None
+
+
+def _limit(result: Result) -> list[Text]:
     """What no bandwidth can go beyond."""
-    limit = result.get("sampled", {}).get("sample_time_limit")
+    limit = sample_time_limit(result)
     return [] if limit is None else [Text(f"However large the bandwidth, C needs Ts < {down(limit)} s.")]
 
 
 # -- tube and metric
 
 
-def _tube(result: Mapping[str, Any]) -> list[RenderableType]:
-    tube = result["tube"]
-    line = f"rho = {up(tube['rho'])}"
-    if "rho_r" in tube:
-        line += f" = {up(tube['rho_r'])} (rho_r) + {up(tube['rho_a'])} (rho_a)"
-    lines = [f"{line}; epsilon = {short(tube['epsilon'])}"]
-    if widths := tube.get("half_widths"):
-        units = result["spec"]["effective"]["system"].get("units", {})
-        sides = (f"{name} {up(width)} {units.get(name, '')}".rstrip() for name, width in widths.items())
-        lines.append(f"half-widths: {', '.join(sides)}")
-    return [*map(Text, lines), *_in_the_long_run(result)]
+def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
+    lines = [f"rho = {radii(tube)}; epsilon = {short(tube.epsilon)}"]
+    if tube.half_widths:
+        lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
+    found = (f"in the long run |x - x*| <= {up(radius)} with {title}" for title, radius in long_run(result))
+    return [*map(Text, lines), *map(Text, found)]
 
 
-def _in_the_long_run(result: Mapping[str, Any]) -> list[Text]:
+def radii(tube: TubeData) -> str:
+    """The radius and its parts."""
+    parts = "" if tube.rho_r is None else f" = {up(tube.rho_r)} (rho_r) + {up(tube.rho_a)} (rho_a)"
+    return f"{up(tube.rho)}{parts}"
+
+
+def half_widths(result: Result, widths: Mapping[str, float]) -> str:
+    """The half-width of every state."""
+    units = result.spec.effective.system.units
+    return ", ".join(
+        f"{name} {up(widths[name])} {units.get(name, '')}".rstrip()
+        for name in result.spec.effective.system.states
+        if name in widths
+    )
+
+
+def long_run(result: Result) -> Iterator[tuple[str, float]]:
     """The radius that remains when the initial error has died out, for each certificate that holds."""
     if horizon(result) is not None:
-        return []
-    found = [
-        (title, data["ultimate_radius"])
-        for key, title in NAMES.items()
-        if (data := result.get(key, {})).get("verdict") == "certified"
-        and data.get("ultimate_radius") is not None
-    ]
-    return [Text(f"in the long run |x - x*| <= {up(radius)} with {title}") for title, radius in found]
+        return
+    for key, words in NAMES.items():
+        section = result.sections.get(key)
+        held = section is not None and section.verdict is Verdict.CERTIFIED
+        if section is not None and held and section.ultimate_radius is not None:
+            yield words, section.ultimate_radius
 
 
-def _metric(metric: Mapping[str, Any], safe_set: Mapping[str, Any]) -> list[RenderableType]:
-    body = [f"rate {short(metric['rate'], 12)} 1/s: {metric['verdict']} on the safe set"]
-    if (largest := metric.get("largest_rate")) is not None:
-        body[0] += f"; the metric supports rates up to {down(largest[0], 7)} 1/s"
-    if (margin := metric.get("margin")) and metric["verdict"] == "certified":
-        body[0] += f" (margin {down(margin[0], 3)} 1/s)"
-    for words, low, high in (
-        ("over the tube", "lower", "upper"),
-        ("on the safe set", "lower_on_set", "upper_on_set"),
+def _metric(result: Result, metric: MetricData) -> list[RenderableType]:
+    body = [f"rate {short(metric.rate, 12)} 1/s: {metric.verdict} on the safe set"]
+    if metric.largest_rate is not None:
+        body[0] += f"; the metric supports rates up to {down(metric.largest_rate.below, 7)} 1/s"
+    if metric.margin is not None and metric.verdict is Verdict.CERTIFIED:
+        body[0] += f" (margin {down(metric.margin.below, 3)} 1/s)"
+    body += [f"{bounds} {words}" for words, bounds in metric_bounds(metric)]
+    sides = (f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in safe_set(result))
+    return [Text(line) for line in [*body, f"safe set: {', '.join(sides)}"]]
+
+
+def safe_set(result: Result) -> Iterator[tuple[str, tuple[Fraction, Fraction]]]:
+    """The range of every state, in the order of the states."""
+    for name in result.spec.effective.system.states:
+        if name in result.safe_set:
+            yield name, result.safe_set[name]
+
+
+def metric_bounds(metric: MetricData) -> Iterator[tuple[str, str]]:
+    """Where the metric is bounded, and by what."""
+    for words, a, A in (
+        ("over the tube", metric.lower, metric.upper),
+        ("on the safe set", metric.lower_on_set, metric.upper_on_set),
     ):
-        if low in metric and high in metric:
-            a, A = metric[low], metric[high]
-            body.append(f"{down(a[0])} I <= M <= {up(A[1])} I {words}")
-    sides = ", ".join(f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in safe_set.items())
-    return [Text(line) for line in [*body, f"safe set: {sides}"]]
+        if a is not None and A is not None:
+            yield words, f"{down(a.below)} I <= M <= {up(A.above)} I"
 
 
-def _constants(result: Mapping[str, Any]) -> Table:
+def _constants(result: Result) -> Table:
     table = plain_table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
-    for name, item in result["constants"].items():
-        table.add_row(
-            item["symbol"], _described(result, name, item), proven(name, item), item["unit"], gap(item)
-        )
+    for name, item in result.constants.items():
+        table.add_row(item.symbol, _described(result, name, item), proven(name, item), item.unit, gap(item))
     return table
 
 
-def _described(result: Mapping[str, Any], name: str, item: Mapping[str, Any]) -> Text:
+def _described(result: Result, name: str, item: Bound) -> Text:
     text = Text(described(name))
-    if item.get("at") and (where := point(result, item["at"])):
+    if item.at is not None and (where := point(result, item.at)):
         text.append(f"\nat {where}", style="dim")
     return text
 
@@ -189,17 +231,17 @@ def described(name: str) -> str:
     return name.replace("_", " ") if meaning is None else meaning.words
 
 
-def proven(name: str, item: Mapping[str, Any]) -> str:
+def proven(name: str, item: Bound) -> str:
     """The side that the certificate uses: from below for an infimum, from above for a supremum."""
     meaning = MEANINGS.get(name)
     if meaning is not None and meaning.side == "below":
-        return f">= {down(item['below'], 6)}"
-    return f"<= {up(item['above'], 6)}"
+        return f">= {down(item.below, 6)}"
+    return f"<= {up(item.above, 6)}"
 
 
-def gap(item: Mapping[str, Any]) -> str:
+def gap(item: Bound) -> str:
     """How far the two proven sides are apart, relative to the larger one."""
-    low, high = item["below"], item["above"]
+    low, high = item.below, item.above
     if low is None or high is None or low < 0 < high:
         return UNKNOWN
     return "exact" if low == high else f"{up(100 * (high - low) / max(abs(low), abs(high)), 2)} %"
@@ -208,18 +250,18 @@ def gap(item: Mapping[str, Any]) -> str:
 # -- assumptions
 
 
-def _assumptions(result: Mapping[str, Any], verbose: bool) -> list[RenderableType]:
-    stated = result["assumptions"]
-    declared = result.get("declared", {})
+def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
+    stated, declared = result.assumptions, result.declared
     believed = [
         f"declared, believed as given: {', '.join(f'{k} <= {exact(v)}' for k, v in declared.items())}"
     ]
     if verbose:
         table = Table.grid(padding=(0, 1, 0, 0))
-        for item in [*map(assumption_of, stated), *(believed if declared else [])]:
+        for item in [*map(assumed, stated), *(believed if declared else [])]:
             table.add_row("-", Text(item))
         return [table]
-    proven = result.get("metric", {}).get("unique_geodesics", {}).get("holds", False)
+    test = None if result.metric is None else result.metric.unique_geodesics
+    proven = test is not None and test.holds
     geodesics = "exact geodesics (their uniqueness is proven)" if proven else "exact and unique geodesics"
     brief = (
         f"exact continuous-time control, full state, no noise, delay or saturation; {geodesics}; filter "

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.numbers import UNKNOWN, down, exact, short, up
-from tubecert.report.reasons import outcome_of, place, reason_of
-from tubecert.report.sections import VERDICTS
+from tubecert.report.reasons import outcome_of, reason_of
+from tubecert.report.sections import VERDICTS, place
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
 

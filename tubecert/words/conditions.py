@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from tubecert import kinds
+from tubecert.kinds.data import Role
+
 # what a certificate is called where its gains stand
-SECTIONS: Mapping[str, str] = {
-    "conditions_26": "A (26)",
-    "distance": "B distance",
-    "sampled": "C sampled",
+SECTIONS: Mapping[str, str] = {name.key: str(name) for name in kinds.NAMES}
+
+# what a set of gains is chosen for, in the order in which they are shown
+ROLES: Mapping[Role, str] = {
+    "asked": "asked for",
+    "least_bandwidth": "least omega",
+    "least_adaptation": "least Gamma",
+    "longest_sample": "omega = 1/Ts",
 }
 
 # a condition as it is named beside a certificate
@@ -19,6 +26,9 @@ NAMES: Mapping[str, str] = {
     "proven_gains": "nothing found",
     "any_gains": "nothing found",
 }
+
+# the quantity that the only condition of a certificate bounds
+SHOWN: Mapping[str, str] = {"distance": "sup D(t)", "sampled": "sup D(t), sampled"}
 
 SAYS: Mapping[str, str] = {
     "26a": "the initial error and the filter's share must fit into rho_r",
