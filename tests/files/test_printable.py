@@ -20,6 +20,7 @@ from rich.text import Text
 from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
+from tubecert.certificate.result import Certificate
 from tubecert.checking import Checked
 from tubecert.checking.expectations import Claim
 from tubecert.cli.app import app
@@ -199,7 +200,7 @@ def test_recheck_shows_unknown_members_and_the_hash_on_lines_of_their_own(member
 @pytest.mark.parametrize("render", [html.render, markdown.render])
 def test_the_line_to_copy_is_one_command_of_the_shell(render):
     name = "x'; touch hurt; echo $(id) `id` \"&"
-    page = render(planted(name, "spec", "effective", "name"))
+    page = render(Certificate.from_json(planted(name, "spec", "effective", "name")))
     import html as escapes
 
     lines = [line for line in escapes.unescape(page).splitlines() if "tubecert recheck" in line]
@@ -229,9 +230,8 @@ def test_markdown_shows_a_text_as_it_is(text):
 @settings(max_examples=100, deadline=None)
 @given(MARKUP)
 def test_nothing_in_a_certificate_is_markup_of_its_page(text):
-    reason = visible(text)
-    plain = markdown.render(planted("x", *PLACES[1]))
-    page = markdown.render(planted(reason, *PLACES[1]))
+    plain = markdown.render(Certificate.from_json(planted("x", *PLACES[0])))
+    page = markdown.render(Certificate.from_json(planted(visible(text), *PLACES[0])))
     parser = MarkdownIt("commonmark")
     count = [sum(token.type == "heading_open" for token in parser.parse(each)) for each in (plain, page)]
     assert count[0] == count[1]

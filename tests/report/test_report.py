@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rich.text import Text
 
 from tubecert.certificate import seal
+from tubecert.certificate.result import Certificate, Result
 from tubecert.findings import Finding, Location, Severity
 from tubecert.report import console, findings, progress
 from tubecert.report.numbers import down, exact, percent, short, up
@@ -36,12 +37,14 @@ def terminal(*, width=100, colored=False):
 
 
 def shown(result, *, verbose=False, **looks):
-    report = console.report(seal(result, {}), target="out/pendulum.certificate.json", verbose=verbose)
+    report = console.report(
+        Certificate.from_json(seal(result, {})), target="out/pendulum.certificate.json", verbose=verbose
+    )
     return terminal(**looks).text(report)
 
 
 def line(result):
-    return terminal().text(console.verdict_line(result)).rstrip("\n")
+    return terminal().text(console.verdict_line(Result.from_json(result))).rstrip("\n")
 
 
 @pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
@@ -168,9 +171,9 @@ def test_numbers_are_short():
     assert exact("4/3") == "4/3"
     assert exact("0.1234567890123456789") == "0.1234567890123456789"
     assert short("4/3") == "1.333"
-    assert percent([0.12345, 0.2]) == "12.3 %"
-    assert percent([-0.5, 0.2]) == "-50 %"
-    assert percent([None, 0.2]) == "-"
+    assert percent(0.12345) == "12.3 %"
+    assert percent(-0.5) == "-50 %"
+    assert percent(None) == "-"
     assert short(float("inf")) == "-"
 
 

@@ -34,6 +34,27 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """The initial state that is claimed about: a point, or anything within a radius of the plan's start."""
+
+    at: tuple[str, ...] | None = None
+    within: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claimed:
+    """What is claimed, in words of its own, exact texts; `recheck` derives it again from the specification."""
+
+    id: Literal["tube"]
+    horizon: str | None
+    for_all_time: Literal["autonomous", "periodic"] | None
+    period: str | None
+    domain: Mapping[str, tuple[str, str]]
+    start: Start
+    uncertainty: Literal["bounds", "expression", "expression or bounds"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Overrides:
     """What the command line changed."""
 
@@ -213,6 +234,7 @@ class Result:
     verdict: Verdict
     formulas: Literal["corrected", "as-printed"]
     spec: Source
+    claim: Claimed
     overrides: Overrides
     effort: Work
     plan: PlanData
@@ -228,6 +250,15 @@ class Result:
     sections: Mapping[str, SectionData] = field(default_factory=dict, metadata=keyed(_sections))
     elasticities: Mapping[str, Mapping[str, float]] | None = None
     decided_by: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        states = set(self.spec.effective.system.states)
+        widths = None if self.tube is None else self.tube.half_widths
+        for what, named in (("safe_set", self.safe_set), ("tube.half_widths", widths)):
+            if named is not None and set(named) != states:
+                raise ValueError(f"{what} is not about the states of the specification")
+        if not set(self.decided_by) <= set(self.sections):
+            raise ValueError("decided_by names a section that is not there")
 
     @property
     def asked(self) -> bool:

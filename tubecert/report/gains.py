@@ -66,7 +66,7 @@ def rows(result: Result) -> Iterator[Gains]:
             yield Gains(
                 section=key,
                 verdict=section.verdict,
-                decides=key in result.decided_by and pair is decisive,
+                decides=key in result.decided_by and pair == decisive,
                 pair=pair,
             )
 

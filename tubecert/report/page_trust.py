@@ -45,5 +45,5 @@ _DECLARED = {"h": "|h|", "h_x": "|dh/dx|", "h_t": "|dh/dt|"}
 
 def declared(result: Result) -> Iterator[str]:
     """What the specification declares and nobody proves."""
-    for name, value in result.declared.items():
+    for name, value in sorted(result.declared.items()):
         yield f"{_DECLARED.get(name, name)} <= {up(value, 12)} on the tube"
