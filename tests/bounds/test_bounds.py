@@ -18,6 +18,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import graph, symbol
 from tubecert.model import build, time_period
 from tubecert.spec import load
+from tubecert.trajectory import Plan
 
 ROOT = Path(__file__).parents[2]
 RHO_TWO = 0.7
@@ -559,6 +560,20 @@ def test_another_metric_than_the_stored_one_is_noticed(three, three_truth):
     lower, upper = other.metric_bounds()
     with pytest.raises(AssertionError):
         check_all(replace(three[1], lower=lower, upper=upper), three_truth)
+
+
+@pytest.mark.parametrize("away", ["rounded", "1e-300", "1e-170", "0.001"])
+def test_a_start_a_rounding_away_from_the_plan_has_a_distance(away):
+    """x0 is an irrational start rounded to a double, or so near that squares underflow."""
+    model = two_state_model()
+    root = graph.sqrt(graph.constant(2))
+    start = (root, graph.constant(0)) if away == "rounded" else (graph.constant(0),) * 2
+    x0 = (Fraction(math.sqrt(2)), Fraction(0)) if away == "rounded" else (Fraction(away), Fraction(0))
+    suprema = Suprema(model, Plan(start, (graph.constant(0),), None), 1.0, None, EFFORT)
+    found = KnownStart(x0).distance(suprema, suprema.metric_bounds())
+    exact = 1e-16 if away == "rounded" else float(away)  # |sqrt(2) - its float|, to 3 %; M is about 1/4
+    assert 0 <= found.below <= exact
+    assert 0.4 * exact <= found.above <= exact + 1e-15
 
 
 # -- periods -------------------------------------------------------------------------------------------------

@@ -73,7 +73,7 @@ class KnownStart:
         delta = self._delta(start)
         if all(d is ZERO for d in delta):
             return Constant.exactly(0.0)
-        s = symbol("s")
+        s = symbol("s#")  # no state can have this name
         along = dict(
             zip(suprema.model.states, (a + s * d for a, d in zip(start, delta, strict=True)), strict=True)
         )
@@ -139,4 +139,6 @@ def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
         for j in range(t.shape[-1]):
             entry = entry + delta[:, j, 0] * t[:, i, j]
         total = total + entry**2
-    return sqrt(total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])).sanitised()
+    square = total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])
+    # where the start is a rounding away from the plan's, squares reach 0 and are rounded below it
+    return sqrt(Interval(np.maximum(square.lo, 0.0), square.hi)).sanitised()

@@ -27,7 +27,7 @@ def transpose(a: Rows) -> Matrix:
 
 
 def multiply(a: Rows, b: Rows) -> Matrix:
-    """A b."""
+    """The product a b."""
     columns = transpose(b)
     return matrix([[dot(row, column) for column in columns] for row in a])
 
@@ -39,7 +39,7 @@ def dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
 
 
 def combine(p: Expression | int | Fraction, a: Rows, q: Expression | int | Fraction, b: Rows) -> Matrix:
-    """P a + q b."""
+    """The sum p a + q b."""
     return matrix([[p * x + q * y for x, y in zip(r, s, strict=True)] for r, s in zip(a, b, strict=True)])
 
 
@@ -54,7 +54,7 @@ def jacobian(entries: Sequence[Expression], names: Sequence[str]) -> Matrix:
 
 
 def differentiate(a: Rows, name: str) -> Matrix:
-    """da/d(name), entry by entry."""
+    """The derivative da/d(name), entry by entry."""
     width = len(a[0])
     flat = derivatives([e for row in a for e in row], name)
     return matrix([flat[i : i + width] for i in range(0, len(flat), width)])

@@ -61,7 +61,7 @@ class Setting:
 
     @property
     def rate(self) -> Ball:
-        """Lambda."""
+        """The rate lambda."""
         return exact(self.system.rate)
 
     @property

@@ -212,7 +212,7 @@ def matrix_replaced(a: Rows, values: Mapping[str, Term]) -> Matrix:
 
 
 def times(a: Rows, b: Rows) -> Matrix:
-    """A b."""
+    """The product a b."""
     columns = list(zip(*b, strict=True))
     return [
         [sum((x * y for x, y in zip(row, column, strict=True)), start=NOUGHT) for column in columns]

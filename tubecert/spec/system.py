@@ -21,7 +21,7 @@ _SYMMETRY_BUDGET = 20_000
 def read_dynamics(
     f: Field | None, B: Field | None, names: Names
 ) -> tuple[tuple[Term, ...], TermMatrix] | None:
-    """F (n) and B (n, m)."""
+    """The drift f, of n entries, and the input matrix B, n x m."""
     n, m = len(names.states), len(names.inputs)
     drift = f.terms(n, names.of_state(), "expressions, one per state") if f else None
     inputs = B.term_matrix(n, m, names.of_state()) if B else None
