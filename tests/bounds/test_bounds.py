@@ -537,6 +537,7 @@ def test_a_broken_derivative_rule_is_noticed(three, three_truth, op, monkeypatch
         check_all(replace(three[1], **broken), three_truth)
 
 
+@pytest.mark.slow
 def test_a_broken_sine_rule_is_noticed(two, two_truth, monkeypatch):
     monkeypatch.setattr(graph, "_slope", wrong_rule("sin"))
     model = two_state_model()

@@ -104,6 +104,7 @@ def test_cutting_a_box_loses_no_point_of_the_tube(name, variables, data, rho):
             assert high[0, k] <= hi[k]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)

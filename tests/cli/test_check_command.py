@@ -105,6 +105,7 @@ def codes(result) -> list[str]:
 RANGES = "rho: [0.039, 0.04], bandwidth: [18, 19], adaptation_rate: [1e6, 2e6], sample_time: [0.09, 0.1]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "expect", "code", "findings"),
     [
@@ -377,6 +378,7 @@ def test_sarif():
     assert "locations" not in third
 
 
+@pytest.mark.slow
 def test_sarif_of_real_files():
     paths = [str(path) for path in sorted((ROOT / "tests/specs/bad").glob("*.yaml"))]
     log = valid_sarif(run(*paths, "--format", "sarif").stdout)

@@ -590,6 +590,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tubecert.cli.app", "typer", "tubecert.cli.certify", "tubecert.spec"])
 def test_interrupted_while_modules_are_imported(folder, name):
     command = process("certify", SPEC, code=INTERRUPTING.format(name=name))

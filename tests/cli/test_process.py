@@ -102,6 +102,7 @@ def test_an_exception_that_nobody_expects_is_an_internal_error(before):
     assert errors.startswith("tubecert: internal error")
 
 
+@pytest.mark.slow
 def test_out_of_memory_is_no_defect():
     code, _, errors = ended(
         started("certify", SPEC, before=CERTIFY.format(body="raise MemoryError('4 TiB')"))
@@ -148,6 +149,7 @@ sys.meta_path.insert(0, Stop())
         assert ended(started("certify", SPEC, before=before)) == (143, "", "tubecert: terminated\n")
 
 
+@pytest.mark.slow
 def test_nohup_is_honoured(folder):
     def ignore():
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -158,6 +160,7 @@ def test_nohup_is_honoured(folder):
     assert list(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_what_was_registered_for_the_end_is_done_and_output_is_whole(folder):
     before = "import atexit; atexit.register(print, 'the end')\n" + CERTIFY.format(body="pass")
     code, output, _ = ended(started("certify", SPEC, "-q", before=before))

@@ -72,6 +72,7 @@ def test_kappa_is_the_supremum_and_stable_at_equal_rates(ratio):
         assert value.hi - value.lo < 1e-13
 
 
+@pytest.mark.slow
 def test_tight_kernel_interval_contains_the_value_at_high_precision():
     with mpmath.workdps(80):
         for _ in range(300):

@@ -173,6 +173,7 @@ def test_every_value_lies_in_the_hull_of_the_vertices(dim, degree, data):
         assert sum(w * q for w, q in zip(weights, values, strict=True)) <= support(e, 0, c)
 
 
+@pytest.mark.slow
 def test_roundings_of_products_and_sums_are_covered():
     """Bilinear forms whose squares are negligible: nothing but the slack covers the sums over many vertices."""
     rng = np.random.default_rng(4)
@@ -321,6 +322,7 @@ def test_variables_beyond_the_vertices_keep_the_whole_curvature(monkeypatch):
         assert bottom(e) <= least
 
 
+@pytest.mark.slow
 @given(data=st.data(), kept=st.integers(0, 3))
 @QUICK
 def test_any_number_of_vertices_contains(data, kept):

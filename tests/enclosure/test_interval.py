@@ -116,6 +116,7 @@ def test_every_corner_counts(name, a):
             assert most - max(corners) <= Fraction(1, 10**14)
 
 
+@pytest.mark.slow
 @given(data=st.data(), n=st.integers(-7, 9))
 @SETTINGS
 def test_powers_contain_the_exact_result(data, n):

@@ -77,6 +77,7 @@ def definite(rng, n, condition):
     return 0.5 * (a + a.T)
 
 
+@pytest.mark.slow
 def test_badly_scaled_pencils_at_points():
     """Condition numbers up to 1e11, values of every size and sign, targets on both sides: no tolerance."""
     rng = np.random.default_rng(5)

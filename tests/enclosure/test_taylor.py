@@ -61,6 +61,7 @@ parts = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(several=st.lists(texts(leaves=5), min_size=4, max_size=4), box=boxes, part=parts)
 @SETTINGS
 def test_expansions_contain_the_function(several, box, part):

@@ -150,6 +150,7 @@ def test_derivatives_agree_with_sympy(name: str, text: str, point: dict[str, Fra
         assert close(ours, by_sympy(text, point, name))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(text=texts(), point=points)
 def test_simplification_keeps_the_value(text: str, point: dict[str, Fraction]) -> None:

@@ -308,6 +308,7 @@ def test_limits_are_not_narrower_than_promised() -> None:
     assert free_symbols([read(distinct).expression]) == {"x", "y"}
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(text=texts())
 def test_random_expressions_are_accepted(text: str) -> None:

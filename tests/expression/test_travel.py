@@ -31,6 +31,7 @@ def test_a_copy_is_the_same_object(e: Expression) -> None:
     assert all(other is e for other in copies(pickle.loads(pickle.dumps([e, (e,)]))[1][0]))
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(text=texts())
 def test_identity_survives_pickle(text: str) -> None:

@@ -114,6 +114,7 @@ def checked(text: str) -> list[Checked]:
     return [Checked(path=place.file, findings=findings, code=ExitCode.INVALID, claims=claims)]
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(FOREIGN)
 def test_no_format_passes_on_what_does_not_print(text):
@@ -172,6 +173,7 @@ PLACES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PLACES, ids=".".join)
 @pytest.mark.parametrize("text", ["a\nconfirmed b: the certificate says certified", "\x1b[2J", "\u202ex"])
 def test_a_certificate_holds_no_character_that_does_not_print(path, text):

@@ -43,6 +43,7 @@ def test_every_dependency_is_said_to_decide_or_to_show():
     assert {*libraries.DECIDING, *libraries.SHOWING} == needed()
 
 
+@pytest.mark.slow
 def test_dependencies_are_what_is_imported():
     found = frozenset().union(*map(libraries_of, MODULES))
     foreign = found - set(sys.stdlib_module_names) - {"tubecert"}

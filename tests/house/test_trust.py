@@ -52,6 +52,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 TRUSTED = [path for path in MODULES if room_of(name_of(path)) in TRUSTED_ROOMS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", TRUSTED, ids=name_of)
 def test_what_is_trusted_imports_only_what_is_trusted(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -89,6 +90,7 @@ def test_gains_become_certified_in_one_module_only(path):
     assert not made or name_of(path) == SAYS_CERTIFIED, made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_proofs_are_made_by_the_kernel_alone(path):
     """Nobody else calls `Proof`, nor goes round its constructor."""

@@ -215,6 +215,7 @@ CHECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS)
 def test_what_is_proven_on_a_box_is_true(name):
     CHECKS[name]()

@@ -79,6 +79,7 @@ def flipped(data):
     return data[:-100] + bytes([data[-100] ^ 1]) + data[-99:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -235,6 +236,7 @@ def test_without_a_place_for_the_key_nothing_is_kept(kernels, tmp_path, monkeypa
 # what is certified
 
 
+@pytest.mark.slow
 def test_certification_neither_loads_kernels_nor_numba(tmp_path):
     """A simulation may falsify a certificate; what certifies does not even import what simulates."""
     (tmp_path / "flat.yaml").write_text(FLAT)

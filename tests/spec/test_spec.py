@@ -84,6 +84,7 @@ def test_bad_files_are_refused_where_they_say(path: Path) -> None:
         assert len(found) == len(expected), "\n".join(map(str, found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
 def test_the_parser_without_c_agrees(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """PyYAML may come without its C part; only the wording about malformed YAML may then differ."""

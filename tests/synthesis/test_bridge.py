@@ -150,6 +150,7 @@ def test_a_solver_that_is_not_there_is_refused_with_those_that_are(solver, why, 
     assert not target.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text", ["cvxpy", "cvxpy:", "cvxpy:A B", "CVXPY:SCS", "mosek", "cvxpy:" + 40 * "A", ""]
 )
@@ -169,6 +170,7 @@ def test_the_specification_names_it_too():
 # -- whole runs
 
 
+@pytest.mark.slow
 def test_metrics_are_found_and_proven_as_ever(tmp_path):
     target = tmp_path / "metric.json"
     found = {}
@@ -180,6 +182,7 @@ def test_metrics_are_found_and_proven_as_ever(tmp_path):
     assert found["cvxpy:clarabel"] == pytest.approx(found["clarabel"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_lie_writes_no_metric(monkeypatch, tmp_path):
     monkeypatch.setattr(
         conic,

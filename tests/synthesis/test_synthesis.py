@@ -184,6 +184,7 @@ def test_the_two_state_metric_is_as_good_as_the_best_published():
     assert again.verdict == "certified"
 
 
+@pytest.mark.slow
 def test_the_rate_is_searched_up_to_what_is_possible():
     """A double integrator in a box has a metric of any rate; its condition number grows, and a limit ends it."""
     double = model(("x", "y"), ("u",), ("y", "0"), [["0"], ["1"]])

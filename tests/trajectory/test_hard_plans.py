@@ -163,6 +163,7 @@ def test_many_inputs_are_no_hang(entry):
     assert len(model.pivots[0]) == 1
 
 
+@pytest.mark.slow
 def test_a_minor_that_is_not_the_only_one_refutes_nothing():
     """Each of x and y vanishes somewhere, both together never: B = (x, y) on a set without the origin."""
     model = replace(LINEAR, B=((x,), (y,)))

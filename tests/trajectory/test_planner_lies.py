@@ -58,6 +58,7 @@ LIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIES)
 def test_knots_that_are_not_the_plan_asked_for_are_refused(name, knots):
     assert refusal(SPEC, TASK, knots) is None
@@ -81,6 +82,7 @@ def test_a_miss_is_decided_exactly():
     assert misses(task, (3 + allowed * (1 + Fraction(1, 10**9)), Fraction(4)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", ["0.9", "1.01", "-1", "1e300"])
 def test_inputs_of_the_cache_that_lead_elsewhere_are_planned_anew(factor, knots, monkeypatch):
     """An entry with a right seal: scaled by .9 it once was certified as a plan with a goal (R6)."""
@@ -97,6 +99,7 @@ def test_inputs_of_the_cache_that_lead_elsewhere_are_planned_anew(factor, knots,
     assert calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "lie",
     [
@@ -114,6 +117,7 @@ def test_a_planner_that_says_found_and_lies_certifies_nothing(lie, monkeypatch, 
         certify(SPEC, Options(conditions="distance"))
 
 
+@pytest.mark.slow
 def test_few_knots_end_where_they_were_planned_to():
     """The planner's own steps were coarser than those of the curve, which then missed the target by 1.4."""
     few = load_text(TEXT.replace("  knots: 101", "  knots: 21"), "spec.yaml")
