@@ -244,3 +244,256 @@ def campaign(certificate, count, seed, report=None):
         if not is_harmless(certificate["result"], path, old, new):
             wrong.append((shape(path, indices=True), kind, old, new))
     return refused, dict(accepted), wrong
+
+
+# -- changes of structure: keys removed, added, renamed, moved; types; extreme numbers; names of other kinds
+
+STRUCTURES = (
+    "removed",
+    "added",
+    "renamed",
+    "moved",
+    "swapped",
+    "retyped",
+    "wrapped",
+    "listed",
+    "extreme",
+    "named",
+)
+EXTREME = [
+    "1e-999999999",
+    "1e999999999",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "-0.0",
+    "9" * 4000,
+    "0." + "3" * 4000,
+    "0.1000000000000000055511151231257827",
+    "1E400",
+    "00",
+    "1.",
+    '"1e-999999999"',
+    '"9**9**9"',
+    '"12**12**12"',
+    f'"{"9" * 4000}"',
+    '"1/0"',
+    '"nan"',
+    '"Infinity"',
+    '"\\u0661"',
+    '"1_0"',
+    '"0x10"',
+    "NaN",
+    "-Infinity",
+]
+BAD_NAMES = ("pi", "t", "True", "None", "sin", "abs", "lambda", "e 1", "1e5", "", "x*", "\u03c0", "mu#", "s#")
+
+# members that may be there or not, wherever they come from: they make no claim, or are examined as they stand
+MAY_BE_ADDED = [
+    r"spec\.effective\.system\.(units|parameters)\.\w+",
+    r"spec\.effective\.(expect|simulation|obstacles)",
+    r"spec\.effective\.conditions\.kernel",
+    r"overrides\.\w+",
+    r"reasons\[\]\.(binds|below_twice_rate|predictor_gain|relax|at)",
+    r"constants\.\w+\.at(\.t)?",
+    r"elasticities\.\w+\.\w+",
+    r"plan\.samples",
+    r"run\b.*",
+]
+OF_STRUCTURE = [
+    (r"spec\.effective\.(name|expect|simulation|obstacles)\b.*", anything),
+    (r"spec\.effective\.system\.(units|parameters)\b.*", anything),
+    (r"spec\.effective\.trajectory\.(Q|R|knots|file)\b.*", anything),  # how the plan was found
+    (r"spec\.effective\.metric\.bounds\b.*", anything),  # declared, and nothing rests on them
+    (r"spec\.effective\.conditions\.kernel", anything),  # examined with the other kernel
+    (r"(\w+\.)*curve\[\]", anything),  # a point less, twice, or elsewhere in the list
+    (r"(reasons|decided_by)\[\]", anything),
+    (r"reasons\[\]\.relax\[\].*", anything),
+    (r"(synthesis|elasticities)\b.*", anything),
+    (r"\w+\.margins_around", anything),
+    (r"plan\.samples", anything),
+]
+
+
+def allowed(result, path, old, new):
+    """Whether a member may be changed so (new None: removed), or is harmless as a single field is."""
+    return is_harmless(result, path, old, new) or any(
+        re.fullmatch(pattern, shape(path)) and serves(old, new) for pattern, serves in OF_STRUCTURE
+    )
+
+
+def may_be_added(path):
+    return any(re.fullmatch(pattern, shape(path)) for pattern in MAY_BE_ADDED)
+
+
+def value_at(result, path):
+    for key in path:
+        result = result[key]
+    return result
+
+
+def restructured(random_, original, kind):
+    """(a result of another structure, the paths that were changed with their old and new values)."""
+    result = copy.deepcopy(original)
+    shapes = fields(original)
+    names = sorted(shapes)
+
+    def some(accepts=lambda value: True):
+        for _ in range(200):
+            path = random_.choice(shapes[random_.choice(names)])
+            if accepts(value_at(original, path)):
+                return path
+        return None
+
+    path = some()
+    if kind in ("swapped", "added"):
+        path = some(lambda value: isinstance(value, dict) and len(value) > 1)
+    if kind in ("removed", "renamed", "moved"):
+        while isinstance(path[-1], int):
+            path = some()
+    if kind == "listed":
+        path = some(lambda value: isinstance(value, list) and value)
+    if kind == "extreme":
+        path = some(
+            lambda value: number(value) or (isinstance(value, str) and re.fullmatch(r"-?[\d./]+", value))
+        )
+    old = copy.deepcopy(value_at(original, path))
+    holder, key = value_at(result, path[:-1]), path[-1]
+    every_key = sorted({p[-1] for group in shapes.values() for p in group if isinstance(p[-1], str)})
+    if kind == "removed":
+        del holder[key]
+        return result, [("removed", path, old, None)]
+    if kind == "added":
+        inner = holder[key]
+        name = random_.choice([*every_key, "u_max", "torque", "", "Horizon", "verdict ", "__class__"])
+        if name in inner:
+            return None
+        value = (
+            copy.deepcopy(value_at(original, some()))
+            if random_.random() < 0.7
+            else random_.choice([1.0, "1", None, {}, []])
+        )
+        inner[name] = value
+        return result, [("added", (*path, name), None, value)]
+    if kind == "renamed":
+        name = random_.choice([*every_key, key.upper(), f"{key} ", f"{key}s"])
+        if name in holder:
+            return None
+        holder[name] = holder.pop(key)
+        return result, [("removed", path, old, None), ("added", (*path[:-1], name), None, old)]
+    if kind == "moved":
+        target = some(lambda value: isinstance(value, dict))
+        if target[: len(path)] == path or key in value_at(result, target):
+            return None
+        value_at(result, target)[key] = holder.pop(key)
+        return result, [("removed", path, old, None), ("added", (*target, key), None, old)]
+    if kind == "swapped":
+        inner = holder[key]
+        one, two = random_.sample(sorted(inner), 2)
+        if inner[one] == inner[two]:
+            return None
+        inner[one], inner[two] = inner[two], inner[one]
+        return result, [("changed", (*path, k), inner[o], inner[k]) for k, o in ((one, two), (two, one))]
+    if kind == "retyped":
+        holder[key] = random_.choice(
+            [0, 1.0, "", "certified", True, False, None, [], {}, [old], {"x": old}, str(old)]
+        )
+    elif kind == "wrapped":
+        holder[key] = random_.choice([[old], {"value": old}, [old, old]])
+    elif kind == "listed":
+        items, place = holder[key], random_.randrange(len(old))
+        how = random_.randrange(3)
+        if how == 0:
+            del items[place]
+        elif how == 1:
+            items.insert(place, copy.deepcopy(items[place]))
+        else:
+            random_.shuffle(items)
+        if items == old:
+            return None
+        return result, [("listed", (*path, 0), old, items)]
+    elif kind == "extreme":
+        holder[key] = "@extreme@"
+    elif kind == "named":
+        return _named(random_, result)
+    return result, [("changed", path, old, holder[key])]
+
+
+def _named(random_, result):
+    """A state or an input renamed everywhere, to a name of its own or to one that means something else."""
+    system = result["spec"]["effective"]["system"]
+    old = random_.choice([*system["states"], *system["inputs"]])
+    good = random_.random() < 0.2
+    new = "zeta" if good else random_.choice([*BAD_NAMES, *system["states"], *system["inputs"]])
+    if new == old:
+        return None
+    text = re.sub(rf"(?<![\w]){re.escape(old)}(?![\w])", new.replace("\\", ""), json.dumps(result))
+    try:
+        return json.loads(text), [("named", ("names", "good" if good else "bad"), old, new)]
+    except ValueError:
+        return None
+
+
+def resealed(certificate, result, random_):
+    """The text of a certificate with both hashes made right."""
+    inner = result.get("spec") if isinstance(result, dict) else None
+    if isinstance(inner, dict) and isinstance(inner.get("effective_hash"), str) and "effective" in inner:
+        inner["effective_hash"] = _hash(inner["effective"])
+    text = json.dumps({**certificate, "hash": _hash(result), "result": result})
+    return text.replace('"@extreme@"', random_.choice(EXTREME))
+
+
+def _hash(data):
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return "sha256:" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def structural_campaign(certificate, count, seed, report=None):
+    """`count` changes of structure: refused, accepted by kind and shape, and those that must not be (or crash)."""
+    random_, memory = random.Random(seed), {}
+    refused, accepted, wrong, done = 0, defaultdict(int), [], 0
+    same = json.dumps(certificate["result"])
+    while done < count:
+        kind = STRUCTURES[done % len(STRUCTURES)]
+        made = restructured(random_, certificate["result"], kind)
+        if made is None:
+            continue
+        result, changes = made
+        text = resealed(certificate, result, random_)
+        if json.dumps(result) == same:
+            continue  # a hash that is made right again, a text for a text
+        done += 1
+        if report is not None and done % 100 == 0:
+            report(
+                f"{done} changes: {refused} refused, {sum(accepted.values())} harmless, {len(wrong)} wrong"
+            )
+        try:
+            code = recheck(
+                resealed(certificate, result, random_),
+                "tampered",
+                BUDGET,
+                memory=memory,
+                to_first_failure=True,
+            ).exit_code
+        except TubecertError as error:
+            code = error.exit_code
+        except Exception as error:  # an internal error is a finding too
+            wrong.append(("crash", kind, repr(error)[:100], [shape(path) for _, path, _, _ in changes]))
+            continue
+        if code != ExitCode.CERTIFIED:
+            refused += 1
+            continue
+        accepted[kind, shape(changes[0][1])] += 1
+        if not all(_harmless_change(certificate["result"], *change) for change in changes):
+            wrong.append(
+                (kind, [(shape(path), str(old)[:40], str(new)[:40]) for _, path, old, new in changes])
+            )
+    return refused, dict(accepted), wrong
+
+
+def _harmless_change(result, how, path, old, new):
+    if how == "added":
+        return may_be_added(path)
+    if how == "named":
+        return path[-1] == "good"
+    return allowed(result, path, old, new)

@@ -1,6 +1,10 @@
-"""Random single-field changes of the shipped certificates, hash made right: none may recheck unless it is harmless.
+"""Random changes of the shipped certificates, hashes made right: none may recheck unless it is harmless.
 
     python tests/harness/tamper.py --count 10000 configs/three_state.yaml configs/two_state.yaml
+    python tests/harness/tamper.py --structural --count 2000 configs/three_state.yaml configs/two_state.yaml
+
+Without `--structural` single fields are changed; with it keys are removed, added, renamed and moved, members swapped,
+types changed, numbers written in extreme ways, states and inputs renamed.
 
 The kinds of harmless changes are listed in `tests/tampers.py` and in docs/recheck.md. Exit code 1 if another kind was
 accepted. Outcomes of claims that a change does not touch are kept, so that a change costs what it touches.
@@ -40,11 +44,13 @@ def main() -> int:
     parser.add_argument("specs", nargs="+")
     parser.add_argument("--count", type=int, default=10_000, help="changes, shared evenly")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--structural", action="store_true", help="change the structure, not single fields")
     given = parser.parse_args()
     failed = False
     for path in given.specs:
         start = time.perf_counter()
-        refused, accepted, wrong = tampers.campaign(
+        campaign = tampers.structural_campaign if given.structural else tampers.campaign
+        refused, accepted, wrong = campaign(
             certified(path),
             given.count // len(given.specs),
             given.seed,
@@ -55,7 +61,7 @@ def main() -> int:
             f"{path}: {refused} refused, {sum(accepted.values())} harmless, {len(wrong)} wrong, {seconds:.0f} s"
         )
         for name, count in sorted(accepted.items(), key=lambda item: -item[1]):
-            print(f"  accepted {count:5}  {name}")
+            print(f"  accepted {count:5}  {' '.join(name) if given.structural else name}")
         for case in wrong:
             print(f"  WRONG {case}")
         sys.stdout.flush()

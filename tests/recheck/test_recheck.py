@@ -81,6 +81,19 @@ def test_a_changed_field_is_never_confirmed_unless_it_is_harmless(shipped, path,
     assert accepted  # harmless changes are not refused
 
 
+@pytest.mark.parametrize(
+    ("path", "count"),
+    [(THREE, 200), pytest.param(TWO, 100, marks=pytest.mark.slow)],
+    ids=["three_state", "two_state"],
+)
+def test_a_changed_structure_is_never_confirmed_unless_it_is_harmless(shipped, path, count):
+    """Keys removed, added, renamed, moved; types; extreme numbers; names of other kinds; all hashes made right."""
+    refused, accepted, wrong = tampers.structural_campaign(shipped(path), count, seed=11)
+    assert wrong == []
+    assert refused > 0.8 * count
+    assert accepted
+
+
 @pytest.mark.slow
 def test_every_constant_that_is_understated_is_named(shipped):
     document, memory = shipped(THREE), {}

@@ -542,17 +542,19 @@ def _constants(node: Node, result: Members) -> dict[str, Enclosure]:
     has_gains = "conditions_26" in result and result["conditions_26"].mapping().get("bandwidth") is not None
     names = (*MEASURED, *(DERIVED if has_gains else ()))
     own = node.closed(*names)
-    return {name: _constant(own[name]) for name in names}
+    n = len(result["safe_set"].mapping())
+    return {name: _constant(own[name], n) for name in names}
 
 
-def _constant(node: Node) -> Enclosure:
+def _constant(node: Node, n: int) -> Enclosure:
     labels = ("symbol", "equation", "unit")
     own = node.closed("below", "above", *labels, optional=("at",))
     for key in labels:
         own[key].text()
     if "at" in own:
         point = own["at"].closed("x", optional=("t",))
-        point["x"].numbers()
+        if len(point["x"].numbers()) not in (0, n):
+            raise point["x"].refused(f"must have {n} entries")
         point.get("t", Node.number)
     return Enclosure(own.known("below", Node.number), own.known("above", Node.number))
 
