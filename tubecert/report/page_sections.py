@@ -111,7 +111,10 @@ def _gains(result: Result) -> Iterator[Block]:
     found = list(rows(result))
     if found:
         columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "Ts (s)", "margin left")
-        note = "* decides the verdict. Rows do not mix: each set of gains was proven by itself."
+        note = (
+            "Each row was proven on its own: do not take ω from one row and Γ from another. The row marked * "
+            "decides the verdict."
+        )
         decided = any(row.decides for row in found)
         yield Table(columns=columns, rows=tuple(map(_gains_row, found)), note=note if decided else "")
     if missing := [

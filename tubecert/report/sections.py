@@ -117,7 +117,8 @@ def _gains(result: Result) -> list[RenderableType]:
         if any(row.decides for row in found):
             body.append(
                 Text(
-                    "* decides the verdict; rows do not mix; omega in rad/s, Ts in s",
+                    "Each row was proven on its own: do not take omega from one row and Gamma from another. The row "
+                    "marked * decides the verdict. omega is in rad/s, Ts in s.",
                     style="dim",
                 )
             )
