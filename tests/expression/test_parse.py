@@ -354,3 +354,15 @@ def test_no_variable_can_have_a_name_that_reads_as_something_else(name: str) -> 
 def test_a_number_is_not_what_is_left_of_something_undefined(text: str) -> None:
     with pytest.raises(ExpressionError, match="not a rational number"):
         parse_number(text)
+
+
+def test_what_powers_multiply_to_is_bounded_for_every_sign() -> None:
+    assert refusal("((x**-12)**-12)**-12").kind == "limit"
+    assert refusal("((x**12)**-12)**-2").kind == "limit"
+    assert refusal("(1e40)**-12*(1e300)**-12").kind == "limit"
+    assert refusal("(1e300)**-12*x").kind == "limit"
+
+
+def test_a_divisor_that_is_zero_is_no_constant_to_forget() -> None:
+    for text in ("1/0", "x/0", "0/0", "0**-1", "x/(y - y)"):
+        assert refusal(text).message == "division by zero"
