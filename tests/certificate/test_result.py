@@ -2,17 +2,36 @@
 
 import copy
 import json
+from dataclasses import fields
+from pathlib import Path
 
 import certificates
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import tubecert
 from tubecert.certificate.result import Result
-from tubecert.claims import MetricContraction, TubeInSafeSet
+from tubecert.claims import (
+    Assumption,
+    Claim,
+    Failure,
+    HalveConstant,
+    MendPlan,
+    MetricContraction,
+    Outcome,
+    PlanRemedy,
+    Relax,
+    TubeInSafeSet,
+)
 from tubecert.records import FormError, to_json
 from tubecert.verdict import Verdict
+from tubecert.words import advice as advice_words
+from tubecert.words import claims as claim_words
 
+SCHEMA = json.loads(
+    (Path(tubecert.__file__).parent / "schemas" / "certificate.schema.json").read_text(encoding="utf-8")
+)
 RESULTS = {
     "certified": certificates.certified(),
     "refuted metric": certificates.refuted_metric(),
@@ -116,3 +135,37 @@ def test_absurd_numbers_are_refused_at_once():
         data["tube"]["rho"] = text
         with pytest.raises(FormError, match=r"result\.tube\.rho is not a number"):
             Result.from_json(data)
+
+
+FAMILIES = {
+    "claim": Claim,
+    "failure": Failure,
+    "relax": Relax,
+    "plan_remedy": PlanRemedy,
+    "assumption": Assumption,
+    "outcome": Outcome,
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_schema_knows_every_id_and_its_parameters(name):
+    known = {
+        next(item["const"] for item in member["properties"].values() if "const" in item): set(
+            member["properties"]
+        )
+        for member in SCHEMA["$defs"][name]["anyOf"]
+    }
+    family = FAMILIES[name]
+    assert known == {
+        tag: {family.key, *(item.name for item in fields(member))} for tag, member in family.family.items()
+    }
+
+
+@pytest.mark.parametrize("kind", [Claim, Relax, Failure])
+def test_every_id_has_words(kind):
+    tables = {
+        Claim: claim_words._MESSAGES,
+        Relax: {**advice_words._ACTIONS, HalveConstant: None, MendPlan: None},
+        Failure: claim_words._FAILURES,
+    }
+    assert set(kind.family.values()) <= set(tables[kind])
