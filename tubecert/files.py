@@ -1,16 +1,13 @@
-"""Files that users name are read here and nowhere else; files are replaced as a whole; what is kept between runs.
+"""Files that users name are read here and nowhere else, and files are replaced as a whole.
 
 A name may stand for anything: a pipe that nobody writes to, a device without end, a folder. Only regular files are
-read, and not more of them than their kind allows. A cache entry that is broken, altered, absent or unwritable counts
-as absent: it only costs time.
+read, and not more of them than their kind allows.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
-import json
 import os
 import stat
 import sys
@@ -24,7 +21,6 @@ from tubecert.findings import Finding, Location
 from tubecert.printable import visible
 
 STDIN: Final = "-"
-_LARGEST_ENTRY: Final = 64_000_000  # of what is kept between runs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,36 +118,3 @@ def replace(path: Path, data: bytes) -> None:
         with contextlib.suppress(OSError):
             Path(temporary).unlink()
         raise
-
-
-def kept_folder(kind: str) -> Path:
-    """Where things of a kind are kept."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".cache") / "tubecert" / kind
-
-
-def read_kept(kind: str, name: str) -> Any:
-    """The JSON data kept under a name; None if there are none, or they are not sealed as they were written."""
-    try:
-        with _opened(kept_folder(kind) / f"{name}.json") as file:
-            kept = json.loads(file.read(_LARGEST_ENTRY).decode())
-        return kept["data"] if kept["key"] == name and kept["seal"] == seal(kept["data"]) else None
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, RecursionError):
-        return None
-
-
-def keep(kind: str, name: str, data: Any) -> str:
-    """Keep JSON data under a name; the reason if that cannot be done, else nothing."""
-    text = json.dumps({"key": name, "seal": seal(data), "data": data})
-    try:
-        folder = kept_folder(kind)
-        folder.mkdir(parents=True, exist_ok=True)
-        replace(folder / f"{name}.json", text.encode())
-    except (OSError, RuntimeError) as error:
-        return str(error)
-    return ""
-
-
-def seal(data: Any) -> str:
-    """A hash of JSON data."""
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

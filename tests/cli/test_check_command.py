@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.resources
 import json
 import os
@@ -26,8 +27,9 @@ from tubecert.checking import Checked, cache
 from tubecert.checking.expectations import Claim
 from tubecert.cli.app import app
 from tubecert.errors import ExitCode
-from tubecert.files import kept_folder, seal
 from tubecert.findings import Finding, Location, Severity
+from tubecert.kept import kept_folder, seal, user_key
+from tubecert.planner import ilqr
 from tubecert.printable import visible
 from tubecert.report import github, junit, sarif
 
@@ -455,30 +457,83 @@ def test_another_program_does_it_again(monkeypatch):
     assert len(entries()) == 2
 
 
+def forged(data) -> str:
+    """An entry as somebody writes it who knows everything but the key."""
+    text = json.dumps(data)
+    return f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}"
+
+
+def sealed(data, name: str) -> str:
+    """An entry as only the user's own tubecert can write it, but with something else in it."""
+    text = data if isinstance(data, str) else json.dumps(data)
+    return f"{seal(user_key(), f'{cache.KIND}/{name}', text.encode()).hex()}\n{text}"
+
+
+CERTIFIED = {"verdict": "certified", "numbers": [], "claims": []}
+DAMAGE = [
+    lambda name, text: "",
+    lambda name, text: text[:-5],
+    lambda name, text: "[]",
+    lambda name, text: "null",
+    lambda name, text: text.replace("certified", "refuted"),
+    lambda name, text: text.replace("[", "{", 1),
+    lambda name, text: "[" * 100_000,
+    lambda name, text: "\udcff",
+    lambda name, text: forged({"findings": []}),
+    lambda name, text: forged(CERTIFIED),
+    lambda name, text: sealed(None, name),
+    lambda name, text: sealed({"findings": [{"code": 1}]}, name),
+    lambda name, text: sealed({"findings": [], "more": 1}, name),
+    lambda name, text: sealed(CERTIFIED | {"numbers": [["rho", "abc"]]}, name),
+    lambda name, text: sealed('{"verdict": "certified", "numbers": [["rho", NaN]], "claims": []}', name),
+    lambda name, text: sealed(CERTIFIED | {"verdict": "fine"}, name),
+    lambda name, text: sealed("[" * 100_000, name),
+    lambda name, text: sealed({"findings": []}, "another name"),
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda text: "",
-        lambda text: text[:-5],
-        lambda text: "[]",
-        lambda text: "null",
-        lambda text: text.replace("certified", "refuted"),
-        lambda text: text.replace("[", "{", 1),
-        lambda text: json.dumps({**json.loads(text), "data": None}),
-        lambda text: json.dumps({**json.loads(text), "data": [], "seal": seal([])}),
-        lambda text: json.dumps({**json.loads(text), "data": {"a": 1}, "seal": seal({"a": 1})}),
-        lambda text: "[" * 100_000,
-        lambda text: "\udcff",
-    ],
-)
+@pytest.mark.parametrize("damage", DAMAGE)
 def test_broken_entries_count_as_absent(damage, certified):
-    path = spec("spec.yaml", ("rate: 0.9999", "rate: 0.99"))
+    path = spec("spec.yaml", ("epsilon: 0.01", "epsilon: 0.072"))
     first = run(path, "--certify")
+    assert first.exit_code == 1
     for entry in entries():
-        entry.write_text(damage(entry.read_text()), encoding="utf-8", errors="surrogateescape")
+        entry.write_text(damage(entry.stem, entry.read_text()), encoding="utf-8", errors="surrogateescape")
     again = run(path, "--certify")
     assert (again.exit_code, again.stdout) == (first.exit_code, first.stdout)
+    assert len(certified) == 2
+
+
+def test_a_cache_from_elsewhere_decides_nothing(certified, monkeypatch, tmp_path):
+    path = spec("spec.yaml", ("epsilon: 0.01", "epsilon: 0.072"))
+    run(path, "--certify")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "another user"))
+    run(path, "--certify")
+    assert len(certified) == 2
+    monkeypatch.setenv("TUBECERT_CACHE_KEY", "a secret of a CI service")
+    run(path, "--certify")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "another machine"))
+    run(path, "--certify")
+    assert len(certified) == 3
+    monkeypatch.setenv("TUBECERT_CACHE_KEY", "short")
+    run(path, "--certify")
+    assert len(certified) == 4
+
+
+def test_without_the_cache_no_plan_is_taken_from_it_either(monkeypatch):
+    text = SPEC.replace(
+        "trajectory: {kind: equilibrium, at: [0, 0, 0], input: [0]}",
+        "trajectory: {kind: ilqr, start: [0, 0, 0], target: [0.1, 0, 0], horizon: 1, knots: 5, goal: false}",
+    )
+    assert text != SPEC
+    Path("spec.yaml").write_text(text.replace("duration: 10 ", "duration: 1 "), encoding="utf-8")
+    planned = []
+    true = ilqr.plan
+    monkeypatch.setattr(ilqr, "plan", lambda *arguments: planned.append(1) or true(*arguments))
+    for count, options in enumerate(([], ["--gap", "0.02"], ["--no-cache"], ["--no-cache"]), start=0):
+        run("spec.yaml", "--certify", *options)
+        assert len(planned) == max(1, count), options
 
 
 def test_a_cache_that_cannot_be_written_is_no_trouble(monkeypatch, tmp_path):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tubecert import files, spec
+from tubecert import files, kept, spec
 from tubecert.cli.app import app
 from tubecert.errors import TargetError, TubecertError
 from tubecert.findings import MOST, Finding, Location, Severity, capped
@@ -63,7 +63,7 @@ def strange(kind: str) -> str:
     return kind
 
 
-STRANGE = ["pipe", "link to a pipe", "folder", "socket", "/dev/zero", "/dev/tty", "/dev/full"]
+STRANGE = ["pipe", "link to a pipe", "folder", "socket", "/dev/null", "/dev/tty", "/dev/full"]
 
 
 @pytest.mark.slow
@@ -138,10 +138,10 @@ def test_stdin_has_a_limit_as_well():
 
 
 def test_a_cache_entry_that_is_a_pipe_counts_as_absent():
-    folder = files.kept_folder("plans")
+    folder = kept.kept_folder("plans")
     folder.mkdir(parents=True)
     os.mkfifo(folder / "a.json")
-    assert files.read_kept("plans", "a") is None
+    assert kept.read_kept("plans", "a") is None
 
 
 # files that are not what they are named for (S2)

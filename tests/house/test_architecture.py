@@ -16,6 +16,7 @@ ROOMS = [
     "printable",
     "findings",
     "files",
+    "kept",
     "libraries",
     "verdict",
     "expression",

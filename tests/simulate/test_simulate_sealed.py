@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 from simulated import FLAT
 
+from tubecert.kept import user_key
 from tubecert.simulate import compiled, sealed
-from tubecert.simulate.sealed import SealedFile, user_key
+from tubecert.simulate.sealed import SealedFile
 
 SOURCE = """
 from tubecert.simulate.compiled import compiled, entry
@@ -37,9 +38,7 @@ def state(tmp_path, monkeypatch):
     """A state folder of its own, hence a key of its own."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr(compiled, "_NAMES", [])
-    user_key.cache_clear()
-    yield tmp_path / "state" / "tubecert"
-    user_key.cache_clear()
+    return tmp_path / "state" / "tubecert"
 
 
 @pytest.fixture
@@ -183,12 +182,11 @@ def test_a_disk_that_is_full_does_not_stop_anything(kernels, monkeypatch):
 
 def test_the_key_is_the_users_alone(state):
     secret = user_key()
-    path = state / "kernels.key"
+    path = state / "cache.key"
     assert path.read_bytes() == secret
     assert len(set(secret)) > 8
     if os.name == "posix":
         assert path.stat().st_mode & 0o777 == 0o600
-    user_key.cache_clear()
     assert user_key() == secret
 
 
@@ -196,7 +194,7 @@ def test_the_key_is_the_users_alone(state):
 @pytest.mark.parametrize("spoil", ["open", "short", "long", "link", "folder"])
 def test_a_key_that_others_may_know_is_replaced(state, tmp_path, spoil):
     old = user_key()
-    path = state / "kernels.key"
+    path = state / "cache.key"
     if spoil == "open":
         path.chmod(0o644)
     elif spoil in ("short", "long"):
@@ -207,7 +205,6 @@ def test_a_key_that_others_may_know_is_replaced(state, tmp_path, spoil):
         planted.write_bytes(b"k" * 32)
         planted.chmod(0o600)
         path.symlink_to(planted) if spoil == "link" else path.mkdir()
-    user_key.cache_clear()
     found = user_key()
     if spoil == "folder":
         assert found is None
@@ -220,7 +217,6 @@ def test_a_key_that_others_may_know_is_replaced(state, tmp_path, spoil):
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners here")
 def test_a_key_of_another_user_is_not_used(state, monkeypatch):
     assert user_key() is not None
-    user_key.cache_clear()
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
     assert user_key() is None
 

@@ -384,7 +384,7 @@ def test_files_that_are_not_text(tmp_path: Path) -> None:
 @pytest.mark.timeout(30)
 def test_an_endless_file_is_refused() -> None:
     with pytest.raises(TargetError) as caught:
-        load("/dev/zero")
+        load("/dev/full")
     assert "it is a device" in caught.value.findings[0].message
 
 

@@ -16,7 +16,7 @@ from tubecert.conditions.problem import Drift
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import ExitCode, SpecError
-from tubecert.files import kept_folder
+from tubecert.kept import kept_folder
 from tubecert.model import build
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import answer
@@ -287,8 +287,8 @@ def test_a_plan_is_kept_and_found_again(tmp_path, monkeypatch):
         lambda text: "",
         lambda text: text[:-20],
         lambda text: "[1, 2]",
-        lambda text: json.dumps(json.loads(text) | {"data": [["0"]] * 21}),
-        lambda text: json.dumps(json.loads(text) | {"seal": 1}),
+        lambda text: f"{text.partition(chr(10))[0]}\n{json.dumps([['0']] * 21)}",
+        lambda text: f"{'0' * 64}\n{text.partition(chr(10))[2]}",
     ],
 )
 def test_a_broken_cache_is_not_believed(tmp_path, monkeypatch, damage):

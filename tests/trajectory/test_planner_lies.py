@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -13,7 +12,7 @@ import pytest
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
-from tubecert.files import kept_folder
+from tubecert.kept import kept_folder, seal, user_key
 from tubecert.model import build
 from tubecert.pipeline import Options, certify
 from tubecert.planner import cache, ilqr
@@ -88,10 +87,10 @@ def test_inputs_of_the_cache_that_lead_elsewhere_are_planned_anew(factor, knots,
     """An entry with a right seal: scaled by .9 it once was certified as a plan with a goal (R6)."""
     (path, *_) = sorted(kept_folder(cache.KIND).iterdir())
     for path in kept_folder(cache.KIND).iterdir():
-        whole = json.loads(path.read_text(encoding="utf-8"))
-        data = [[str(float(Fraction(v) * Fraction(factor))) for v in row] for row in whole["data"]]
-        seal = hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
-        path.write_text(json.dumps(whole | {"data": data, "seal": seal}), encoding="utf-8")
+        whole = json.loads(path.read_text(encoding="utf-8").partition("\n")[2])
+        data = json.dumps([[str(float(Fraction(v) * Fraction(factor))) for v in row] for row in whole])
+        mark = seal(user_key(), f"{cache.KIND}/{path.stem}", data.encode()).hex()
+        path.write_text(f"{mark}\n{data}", encoding="utf-8")
     calls = []
     original = ilqr.plan
     monkeypatch.setattr(ilqr, "plan", lambda *a: calls.append(1) or original(*a))

@@ -1,15 +1,15 @@
 """What checks have found, kept in the user's cache, so that an unchanged file costs nothing.
 
 Findings belong to a text (they have places), outcomes of certifications to the effective specification. Both keys
-hold a fingerprint of this program and of the libraries that results rest on. An entry that is not sealed as it was
-written, or cannot be read, counts as absent.
+hold a fingerprint of this program and of the libraries that results rest on. An entry that this user's tubecert has not
+written (`kept`), or that does not hold what it should, counts as absent: a cache never changes a verdict.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -17,13 +17,20 @@ from typing import Any
 
 import tubecert
 from tubecert.checking.expectations import Outcome
-from tubecert.files import keep, read_kept
-from tubecert.findings import Finding, Location, Severity
+from tubecert.findings import Finding
+from tubecert.kept import keep, read_kept
 from tubecert.libraries import versions
-from tubecert.records import FormError, from_json, to_json
+from tubecert.records import from_json, to_json
 from tubecert.spec import Spec, canonical
 
 KIND = "checks"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Kept:
+    """Findings as an entry holds them."""
+
+    findings: tuple[Finding, ...]
 
 
 def key_of_text(what: str, spec: Spec) -> str:
@@ -59,22 +66,23 @@ def read_findings(name: str, spec: Spec) -> list[Finding] | None:
     """The findings kept under a name, at their places in the file of `spec`."""
     data = read_kept(KIND, name)
     try:
-        return None if data is None else [_finding(item, spec.path) for item in data]
-    except (KeyError, TypeError, ValueError):
+        kept = None if data is None else from_json(_Kept, data, "findings")
+    except ValueError:
         return None
+    return None if kept is None else [_placed(item, spec.path) for item in kept.findings]
 
 
 def write_findings(name: str, findings: list[Finding]) -> None:
     """Keep findings; those of other files (a plan's) are not kept, since these may change."""
     files = {item.location.file for item in findings if item.location}
     if len(files) <= 1:
-        keep(KIND, name, [asdict(item) for item in findings])
+        keep(KIND, name, to_json(_Kept(findings=tuple(findings))))
 
 
-def _finding(data: dict[str, Any], path: str) -> Finding:
-    place = data["location"]
-    location = None if place is None else Location(**{**place, "file": path})
-    return Finding(**{**data, "location": location, "severity": Severity(data["severity"])})
+def _placed(finding: Finding, path: str) -> Finding:
+    """The finding in the file that was asked about: the text is the same, the name may be another."""
+    place = finding.location
+    return finding if place is None else replace(finding, location=replace(place, file=path))
 
 
 def read_outcome(name: str) -> Outcome | None:
@@ -82,7 +90,7 @@ def read_outcome(name: str) -> Outcome | None:
     data = read_kept(KIND, name)
     try:
         return None if data is None else from_json(Outcome, data, KIND)
-    except FormError:
+    except ValueError:
         return None
 
 

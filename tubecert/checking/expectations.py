@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isfinite
 
 from tubecert.certificate.result import Result
 from tubecert.claims import METRIC_CLAIMS, MetricFound
@@ -49,6 +50,10 @@ class Outcome:
     verdict: Verdict
     numbers: tuple[tuple[str, float], ...]
     claims: tuple[Claim, ...]
+
+    def __post_init__(self) -> None:
+        if not all(isfinite(value) for _, value in self.numbers):
+            raise ValueError("a number of a certification is finite")
 
 
 def outcome(result: Result) -> Outcome:

@@ -12,6 +12,7 @@ from tubecert.checking import cache
 from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, outcome
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding, Severity
+from tubecert.kept import nothing_kept
 from tubecert.spec import Spec, load
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions:
-    """How to check: with a certification, warnings as errors, and whether to remember."""
+    """How to check: with a certification, warnings as errors, and whether to remember (plans as well)."""
 
     certify: bool = False
     strict: bool = False
@@ -42,11 +43,16 @@ class Checked:
 
 def check(path: str, options: CheckOptions, progress: Progress | None = None) -> Checked:
     """The findings of a file, and the exit code that they deserve."""
+    with nothing_kept(not options.cached):
+        return _checked(path, options, progress)
+
+
+def _checked(path: str, options: CheckOptions, progress: Progress | None) -> Checked:
     started = time.perf_counter()
     claims: tuple[Claim, ...] = ()
     try:
         spec = load(path)
-        findings = _remembered("lint", spec, options, lambda: _inspected(spec))
+        findings = _remembered("lint", spec, lambda: _inspected(spec))
         if options.certify and not _errors(findings):
             found = _certified(spec, options, progress)
             findings = [*findings, *compared(spec, found)]
@@ -90,12 +96,8 @@ def _code(findings: list[Finding]) -> ExitCode:
     return ExitCode.NOT_CERTIFIED
 
 
-def _remembered(
-    what: str, spec: Spec, options: CheckOptions, work: Callable[[], list[Finding]]
-) -> list[Finding]:
+def _remembered(what: str, spec: Spec, work: Callable[[], list[Finding]]) -> list[Finding]:
     """Findings of a text that has not changed, or those that `work` finds."""
-    if not options.cached:
-        return work()
     name = cache.key_of_text(what, spec)
     kept = cache.read_findings(name, spec)
     if kept is None:
@@ -107,13 +109,12 @@ def _remembered(
 def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
     """The outcome of a system that has not changed, or of a new certification; raises `TubecertError`."""
     name = cache.key_of_system(spec, options.gap, options.budget)
-    kept = cache.read_outcome(name) if options.cached else None
+    kept = cache.read_outcome(name)
     if kept is None:
         from tubecert import pipeline
         from tubecert.certificate.result import Result
 
         effort = pipeline.Options(gap=options.gap, budget=options.budget)
         kept = outcome(Result.from_json(pipeline.certify(spec, effort, progress)))
-        if options.cached:
-            cache.write_outcome(name, kept)
+        cache.write_outcome(name, kept)
     return kept

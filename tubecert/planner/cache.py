@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from tubecert.files import keep, read_kept
+from tubecert.kept import keep, read_kept
 
 KIND = "plans"
 Rows = tuple[tuple[str, ...], ...]  # decimals as text, row by row
