@@ -478,7 +478,12 @@ def structural_campaign(certificate, count, seed, report=None):
             refused += 1
             continue
         accepted[kind, shape(changes[0][1])] += 1
-        if not all(_harmless_change(certificate["result"], *change) for change in changes):
+        left = [
+            change for change in changes if change[0] != "changed" or value_at(result, change[1]) != change[2]
+        ]
+        if not all(
+            _harmless_change(certificate["result"], *change) for change in left
+        ):  # a hash is made right again
             wrong.append(
                 (kind, [(shape(path), str(old)[:40], str(new)[:40]) for _, path, old, new in changes])
             )

@@ -6,12 +6,14 @@ import copy
 from fractions import Fraction
 
 import pytest
-from rechecked import certified, digest, examine, failing, respecified, sealed, shipped
+from flint import ctx
+from rechecked import case_of, certified, digest, examine, failing, respecified, sealed, shipped
 from systems import SMALL
 
 from tubecert import spec
 from tubecert.cli.belonging import ForeignError, belongs
 from tubecert.errors import ExitCode
+from tubecert.recheck import geodesics
 from tubecert.recheck.document import Node
 
 GIVEN = 'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}'
@@ -142,3 +144,28 @@ def test_the_hash_of_the_specification_is_compared():
     document["result"]["spec"]["effective"]["name"] = "other"
     document["hash"] = digest(document["result"])
     assert "the specification and what repeats it" in names(examine(document, 20))
+
+
+def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
+    """R8: samples of a grid missed the extreme of the tube, and the bound was shared by them."""
+    text = (
+        SMALL.replace(
+            "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}",
+            'trajectory: {kind: expressions, x: ["0.1*sin(t)", "0.1*sin(t) + 0.1*cos(t)"], '
+            'u: ["0.2*cos(t) - 0.3*sin(0.1*sin(t))"], horizon: 3}',
+        )
+        .replace("at: [0.05, 0]", "at: [0.02, 0.1]")
+        .replace(GIVEN, 'metric: {rate: 0.35, dual_metric: [["1 + 0.1*x + 0.1*x**2", "-0.3"], ["-0.3", 2]]}')
+    )
+    case = case_of(certified(text, conditions="distance"), 20_000)
+    place = case.place
+    value = case.metric.geodesics.value.above
+    with ctx.workprec(64):
+        assert geodesics.unique(place, value).holds
+        sampled = [
+            Fraction(geodesics._sampled(geodesics.SymbolsBelow(place.system, order, Fraction(0)), place))
+            for order in (0, 1)
+        ]
+        tight = sampled[0] * place.rho + sampled[1] * place.rho**2 / 8
+        assert geodesics.unique(place, tight * Fraction(1003, 1000)).holds
+        assert not geodesics.unique(place, tight * Fraction(999, 1000)).holds
