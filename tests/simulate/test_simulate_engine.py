@@ -251,10 +251,7 @@ def levels(case, x0, h, count):
     """x at the output times (K, n) for one level of steps after the other."""
     steps = ladder(case, h)
     disturbance = Disturbance.from_expressions(h, case.model, 1)
-    return [
-        run(steps.level(j, disturbance), steps.point, x0, len(case.times)).values[0, :, : x0.shape[1]]
-        for j in range(count)
-    ]
+    return [run(steps.level(j, disturbance), steps.point, x0, len(case.times)).x[0] for j in range(count)]
 
 
 ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)

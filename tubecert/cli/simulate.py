@@ -23,7 +23,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.simulate.campaign import Campaign
-    from tubecert.simulate.problem import Controller
+    from tubecert.simulate.loops import Controller
     from tubecert.spec import Spec
 
 _POSITIVE: Final = ("epsilon", "rho_a", "duration", "control_rate")

@@ -5,11 +5,12 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 
 | module | what it does |
 |---|---|
-| `problem`, `runs` | what is simulated, and what comes out |
+| `problem`, `loops`, `runs` | what is simulated, the terms of the loops, and what comes out |
 | `integrator` | steps are halved until the error estimate is small enough; lanes on all cores |
 | `grid` | the times of the steps, the plan at them, and the fast part's exact steps |
 | `program` | expressions as arrays for one compiled interpreter |
 | `compiled`, `sealed` | compilation; machine code kept between runs, and run only under the user's own seal |
+| `layout` | the blocks of the fast part's state: the only place that counts entries |
 | `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
 | `computer`, `held` | the controller as a computer: everything held between samples; whether that is stable |

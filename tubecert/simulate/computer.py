@@ -1,9 +1,11 @@
 """What a computer does at its samples: the adaptation of certificate C, and with a control rate the whole controller.
 
-Adaptation of C at t = i Ts: s_hat = -g/(e^{g Ts} - 1) xtilde, sigma_hat = the projection of e^{g Ts} B^+ s_hat to
+Adaptation of C at t = i Ts (4.5): s_hat = -g/(e^{g Ts} - 1) xtilde, sigma_hat = the projection of e^{g Ts} B^+ s_hat to
 the ball. Controller at a rate: u = u* + k + u_a is held; the filter is exact for a held sigma_hat; the predictor is
 stepped by Euler, xhat+ = xhat + dt (f + B(u + sigma_hat) + A_m xtilde), and then sigma_hat+ = clip(sigma_hat + dt
-Gamma Proj(-B'xtilde)) uses the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2.
+Gamma Proj(-B'xtilde)) uses the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2 (`held` computes it exactly).
+
+It knows the state as it is measured, and the model there (`Moment.measured`, `Point.seen`).
 """
 
 from __future__ import annotations
@@ -12,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled
-from tubecert.simulate.fast import ADAPTIVE, NONE, REFERENCE, SAMPLED
+from tubecert.simulate.layout import blocks
 from tubecert.simulate.small import clip, copy, dot, factor, solve
 
 
@@ -31,104 +34,90 @@ class Computer(NamedTuple):
     growth: float
 
 
+class Registers(NamedTuple):
+    """What a computer keeps between its samples: the input u (m,) and the predicted state xhat (n,).
+
+    `gram` (m, m) is room for B'B.
+    """
+
+    u: Array
+    xhat: Array
+    gram: Array
+
+
 @compiled
-def sample(
-    fast: Any,
-    computer: Any,
-    count: int,
-    x: Any,
-    plan: Any,
-    f: Any,
-    B: Any,
-    inputs: Any,
-    y: Any,
-    held: Any,
-    gram: Any,
-) -> None:
-    """What happens at a sample; without a computer it is not even compiled."""
+def sample(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any, kept: Any) -> None:
+    """What happens at sample `count`; without a computer it is not even compiled."""
     if computer is not None:
         if computer.holds:
-            _control(fast, computer, count, x, plan, f, B, inputs, y, held, gram)
+            _control(fast, computer, count, now, point, y, kept)
         else:
-            _adapt(fast, computer, B, y, gram)
+            _adapt(fast, computer, point.seen.B, y, kept.gram)
 
 
 @compiled
 def _adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
-    """The adaptation of C: s_hat and sigma_hat from xtilde."""
-    n, m = fast.n, fast.m
-    held, sigma = y[n + 2 * m : 2 * n + 2 * m], y[n : n + m]
-    for i in range(n):
-        held[i] = -computer.weight * y[i]
+    """(4.5): s_hat and sigma_hat from xtilde."""
+    own, m = blocks(y, fast.at), fast.at.m
+    sigma = own.sigma_hat
+    for i in range(fast.at.n):
+        own.s_hat[i] = -computer.weight * own.xtilde[i]  # s_hat = -g/(e^{g Ts} - 1) xtilde
     for j in range(m):
         sigma[j] = 0.0
-        for i in range(n):
-            sigma[j] += B[i, j] * held[i]
+        for i in range(fast.at.n):
+            sigma[j] += B[i, j] * own.s_hat[i]
         for k in range(m):
             gram[j, k] = dot(B[:, j], B[:, k])
     if factor(gram, gram):
-        solve(gram, sigma, sigma)
+        solve(gram, sigma, sigma)  # B^+ s_hat = (B'B)^-1 B's_hat
     else:
         sigma[:] = np.nan  # B has lost rank
     for j in range(m):
-        sigma[j] *= computer.growth
+        sigma[j] *= computer.growth  # e^{g Ts} B^+ s_hat
     clip(sigma, fast.radius)
 
 
 @compiled
-def _control(
-    fast: Any,
-    computer: Any,
-    count: int,
-    x: Any,
-    plan: Any,
-    f: Any,
-    B: Any,
-    inputs: Any,
-    y: Any,
-    held: Any,
-    gram: Any,
-) -> None:
-    """One sample of the whole controller: `held` becomes u; the last n entries of y hold the predicted xhat."""
-    n, m = fast.n, fast.m
-    sigma, u_a, xhat = y[n : n + m], y[n + m : n + 2 * m], y[2 * n + 2 * m :]
+def _control(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any, kept: Any) -> None:
+    """One sample of the whole controller: the filter, the estimate, the input, and the prediction of the next state."""
+    terms, own, B = fast.terms, blocks(y, fast.at), point.seen.B
     if count == 0:
-        copy(xhat, x)
-    for i in range(n):
-        y[i] = xhat[i] - x[i]
-    if fast.kind != NONE and count > 0:
-        for j in range(m):
-            u_a[j] = computer.decay * u_a[j] - (1.0 - computer.decay) * sigma[j]
-    if fast.kind == REFERENCE:
-        copy(sigma, inputs[0])
-    elif fast.kind == ADAPTIVE:
+        copy(kept.xhat, now.measured)
+    for i in range(fast.at.n):
+        own.xtilde[i] = kept.xhat[i] - now.measured[i]
+    if terms.filters and count > 0:
+        for j in range(fast.at.m):  # (0.8) for a sigma_hat that was held for dt
+            own.u_a[j] = computer.decay * own.u_a[j] - (1.0 - computer.decay) * own.sigma_hat[j]
+    if terms.knows:
+        copy(own.sigma_hat, point.h)
+    elif terms.adapts:
         _integrate(fast, computer.dt, B, y)
-    elif fast.kind == SAMPLED and count % computer.every == 0:
-        _adapt(fast, computer, B, y, gram)
-    for j in range(m):
-        held[j] = plan[2 * n + j] + inputs[1, j] + u_a[j]
-    for i in range(n):
-        speed = f[i] + dot(B[i], held)
-        if fast.kind == ADAPTIVE:
-            speed += dot(B[i], sigma)
-        if fast.kind == SAMPLED:
-            speed += y[n + 2 * m + i]
-        xhat[i] += computer.dt * (speed + dot(fast.A[i], y[:n]))
+    elif terms.samples and count % computer.every == 0:
+        _adapt(fast, computer, B, y, kept.gram)
+    for j in range(fast.at.m):
+        kept.u[j] = now.plan.u[j] + point.k[j] + own.u_a[j]  # (0.4)
+    for i in range(fast.at.n):
+        speed = point.seen.f[i] + dot(B[i], kept.u)
+        if terms.adapts:
+            speed += dot(B[i], own.sigma_hat)  # (0.6)
+        if terms.samples:
+            speed += own.s_hat[i]  # (4.5)
+        kept.xhat[i] += computer.dt * (speed + dot(fast.A[i], own.xtilde))
 
 
 @compiled
 def _integrate(fast: Any, dt: float, B: Any, y: Any) -> None:
-    """sigma_hat by one Euler step, then into the ball."""
-    n, m = fast.n, fast.m
-    sigma = y[n : n + m]
+    """sigma_hat of (0.7) by one Euler step, then into the ball; Proj is the smooth one of 2.5 if there is a layer."""
+    own = blocks(y, fast.at)
+    sigma = own.sigma_hat
     square = dot(sigma, sigma)
     outward = 0.0
-    for j in range(m):
-        outward -= sigma[j] * dot(B[:, j], y[:n])
+    for j in range(fast.at.m):
+        outward -= sigma[j] * dot(B[:, j], own.xtilde)
     share = 0.0
     if fast.layer > 0.0 and square > 0.0 and outward > 0.0:
         limit = fast.radius * fast.radius
         share = max(0.0, ((1.0 + fast.layer) * square - limit) / (fast.layer * limit)) * outward / square
-    for j in range(m):
-        sigma[j] -= dt * fast.Gamma * (dot(B[:, j], y[:n]) + share * sigma[j])
+    for j in range(fast.at.m):
+        sigma[j] -= dt * fast.Gamma * (dot(B[:, j], own.xtilde) + share * sigma[j])
     clip(sigma, fast.radius)

@@ -1,7 +1,10 @@
-"""The slow part of a loop at a point: f, B, the geodesic, min-norm feedback, and the disturbance.
+"""The slow part of a loop at a point: f, B and h at the state, the geodesic and the feedback at the measured state.
 
-The feedback is the smallest k with phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where
+The feedback (0.5) is the smallest k with phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where
 phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*) + 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E and phi_1 = 2 B'M gamma_s(1).
+
+What acts is at the state x; what the controller computes is at the state that it measures. Today it measures x: `seen`
+and `measured` are the same memory, and nothing is computed twice.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ _ROUNDING = 1e-12
 
 
 class Field(NamedTuple):
-    """f (n,), B (n, m) row by row and the base of h (m,) as one program of t and x; the metric and its rate."""
+    """f (n,), B (n, m) row by row and the base of h (m,) as one program of t and x; the metric and its rate in 1/s."""
 
     program: Program
     metric: Metric
@@ -33,20 +36,58 @@ class Field(NamedTuple):
 
 
 class Force(NamedTuple):
-    """Of every lane: waves (N, W, m + n + 2) of amplitude, wave vector, frequency, phase; push and radius (N, 2)."""
+    """The disturbance of every lane: waves and pushes (`problem.Disturbance`), the centre taken into the phases.
 
-    waves: Array
-    lanes: Array
+    `amplitude` (N, W, m), `wave` (N, W, n), `frequency` and `phase` (N, W), `push` and `radius` (N,).
+    """
+
+    amplitude: Array
+    wave: Array
+    frequency: Array
+    phase: Array
+    push: Array
+    radius: Array
     layer: float
 
 
-class Point(NamedTuple):
-    """Working memory and results of `evaluate`: f (n,), B (n, m); `inputs` (3, m): h, k, B'M gamma_s(1)."""
+class Reference(NamedTuple):
+    """The plan at a time: x* (n,), f(x*) + B(x*)u* (n,), u* (m,)."""
 
-    memory: Array
+    x: Array
+    speed: Array
+    u: Array
+
+
+class Moment(NamedTuple):
+    """Where a lane is evaluated: its number, t in s, the state and what is measured of it (n,), the plan."""
+
+    lane: int
+    t: float
+    x: Array
+    measured: Array
+    plan: Reference
+
+
+class Model(NamedTuple):
+    """f (n,) and B (n, m) at a state."""
+
     f: Array
     B: Array
-    inputs: Array
+
+
+class Point(NamedTuple):
+    """Working memory and results of `evaluate`.
+
+    `plant`: f and B at the state; `seen`: at the measured state (the same memory as long as these are the same); h (m,)
+    at the state, k (m,), `push` = B'M gamma_s(1) (m,).
+    """
+
+    memory: Array
+    plant: Model
+    seen: Model
+    h: Array
+    k: Array
+    push: Array
     curve: Curve
 
 
@@ -57,84 +98,107 @@ def field(model: ControlAffineModel, base: Sequence[Expression] | None, degree: 
     outputs = [*model.f, *(e for row in model.B for e in row), *h]
     program, memory = assemble(outputs, (TIME, *model.states))
     space, curve = metric(model, degree)
-    work = Point(memory, np.zeros(n), np.zeros((n, m)), np.zeros((3, m)), curve)
-    return Field(program, space, float(model.rate)), work
+    return Field(program, space, float(model.rate)), point(memory, curve, n, m)
+
+
+def point(memory: Array, curve: Curve, n: int, m: int) -> Point:
+    """Fresh results around the memory of a program and of a geodesic."""
+    plant = Model(np.zeros(n), np.zeros((n, m)))
+    return Point(memory, plant, plant, np.zeros(m), np.zeros(m), np.zeros(m), curve)
 
 
 def force(d: Disturbance) -> Force:
     """The arrays of a disturbance; its centre goes into the phases."""
-    phase = d.phase - d.wave @ d.centre
-    waves = np.concatenate([d.amplitude, d.wave, d.frequency[..., None], phase[..., None]], axis=2)
-    return Force(waves, np.stack([d.push, d.radius], axis=1).astype(float), float(d.layer))
+    return Force(
+        amplitude=_dense(d.amplitude),
+        wave=_dense(d.wave),
+        frequency=_dense(d.frequency),
+        phase=_dense(d.phase - d.wave @ d.centre),
+        push=_dense(d.push),
+        radius=_dense(d.radius),
+        layer=float(d.layer),
+    )
+
+
+def _dense(part: Array) -> Array:
+    return np.ascontiguousarray(part, dtype=float)
 
 
 @compiled
-def evaluate(
-    field: Any, force: Any, lane: int, t: float, x: Any, plan: Any, whole: bool, point: Any
-) -> tuple[int, float]:
-    """(status, energy) at (t, x); `plan` holds x*, f(x*) + B(x*)u*, u*. f, B, h and k go into `point`.
+def evaluate(field: Any, force: Any, exact: bool, now: Any, whole: bool, point: Any) -> tuple[int, float]:
+    """(status, d(x*, x)^2) at a moment; f, B, h and k go into `point`.
 
-    Without `whole` the geodesic and k are left out unless the lane is pushed along it.
+    `exact`: what is measured is the state. Without `whole` the geodesic and k are left out, unless the lane is pushed
+    along it.
     """
-    n = x.shape[0]
-    _drift(field.program, t, x, point.memory, point.f, point.B, point.inputs[0])
+    _model(field.program, now.t, now.x, point.memory, point.plant)
+    m = point.h.shape[0]
+    first = field.program.outputs.shape[0] - m
+    for j in range(m):
+        point.h[j] = point.memory[field.program.outputs[first + j]]
     status, energy = FOUND, 0.0
-    if whole or force.lanes[lane, 0] != 0.0:
-        status, energy = connect(field.metric, point.curve, point.curve.bend, plan[:n], x)
+    if whole or force.push[now.lane] != 0.0:
+        if not exact:
+            _model(field.program, now.t, now.measured, point.memory, point.seen)
+        status, energy = connect(field.metric, point.curve, point.curve.bend, now.plan.x, now.measured)
         if status != FOUND:
             return status, energy
-        status = _feedback(field.rate * energy, plan[n:], point.f, point.B, point.inputs, point.curve.vectors)
-    _disturb(force.waves[lane], force.lanes[lane], force.layer, t, x, point.inputs)
+        status = _feedback(field.rate * energy, now.plan, point)
+        if not exact and status == FOUND:
+            status, energy = connect(field.metric, point.curve, point.curve.bend, now.plan.x, now.x)
+    _disturb(force, now, point)
     return status, energy
 
 
 @compiled
-def _drift(program: Any, t: float, x: Any, memory: Any, f: Any, B: Any, h: Any) -> None:
-    n, m = B.shape
+def _model(program: Any, t: float, x: Any, memory: Any, found: Any) -> None:
+    """f and B at (t, x); the memory keeps the other outputs."""
+    n, m = found.B.shape
     memory[0] = t
     for i in range(n):
         memory[1 + i] = x[i]
     execute(program.steps, program.steps.shape[0], memory)
     for i in range(n):
-        f[i] = memory[program.outputs[i]]
+        found.f[i] = memory[program.outputs[i]]
         for j in range(m):
-            B[i, j] = memory[program.outputs[n + i * m + j]]
-    for j in range(m):
-        h[j] = memory[program.outputs[n + n * m + j]]
+            found.B[i, j] = memory[program.outputs[n + i * m + j]]
 
 
 @compiled
-def _feedback(decay: float, plan: Any, f: Any, B: Any, inputs: Any, covectors: Any) -> int:
+def _feedback(decay: float, plan: Any, point: Any) -> int:
+    """k of (0.5) at the measured state; `decay` is lambda E."""
+    f, B, push, k = point.seen.f, point.seen.B, point.push, point.k
     n, m = B.shape
-    drift, u = plan[:n], plan[n:]
-    start, end, k, push = covectors[0], covectors[1], inputs[1], inputs[2]
-    phi_0 = 2 * decay - 2 * dot(start, drift)
+    start, end = point.curve.vectors[0], point.curve.vectors[1]  # M gamma_s at plan and state
+    phi_0 = 2 * decay - 2 * dot(start, plan.speed)  # 2 lambda E - 2 gamma_s(0)'M(f(x*) + B(x*)u*) ...
     size = abs(phi_0)
     for i in range(n):
-        speed = f[i] + dot(B[i], u)
-        phi_0 += 2 * end[i] * speed
-        size += abs(end[i] * speed) + abs(start[i] * drift[i])
+        speed = f[i] + dot(B[i], plan.u)
+        phi_0 += 2 * end[i] * speed  # ... + 2 gamma_s(1)'M(f(x) + B(x)u*)
+        size += abs(end[i] * speed) + abs(start[i] * plan.speed[i])
     for j in range(m):
         push[j] = 0.0
         for i in range(n):
-            push[j] += B[i, j] * end[i]
+            push[j] += B[i, j] * end[i]  # phi_1/2 = B'M gamma_s(1)
     reach = dot(push, push)
     for j in range(m):
-        k[j] = -phi_0 * push[j] / (2 * reach) if phi_0 > 0.0 and reach > 0.0 else 0.0
+        k[j] = (
+            -phi_0 * push[j] / (2 * reach) if phi_0 > 0.0 and reach > 0.0 else 0.0
+        )  # -phi_0 phi_1/|phi_1|^2
     return INFEASIBLE if reach == 0.0 and phi_0 > _ROUNDING * size else FOUND
 
 
 @compiled
-def _disturb(waves: Any, lane: Any, layer: float, t: float, x: Any, inputs: Any) -> None:
-    n, m = x.shape[0], inputs.shape[1]
-    h, push = inputs[0], inputs[2]
-    for w in range(waves.shape[0]):
-        wave = waves[w]
-        value = np.sin(wave[m + n] * t + dot(x, wave[m : m + n]) + wave[m + n + 1])
-        for j in range(m):
-            h[j] += wave[j] * value
-    if lane[0] != 0.0:
-        share = lane[0] / np.sqrt(dot(push, push) + layer * layer)
-        for j in range(m):
-            h[j] += share * push[j]
-    clip(h, lane[1])
+def _disturb(force: Any, now: Any, point: Any) -> None:
+    """Adds the lane's waves and push to its base h, and keeps that in its ball (`problem.Disturbance`)."""
+    h, lane = point.h, now.lane
+    for w in range(force.phase.shape[1]):
+        angle = force.frequency[lane, w] * now.t + dot(now.x, force.wave[lane, w]) + force.phase[lane, w]
+        value = np.sin(angle)
+        for j in range(h.shape[0]):
+            h[j] += force.amplitude[lane, w, j] * value
+    if force.push[lane] != 0.0:
+        share = force.push[lane] / np.sqrt(dot(point.push, point.push) + force.layer * force.layer)
+        for j in range(h.shape[0]):
+            h[j] += share * point.push[j]
+    clip(h, force.radius[lane])

@@ -9,7 +9,9 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.simulate.computer import Computer
-from tubecert.simulate.fast import KINDS, NONE, SAMPLED, Fast, exact_flows
+from tubecert.simulate.fast import Fast, exact_flows
+from tubecert.simulate.feedback import Reference
+from tubecert.simulate.layout import layout
 from tubecert.simulate.problem import LoopProblem
 from tubecert.simulate.program import Index
 from tubecert.simulate.stepping import Grid
@@ -68,7 +70,7 @@ def sample_period(problem: LoopProblem) -> float | None:
     """Time between samples of the computer in s; None if there is none."""
     if problem.control_rate is not None:
         return 1.0 / problem.control_rate
-    if problem.controller == "sampled" and problem.gains is not None:
+    if problem.terms.samples and problem.gains is not None:
         return problem.gains.sample_time
     return None
 
@@ -86,16 +88,25 @@ def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
     distinct, which = np.unique(length, return_inverse=True)
     exact_length = np.repeat(spans / counts, counts)
-    marks = np.full((len(start) + 1, 3), -1)
-    marks[:-1, 0], marks[-1, 0] = which, 0
-    marks[first, 1] = samples
-    marks[first[nearest(t, problem.times)], 2] = np.arange(len(problem.times))
-    times = np.stack([np.append(start, problem.horizon), np.append(exact_length, 0.0)], axis=1)
-    return Grid(times, marks, course(problem, start, exact_length)), distinct
+    sample, output = np.full((2, len(start) + 1), -1)
+    sample[first] = samples
+    output[first[nearest(t, problem.times)]] = np.arange(len(problem.times))
+    grid = Grid(
+        start=np.append(start, problem.horizon),
+        length=np.append(exact_length, 0.0),
+        which=np.append(which, 0),
+        sample=sample,
+        output=output,
+        plan=course(problem, start, exact_length),
+    )
+    return grid, distinct
 
 
-def course(problem: LoopProblem, start: Array, length: Array) -> Array:
-    """The plan on every step, and after the last one: where u* jumps, the side that belongs to the step."""
+def course(problem: LoopProblem, start: Array, length: Array) -> Reference:
+    """The plan at start, middle and end of every step (S,), and after the last one: the arrays of `Grid.plan`.
+
+    Where u* jumps, the side that belongs to the step.
+    """
     plan, model = problem.plan, problem.model
     S = len(start)
     t = np.minimum(start[:, None] + length[:, None] * np.array([0.0, 0.5, 1.0]), problem.horizon)
@@ -108,31 +119,27 @@ def course(problem: LoopProblem, start: Array, length: Array) -> Array:
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
     values = [*np.moveaxis(x, -1, 0), *np.moveaxis(u, -1, 0)]
     speed = np.moveaxis(drift.run_floats(values, (S, 3)), 0, -1)
-    whole = np.concatenate([x, speed, u], axis=2)
-    return np.concatenate([whole, np.repeat(whole[-1:, 2:], 3, axis=1)])
+    return Reference(*(np.concatenate([part, np.repeat(part[-1:, 2:], 3, axis=1)]) for part in (x, speed, u)))
 
 
 def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
     """The fast part for steps of the lengths (Q,); its own steps are halved with the level, too."""
     model, gains = problem.model, problem.gains
-    n, m = len(model.states), len(model.inputs)
-    Y = 3 * n + 2 * m
-    kind = KINDS[problem.controller]
+    at = layout(len(model.states), len(model.inputs))
     found = Fast(
-        kind,
-        n,
-        m,
-        np.zeros((n, n)) if gains is None else gains.A_m(n),
-        1.0 if gains is None or gains.adaptation_rate is None else gains.adaptation_rate,
-        1.0 if gains is None else gains.bandwidth,
-        1.0 if gains is None else gains.projection_radius,
-        0.0 if gains is None or gains.smooth is None else gains.smooth,
-        False,
-        np.zeros((1, Y, Y)),
-        np.zeros((1, 3, Y, m)),
-        0.5**level,
+        terms=problem.terms,
+        at=at,
+        A=np.zeros((at.n, at.n)) if gains is None else gains.A_m(at.n),
+        Gamma=1.0 if gains is None or gains.adaptation_rate is None else gains.adaptation_rate,
+        omega=1.0 if gains is None else gains.bandwidth,
+        radius=1.0 if gains is None else gains.projection_radius,
+        layer=0.0 if gains is None or gains.smooth is None else gains.smooth,
+        exact=False,
+        flow=np.zeros((1, at.size, at.size)),
+        forced=np.zeros((1, 3, at.size, at.m)),
+        turn=0.5**level,
     )
-    if kind == NONE or problem.control_rate is not None or not model.constant_input:
+    if not problem.adaptive or problem.control_rate is not None or not model.constant_input:
         return found
     B = np.array([[float(e.fraction) for e in row] for row in model.B])
     return exact_flows(found, B, lengths)
@@ -145,7 +152,7 @@ def computer(problem: LoopProblem) -> Computer | None:
         return None
     dt = 0.0 if rate is None else 1.0 / rate
     every, weight, growth = 1, 0.0, 1.0
-    if gains is not None and KINDS[problem.controller] == SAMPLED:
+    if gains is not None and problem.terms.samples:
         Ts, g = gains.sample_time, gains.predictor_gain
         assert Ts is not None
         assert isinstance(g, float | int)

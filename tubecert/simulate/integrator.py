@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression
+from tubecert.simulate.loops import DESIGNS
 from tubecert.simulate.problem import Disturbance, LoopProblem
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 
 if TYPE_CHECKING:
     from tubecert.simulate.feedback import Point
-    from tubecert.simulate.stepping import Loop, Output
+    from tubecert.simulate.stepping import Lane, Output
 
 Progress = Callable[[int, int], None]
 _MOST_HALVINGS = 14
@@ -54,7 +55,7 @@ def integrate(
         raise ValueError("the disturbance has another number of inputs than the model")
     if not tolerance > 0:
         raise ValueError("tolerance must be positive")
-    if problem.controller == "nominal":
+    if not DESIGNS[problem.controller].disturbed:
         disturbance = Disturbance.from_expressions(None, problem.model, N)
     return _Lanes(problem, starts, disturbance).halve(tolerance, progress)
 
@@ -70,20 +71,28 @@ class Ladder:
         self.field, self.point = field(problem.model, base, problem.degree)
         self.computer = grid.computer(problem)
         self.holds = self.computer is not None and self.computer.holds
-        self._levels: dict[int, Loop] = {}
+        self._levels: dict[int, Lane] = {}
 
-    def level(self, number: int, disturbance: Disturbance) -> Loop:
+    def level(self, number: int, disturbance: Disturbance) -> Lane:
         """The compiled loop's data at a level; ValueError if it has too many steps."""
         from tubecert.simulate import grid
         from tubecert.simulate.feedback import force
-        from tubecert.simulate.stepping import Loop
+        from tubecert.simulate.stepping import Lane
 
         acting = force(disturbance)
         if number not in self._levels:
             steps, lengths = grid.steps(self.problem, number)
-            fast = grid.fast_part(self.problem, lengths, number)
-            limit = self.problem.limit
-            self._levels[number] = Loop(self.field, acting, fast, self.computer, self.holds, limit, steps)
+            self._levels[number] = Lane(
+                field=self.field,
+                force=acting,
+                fast=grid.fast_part(self.problem, lengths, number),
+                computer=self.computer,
+                holds=self.holds,
+                flows=self.problem.adaptive and not self.holds,
+                exact=True,
+                limit=self.problem.limit,
+                grid=steps,
+            )
         return self._levels[number]._replace(force=acting)
 
 
@@ -97,12 +106,13 @@ class _Lanes:
     """Lanes on their way down the levels."""
 
     def __init__(self, problem: LoopProblem, starts: Array, disturbance: Disturbance) -> None:
+        from tubecert.simulate.layout import layout
         from tubecert.simulate.stepping import output
 
         self.problem, self.starts, self.disturbance = problem, starts, disturbance
         self.ladder = ladder(problem, disturbance.base)
         self.N, n = starts.shape
-        self.found = output(self.N, len(problem.times), n, len(problem.model.inputs))
+        self.found = output(self.N, len(problem.times), layout(n, len(problem.model.inputs)))
         self.error = np.full(self.N, np.inf)
         self.unresolved = np.full(self.N, np.nan)
         self.changes = np.full((self.N, _MOST_HALVINGS + 1), np.inf)
@@ -114,18 +124,18 @@ class _Lanes:
         lanes = np.arange(self.N)
         for number in range(_MOST_HALVINGS + 1):
             try:
-                loop = self.ladder.level(number, self.disturbance.of(lanes))
+                lane = self.ladder.level(number, self.disturbance.of(lanes))
             except ValueError:
                 if number == 0:
                     raise
                 break  # no more steps: the error estimates say how far it came
             done = self._compare(
                 lanes,
-                run(loop, self.ladder.point, self.starts[lanes], len(self.problem.times)),
+                run(lane, self.ladder.point, self.starts[lanes], len(self.problem.times)),
                 number,
                 tolerance,
             )
-            self.steps[lanes] = len(loop.grid.times) - 1
+            self.steps[lanes] = len(lane.grid.start) - 1
             lanes = lanes[~done]
             if progress is not None:
                 progress(self.N - len(lanes), self.N)
@@ -137,13 +147,12 @@ class _Lanes:
         self, lanes: NDArray[np.intp], finer: Output, number: int, tolerance: float
     ) -> NDArray[np.bool_]:
         """Takes the finer runs, estimates their errors, and says which lanes are done."""
-        coarser, n = self.found, self.starts.shape[1]
-        difference = finer.values[:, :, :n] - coarser.values[lanes, :, :n]
-        apart = np.sqrt(np.sum(difference**2, axis=2))
+        coarser = self.found
+        apart = np.sqrt(np.sum((finer.x - coarser.x[lanes]) ** 2, axis=2))
         change = apart.max(axis=1)
         change = np.where(np.isnan(change), np.inf, change)
-        failed, before = finer.ends[:, 0] != 0, coarser.ends[lanes, 0] != 0
-        agree = np.abs(finer.ends[:, 1] - coarser.ends[lanes, 1]) <= _AGREEING * self.problem.horizon
+        failed, before = finer.status != 0, coarser.status[lanes] != 0
+        agree = np.abs(finer.ended - coarser.ended[lanes]) <= _AGREEING * self.problem.horizon
         for ours, theirs in zip(coarser, finer, strict=True):
             ours[lanes] = theirs
         self.error[lanes] = np.where(failed, np.inf, change)
@@ -166,34 +175,30 @@ class _Lanes:
         return np.asarray(stays | failed[:, number - _PATIENCE : number + 1].all(axis=1))
 
     def _runs(self) -> Runs:
-        from tubecert.simulate.stepping import PEAKS
+        from tubecert.simulate.stepping import PEAKS, START
 
         problem, found = self.problem, self.found
-        n, m = self.starts.shape[1], len(problem.model.inputs)
         grid = self.ladder.level(0, self.disturbance).grid
-        at = [np.flatnonzero(grid.marks[:, 2] == k)[0] for k in range(len(problem.times))]
-        plan = grid.plan[at, 0]
+        at = [np.flatnonzero(grid.output == k)[0] for k in range(len(problem.times))]
         peaks = {
-            name: Peak(value=found.peaks[:, i, 0].copy(), time=found.peaks[:, i, 1].copy())
+            name: Peak(value=found.peak[:, i].copy(), time=found.peak_time[:, i].copy())
             for i, name in enumerate(PEAKS)
         }
-        ends = np.cumsum([n, n, m, m, m, m])
-        x, xtilde, k, u_a, sigma_hat, h, distance = np.split(found.values, ends, axis=2)
         return Runs(
             t=np.array(problem.times, dtype=float),
-            x=x,
-            x_plan=plan[:, :n],
-            u_plan=plan[:, 2 * n :],
-            k=k,
-            u_a=u_a,
-            sigma_hat=sigma_hat,
-            h=h,
-            xtilde=xtilde,
-            distance=distance[:, :, 0],
+            x=found.x,
+            x_plan=grid.plan.x[at, START],
+            u_plan=grid.plan.u[at, START],
+            k=found.k,
+            u_a=found.u_a,
+            sigma_hat=found.sigma_hat,
+            h=found.h,
+            xtilde=found.xtilde,
+            distance=found.distance,
             worst=Worst(**peaks),
             error=self.error,
             unresolved=self.unresolved,
-            failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.ends[:, 0])),
+            failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.status)),
             steps=self.steps,
         )
 
@@ -207,8 +212,8 @@ class _Lanes:
             INFEASIBLE: "no input makes the metric contract here",
             DIVERGED: _diverged(self.problem),
         }
-        status, t = self.found.ends[lane]
-        return Failure(lane=lane, t=float(t), reason=reasons[int(status)])
+        found = self.found
+        return Failure(lane=lane, t=float(found.ended[lane]), reason=reasons[int(found.status[lane])])
 
 
 def _diverged(problem: LoopProblem) -> str:
@@ -216,24 +221,21 @@ def _diverged(problem: LoopProblem) -> str:
     return f"the state diverges from the plan{beyond}"
 
 
-def run(loop: Loop, point: Point, starts: Array, outputs: int) -> Output:
+def run(own: Lane, point: Point, starts: Array, outputs: int) -> Output:
     """One level of some lanes, on all cores; the result does not depend on how many there are."""
     from tubecert.simulate import stepping
 
-    N = len(starts)
-    out, stop = stepping.output(N, outputs, *point.B.shape), np.zeros(1)
+    N, at = len(starts), own.fast.at
+    out, stop = stepping.output(N, outputs, at), np.zeros(1)
     chunk = max(1, min(_CHUNK, -(-N // _cores())))
 
-    def work(first: int) -> None:
-        last = min(first + chunk, N)
-        stepping.run(first, last, loop, starts, stepping.work(point, stop), out)
+    def work(first: int, last: int) -> None:
+        stepping.run(first, last, own, starts, stepping.work(at, point, stop), out)
 
-    stepping.run(
-        0, 0, loop, starts, stepping.work(point, stop), out
-    )  # compiles, in a thread that Ctrl-C ends
+    work(0, 0)  # compiles, in a thread that Ctrl-C ends
     pool = ThreadPoolExecutor(_cores())
     try:
-        for _ in pool.map(work, range(0, N, chunk)):
+        for _ in pool.map(lambda first: work(first, min(first + chunk, N)), range(0, N, chunk)):
             pass
     finally:
         stop[:] = 1.0  # of an interruption: the lanes under way end at their next step

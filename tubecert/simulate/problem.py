@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,8 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression, free_symbols
 from tubecert.model import TIME, ControlAffineModel
+from tubecert.simulate.loops import CONTROLLERS, DESIGNS, Controller, Terms
 from tubecert.trajectory import Plan
-
-Controller = Literal["nominal", "ccm", "reference", "l1", "sampled"]
-CONTROLLERS: tuple[Controller, ...] = ("nominal", "ccm", "reference", "l1", "sampled")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,18 +93,23 @@ class LoopProblem:
             raise ValueError(f"limit must be a positive distance, not {self.limit}")
         if self.degree < 2:
             raise ValueError("degree must be at least 2")
-        needed = {"l1": "adaptation_rate", "sampled": "sample_time"}.get(self.controller)
         if self.adaptive and self.gains is None:
             raise ValueError(f"the controller {self.controller} needs gains")
-        if needed and getattr(self.gains, needed) is None:
-            raise ValueError(f"the controller {self.controller} needs the gain {needed}")
-        if self.controller == "sampled" and np.ndim(getattr(self.gains, "predictor_gain", 0.0)):
-            raise ValueError("the controller sampled needs a number as predictor_gain")
+        for needed in DESIGNS[self.controller].needs:
+            if getattr(self.gains, needed) is None:
+                raise ValueError(f"the controller {self.controller} needs the gain {needed}")
+        if self.terms.samples and np.ndim(getattr(self.gains, "predictor_gain", 0.0)):
+            raise ValueError(f"the controller {self.controller} needs a number as predictor_gain")
+
+    @property
+    def terms(self) -> Terms:
+        """The terms of its right-hand sides."""
+        return DESIGNS[self.controller].terms
 
     @property
     def adaptive(self) -> bool:
         """Whether there is a filter."""
-        return self.controller in ("reference", "l1", "sampled")
+        return self.terms.filters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

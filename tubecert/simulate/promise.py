@@ -15,7 +15,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import DISTANCE, RATES, SAMPLED, Name
 from tubecert.simulate.certified import Certified, Values
-from tubecert.simulate.problem import Controller
+from tubecert.simulate.loops import Controller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

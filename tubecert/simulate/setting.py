@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -21,13 +21,13 @@ from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.certified import Certified, Result, plan_of, read_numbers
 from tubecert.simulate.held import growth, least_rate
-from tubecert.simulate.problem import Controller, Gains, LoopProblem
+from tubecert.simulate.loops import DESIGNS, Controller
+from tubecert.simulate.problem import Gains, LoopProblem
 from tubecert.simulate.promise import Kind, Promise, kind_for, promise
 from tubecert.simulate.uncertainty import Class, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
-ADAPTIVE: Final = ("l1", "sampled")
 TIMES: Final = 501  # output times of the loops that are drawn
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _TOLERANCE: Final = 1e-3  # of rho, asked of the integrator
@@ -64,8 +64,8 @@ class Loop:
 
     @property
     def tested(self) -> bool:
-        """Whether leaving the tube counts: it adapts, so it is meant to stay."""
-        return self.controller in ADAPTIVE
+        """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
+        return self.problem.terms.predicts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -159,7 +159,7 @@ def loop_of(
 ) -> Loop:
     """A loop with its gains; raises `TubecertError` if there are none for it, or none at the control rate."""
     tuning = _tuning(setting, controller, choice)
-    covered = controller in ADAPTIVE and control_rate is None and tuning.certified
+    covered = DESIGNS[controller].terms.predicts and control_rate is None and tuning.certified
     if control_rate is not None:
         tuning = _held(setting, tuning, choice, control_rate)
     problem = LoopProblem(
@@ -179,7 +179,7 @@ def loop_of(
 def _caution(setting: Setting, problem: LoopProblem) -> str:
     """That the adaptation is unstable at the control rate, and at which it is not; nothing if it is stable."""
     gains, rate = problem.gains, problem.control_rate
-    if problem.controller != "l1" or rate is None or gains is None or gains.adaptation_rate is None:
+    if not problem.terms.adapts or rate is None or gains is None or gains.adaptation_rate is None:
         return ""
     model = setting.model
     names = (*model.states, *model.inputs)
@@ -198,14 +198,11 @@ def _caution(setting: Setting, problem: LoopProblem) -> str:
 
 
 def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning:
-    if controller in ("nominal", "ccm"):
+    design = DESIGNS[controller]
+    if not design.terms.filters:
         return _Tuning(gains=None, kind=None, certified=False, words="no adaptation")
     kind = kind_for(controller, choice.source)
-    wanted: dict[str, Any] = {"bandwidth": choice.bandwidth}
-    if controller == "sampled":
-        wanted["sample_time"] = choice.sample_time
-    if controller == "l1":
-        wanted["adaptation_rate"] = choice.adaptation_rate
+    wanted = {name: getattr(choice, name) for name in ("bandwidth", *design.needs)}
     replaced = {name: float(value) for name, value in wanted.items() if value is not None}
     section = setting.certified.proven(kind.name.key)
     found = {} if section is None else dict(section.recipe)
@@ -219,7 +216,7 @@ def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning
         predictor_gain=_predictor(setting, controller, numbers),
         adaptation_rate=numbers.get("adaptation_rate"),
         smooth=_smooth(setting, controller),
-        sample_time=numbers.get("sample_time") if controller == "sampled" else None,
+        sample_time=numbers.get("sample_time") if design.terms.samples else None,
     )
     same = all(found.get(name) == value for name, value in replaced.items())
     words = f"certified by {kind.name}" if same else CHOSEN
@@ -303,12 +300,12 @@ def _radius(setting: Setting) -> float:
 
 def _smooth(setting: Setting, controller: Controller) -> float | None:
     smooth = setting.spec.adaptation.smooth
-    return None if smooth is None or controller != "l1" else float(smooth)
+    return None if smooth is None or not DESIGNS[controller].terms.adapts else float(smooth)
 
 
 def _predictor(setting: Setting, controller: Controller, numbers: Mapping[str, float]) -> float | Array:
     """A_m: the certificate's g, else the specification's matrix, else the bandwidth as g."""
     A_m = setting.spec.adaptation.A_m
-    if controller != "sampled" and A_m != "auto":
+    if not DESIGNS[controller].terms.samples and A_m != "auto":
         return np.array([[float(entry) for entry in row] for row in A_m])
     return numbers.get("predictor_gain", numbers["bandwidth"])

@@ -1,9 +1,9 @@
 """One lane from start to end: RK4 on the slow part, with the flow of the fast part inside every stage.
 
-x' = f + B(u* + k + h) + B u_a. The stages are those of the exponential Runge-Kutta method of Krogstad: between
-them h (and a moving B) are the polynomials of time through the stages so far, and the fast part flows under these.
-Without a fast part this is classical RK4. Source: S. Krogstad, Generalized integrating factor methods for stiff
-PDEs, J. Comput. Phys. 203, 2005.
+x' = f + B(u* + k + h) + B u_a, (0.1) with (0.4). The stages are those of the exponential Runge-Kutta method of
+Krogstad: between them h (and a moving B) are the polynomials of time through the stages so far, and the fast part flows
+under these. Without a fast part this is classical RK4. Source: S. Krogstad, Generalized integrating factor methods for
+stiff PDEs, J. Comput. Phys. 203, 2005.
 """
 
 from __future__ import annotations
@@ -14,35 +14,44 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled, entry
-from tubecert.simulate.computer import Computer, sample
-from tubecert.simulate.fast import ADAPTIVE, NONE, Fast, Inner, advance, inner, size
-from tubecert.simulate.feedback import Field, Force, Point, evaluate
+from tubecert.simulate.computer import Computer, Registers, sample
+from tubecert.simulate.fast import Fast, Inner, advance, inner
+from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, evaluate, point
 from tubecert.simulate.geodesic import FOUND, copied, forget
+from tubecert.simulate.layout import Layout, blocks
 from tubecert.simulate.program import Index
 from tubecert.simulate.small import copy, dot
 
 DIVERGED = 20
+STOPPED = 21
 _FAR = 1e6
 PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h")
+_DISTANCE, _DEVIATION, _U, _K, _XTILDE, _SIGMA_ERROR, _H = range(7)  # their places
+START, MIDDLE, END = range(3)  # of a step: the places of its plans
 
 
 class Grid(NamedTuple):
-    """Steps: `times` (S + 1, 2) are start and length in s, the last of length 0.
+    """Steps: `start` and `length` (S + 1,) in s, the last of length 0.
 
-    `marks` (S + 1, 3): the number of the length, and those of the computer's sample and of the output time at which the
-    step starts, or -1. `plan` (S + 1, 3, 2 n + m): x*, f(x*) + B(x*)u* and u* at start, middle and end of
-    every step.
+    `which` (S + 1,) is the number of the length, `sample` and `output` those of the computer's sample and of the output
+    time at which the step starts, or -1. `plan`: x* (S + 1, 3, n), f(x*) + B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m)
+    at start, middle and end of every step.
     """
 
-    times: Array
-    marks: Index
-    plan: Array
+    start: Array
+    length: Array
+    which: Index
+    sample: Index
+    output: Index
+    plan: Reference
 
 
-class Loop(NamedTuple):
-    """Everything that a compiled lane reads; `holds`: the computer holds the whole controller.
+class Lane(NamedTuple):
+    """Everything that a compiled lane reads.
 
-    A lane is stopped where |x - x*| exceeds `limit`.
+    `holds`: the computer holds the whole controller; `flows`: the fast part moves between the samples; `exact`: the
+    controller knows the state itself, else what is in `Work.measured`. A lane is stopped where |x - x*| exceeds
+    `limit`.
     """
 
     field: Field
@@ -50,125 +59,158 @@ class Loop(NamedTuple):
     fast: Fast
     computer: Computer | None
     holds: bool
+    flows: bool
+    exact: bool
     limit: float
     grid: Grid
+
+
+class Stages(NamedTuple):
+    """Of the four stages of a step: h (4, m), B (4, n, m), and the slopes w = f + B(u* + k + h) (4, n)."""
+
+    h: Array
+    B: Array
+    slope: Array
 
 
 class Work(NamedTuple):
     """What a compiled lane writes to while it runs.
 
-    `vectors` (6, n): x, where a stage is, and the four slopes w = f + B(u* + k + h); `h` (4, m) and `B` (4, n, m) of
-    the stages; `y` (2, Y): the fast part at the start and at the end of a flow; `inputs` (2, m): what is held, and u;
-    `sizes` (7,): what the peaks are taken of; `stop` (1,): not 0 if all lanes shall end now.
+    `x` (n,) at the start of the step, `state` (n,) where a stage is, `measured` (n,) what the controller knows of it:
+    the same memory as long as it knows the state exactly. `y`, `end` (Y,): the fast part at the start and at the end of
+    a flow. `u` (m,): the input that acts, but for a u_a that flows. `sizes` (7,): what the peaks are taken of. `stop`
+    (1,): not 0 if all lanes shall end now.
     """
 
-    vectors: Array
-    h: Array
-    B: Array
+    x: Array
+    state: Array
+    measured: Array
     y: Array
-    inputs: Array
-    gram: Array
+    end: Array
+    u: Array
     sizes: Array
     stop: Array
+    stages: Stages
+    kept: Registers
     point: Point
     inner: Inner
 
 
 class Output(NamedTuple):
-    """What lanes leave behind; nan where they did not come.
+    """What N lanes leave behind at K output times; nan where they did not come.
 
-    `values` (N, K, 2 n + 4 m + 1): x, xtilde, k, u_a, sigma_hat, h, distance at the output times; `peaks` (N, 7, 2):
-    the largest values and their times; `ends` (N, 2): why (0: it did not) and when a lane stopped.
+    x and xtilde (N, K, n), k, u_a, sigma_hat and h (N, K, m), distance (N, K). `peak` and `peak_time` (N, 7): the
+    largest values and when they were met; `status` and `ended` (N,): why (0: it was not) and when a lane was stopped.
     """
 
-    values: Array
-    peaks: Array
-    ends: Array
+    x: Array
+    xtilde: Array
+    k: Array
+    u_a: Array
+    sigma_hat: Array
+    h: Array
+    distance: Array
+    peak: Array
+    peak_time: Array
+    status: Index
+    ended: Array
 
 
-def work(point: Point, stop: Array) -> Work:
+def work(at: Layout, shared: Point, stop: Array) -> Work:
     """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
-    n, m = point.B.shape
-    fresh = Point(
-        point.memory.copy(),
-        np.zeros(n),
-        np.zeros((n, m)),
-        np.zeros((3, m)),
-        copied(point.curve),
-    )
+    n, m, Y = at.n, at.m, at.size
+    state = np.zeros(n)
     return Work(
-        np.zeros((6, n)),
-        np.zeros((4, m)),
-        np.zeros((4, n, m)),
-        np.zeros((2, size(n, m))),
-        np.zeros((2, m)),
-        np.zeros((m, m)),
-        np.zeros(len(PEAKS)),
-        stop,
-        fresh,
-        inner(n, m),
+        x=np.zeros(n),
+        state=state,
+        measured=state,
+        y=np.zeros(Y),
+        end=np.zeros(Y),
+        u=np.zeros(m),
+        sizes=np.zeros(len(PEAKS)),
+        stop=stop,
+        stages=Stages(np.zeros((4, m)), np.zeros((4, n, m)), np.zeros((4, n))),
+        kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
+        point=point(shared.memory.copy(), copied(shared.curve), n, m),
+        inner=inner(at),
     )
 
 
-def output(lanes: int, K: int, n: int, m: int) -> Output:
+def output(lanes: int, K: int, at: Layout) -> Output:
     """Nothing yet."""
-    ends = np.full((lanes, 2), np.nan)
-    ends[:, 0] = FOUND
-    return Output(np.full((lanes, K, 2 * n + 4 * m + 1), np.nan), np.zeros((lanes, len(PEAKS), 2)), ends)
+
+    def nothing(*shape: int) -> Array:
+        return np.full((lanes, K, *shape), np.nan)
+
+    return Output(
+        x=nothing(at.n),
+        xtilde=nothing(at.n),
+        k=nothing(at.m),
+        u_a=nothing(at.m),
+        sigma_hat=nothing(at.m),
+        h=nothing(at.m),
+        distance=nothing(),
+        peak=np.zeros((lanes, len(PEAKS))),
+        peak_time=np.zeros((lanes, len(PEAKS))),
+        status=np.full(lanes, FOUND),
+        ended=np.full(lanes, np.nan),
+    )
 
 
 @entry
-def run(first: int, last: int, loop: Any, starts: Any, work: Any, out: Any) -> None:
+def run(first: int, last: int, own: Any, starts: Any, work: Any, out: Any) -> None:
     """Runs the lanes first..last-1 from `starts` (N, n)."""
-    grid, fast, point, holds = loop.grid, loop.fast, work.point, loop.holds
-    flows = fast.kind != NONE and not holds
-    x, at, y, end, v = (
-        work.vectors[0],
-        work.vectors[1],
-        work.y[0],
-        work.y[1],
-        work.y.shape[1] - starts.shape[1],
-    )
     for lane in range(first, last):
-        copy(x, starts[lane])
+        copy(work.x, starts[lane])
         work.y[:] = 0.0
-        forget(point.curve.bend)
-        status = FOUND
-        for s in range(grid.times.shape[0]):
-            t, length = grid.times[s]
-            for stage in range(5):
-                half = 0.5 if 0 < stage < 3 else 1.0
-                share = 0.0 if stage == 0 else half * length
-                side = 0 if stage == 0 else (1 if half == 0.5 else 2)
-                if stage > 0 and flows:
-                    _polynomials(work.h, work.B, stage, work.inner)
-                    which, first_entry = 2 * grid.marks[s, 0] + side - 1, 0 if stage == 4 else v
-                    advance(fast, share, which, y, work.inner, first_entry, end)
-                if stage == 4:
-                    break
-                if work.stop[0] != 0.0:
-                    return
-                _stage_state(work.vectors, end, stage, share, flows)
-                plan = grid.plan[s, side]
-                if not _near(at, plan, loop.limit):
-                    status = DIVERGED
-                    break
-                whole = stage == 0 or not holds
-                status, energy = evaluate(loop.field, loop.force, lane, t + share, at, plan, whole, point)
-                if status != FOUND:
-                    break
-                f, B, inputs, held = point.f, point.B, point.inputs, work.inputs[0]
-                if stage == 0:
-                    count, place, distance = grid.marks[s, 1], grid.marks[s, 2], np.sqrt(max(energy, 0.0))
-                    if count >= 0:
-                        sample(fast, loop.computer, count, x, plan, f, B, inputs, y, held, work.gram)
-                    _sizes(fast.kind, holds, x, plan, y, inputs, work.inputs, work.sizes)
-                    _record(lane, place, t, distance, x, y, inputs, work.sizes, out)
-                _keep(plan, holds, held, f, B, inputs, work.h[stage], work.B[stage], work.vectors[2 + stage])
+        forget(work.point.curve.bend)
+        for s in range(own.grid.start.shape[0]):
+            status = _step(own, lane, s, work, out)
+            if status == STOPPED:
+                return
             if status != FOUND:
-                out.ends[lane, 0], out.ends[lane, 1] = status, t
+                out.status[lane], out.ended[lane] = status, own.grid.start[s]
                 break
-            _finish(work.vectors, work.y, length, flows)
+
+
+@compiled
+def _step(own: Any, lane: int, s: int, work: Any, out: Any) -> int:
+    """One step of a lane, and what it leaves behind at the step's start; why it is stopped, if it is."""
+    grid, fast, v = own.grid, own.fast, own.fast.at.v
+    t, length = grid.start[s], grid.length[s]
+    for stage in range(4):
+        share = 0.0 if stage == 0 else (length if stage == 3 else 0.5 * length)
+        side = START if stage == 0 else (END if stage == 3 else MIDDLE)
+        if stage > 0 and own.flows:
+            _polynomials(work.stages, stage, work.inner)
+            advance(fast, share, 2 * grid.which[s] + side - 1, work.y, work.inner, v, work.end)
+        if work.stop[0] != 0.0:
+            return STOPPED
+        _reach(work.x, work.stages.slope, work.end[v:], stage, share, own.flows, work.state)
+        plan = Reference(grid.plan.x[s, side], grid.plan.speed[s, side], grid.plan.u[s, side])
+        if not _near(work.state, plan.x, own.limit):
+            return DIVERGED
+        now = Moment(lane, t + share, work.state, work.measured, plan)
+        whole = stage == 0 or not own.holds
+        status, energy = evaluate(own.field, own.force, own.exact, now, whole, work.point)
+        if status != FOUND:
+            return int(status)
+        if stage == 0:
+            if grid.sample[s] >= 0:
+                sample(fast, own.computer, grid.sample[s], now, work.point, work.y, work.kept)
+            work.sizes[_DISTANCE] = np.sqrt(max(energy, 0.0))
+            if own.holds:
+                _what_acts(fast, plan, work.point, work.y, work.kept)
+            _measure_sizes(fast, now, work.point, work.y, work.sizes)
+            _record(fast, now, grid.output[s], work.point, work.y, work.sizes, out)
+        for j in range(work.u.shape[0]):
+            work.u[j] = work.kept.u[j] if own.holds else plan.u[j] + work.point.k[j]
+        _keep(stage, work.point, work.u, work.stages)
+    if own.flows:
+        _polynomials(work.stages, 4, work.inner)
+        advance(fast, length, 2 * grid.which[s] + END - 1, work.y, work.inner, 0, work.end)
+    _finish(work.x, work.stages.slope, work.y, work.end, length, v, own.flows)
+    return FOUND
 
 
 @compiled
@@ -182,51 +224,45 @@ def _near(x: Any, plan: Any, limit: float) -> bool:
 
 
 @compiled
-def _stage_state(vectors: Any, y: Any, stage: int, share: float, flows: bool) -> None:
-    """Where the stage is: x, the slope of the stage before, and what u_a has added meanwhile."""
-    n = vectors.shape[1]
-    v = y.shape[0] - n
-    for i in range(n):
-        vectors[1, i] = vectors[0, i]
+def _reach(x: Any, slope: Any, v: Any, stage: int, share: float, flows: bool, state: Any) -> None:
+    """Where the stage is: x, the slope of the stage before, and v, what u_a has added meanwhile."""
+    for i in range(x.shape[0]):
+        state[i] = x[i]
         if stage > 0:
-            vectors[1, i] += share * vectors[1 + stage, i]
+            state[i] += share * slope[stage - 1, i]
             if flows:
-                vectors[1, i] += y[v + i]
+                state[i] += v[i]
 
 
 @compiled
-def _finish(vectors: Any, y: Any, length: float, flows: bool) -> None:
-    """The end of the step becomes the start of the next."""
-    n = vectors.shape[1]
-    v = y.shape[1] - n
-    for i in range(n):
-        slope = vectors[2, i] + 2 * vectors[3, i] + 2 * vectors[4, i] + vectors[5, i]
-        vectors[0, i] += length / 6 * slope + (y[1, v + i] if flows else 0.0)
+def _finish(x: Any, slope: Any, y: Any, end: Any, length: float, v: int, flows: bool) -> None:
+    """The end of the step becomes the start of the next: x by RK4 and v, and y but for v."""
+    for i in range(x.shape[0]):
+        mean = slope[0, i] + 2 * slope[1, i] + 2 * slope[2, i] + slope[3, i]
+        x[i] += length / 6 * mean + (end[v + i] if flows else 0.0)
     for i in range(v if flows else 0):
-        y[0, i] = y[1, i]
+        y[i] = end[i]
 
 
 @compiled
-def _keep(
-    plan: Any, holds: bool, held: Any, f: Any, B: Any, inputs: Any, stage_h: Any, stage_B: Any, slope: Any
-) -> None:
-    """h and B of the stage, and its slope w = f + B(u* + k + h), without u_a."""
-    n, m = B.shape
+def _keep(stage: int, point: Any, u: Any, stages: Any) -> None:
+    """h and B of the stage, and its slope w = f + B(u + h), where u is without a u_a that flows."""
+    n, m = point.plant.B.shape
     for i in range(n):
-        slope[i] = f[i]
+        stages.slope[stage, i] = point.plant.f[i]
         for j in range(m):
-            stage_h[j], stage_B[i, j] = inputs[0, j], B[i, j]
-            u = held[j] if holds else plan[2 * n + j] + inputs[1, j]
-            slope[i] += B[i, j] * (u + inputs[0, j])
+            stages.h[stage, j], stages.B[stage, i, j] = point.h[j], point.plant.B[i, j]
+            stages.slope[stage, i] += point.plant.B[i, j] * (u[j] + point.h[j])
 
 
 @compiled
-def _polynomials(h: Any, B: Any, stage: int, inner: Any) -> None:
+def _polynomials(stages: Any, stage: int, inner: Any) -> None:
     """h and B as polynomials of the time over the length of the flow.
 
     Before the last stage they are lines from the first stage whose mean is the stage before, as in classical RK4; at
     last they run through start, the mean of the two stages in the middle, and end.
     """
+    h, B = stages.h, stages.B
     for j in range(h.shape[1]):
         inner.h[0, j], inner.h[1, j], inner.h[2, j] = _through(h[0, j], h[1, j], h[2, j], h[3, j], stage)
         for i in range(B.shape[1]):
@@ -237,6 +273,7 @@ def _polynomials(h: Any, B: Any, stage: int, inner: Any) -> None:
 
 @compiled
 def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float, float, float]:
+    """Coefficients of 1, s and s^2 of the polynomial before a stage, from the values a, b, c, d of the stages."""
     if stage == 1:
         return a, 0.0, 0.0
     if stage == 2:
@@ -247,39 +284,42 @@ def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float,
 
 
 @compiled
-def _sizes(kind: int, holds: bool, x: Any, plan: Any, y: Any, inputs: Any, own: Any, sizes: Any) -> None:
-    """What the peaks are taken of, but for the distance; k becomes what acts if a computer holds it."""
-    n, m = x.shape[0], inputs.shape[1]
-    h, k, u = inputs[0], inputs[1], own[1]
-    sizes[:] = 0.0
-    for i in range(n):
-        sizes[1] += (x[i] - plan[i]) ** 2
-    for j in range(m):
-        if holds:
-            k[j] = own[0, j] - plan[2 * n + j] - y[n + m + j]
-        u[j] = plan[2 * n + j] + k[j] + y[n + m + j]
-        if kind >= ADAPTIVE:  # or sampled
-            sizes[5] += (y[n + j] - h[j]) ** 2
-    sizes[2], sizes[3], sizes[4], sizes[6] = dot(u, u), dot(k, k), dot(y[:n], y[:n]), dot(h, h)
-    for q in range(1, 7):
-        sizes[q] = np.sqrt(sizes[q])
+def _what_acts(fast: Any, plan: Any, point: Any, y: Any, kept: Any) -> None:
+    """k becomes what acts while a computer holds u: with u* and u_a it adds up to that."""
+    u_a = blocks(y, fast.at).u_a
+    for j in range(fast.at.m):
+        point.k[j] = kept.u[j] - plan.u[j] - u_a[j]
 
 
 @compiled
-def _record(
-    lane: int, place: int, t: float, distance: float, x: Any, y: Any, inputs: Any, sizes: Any, out: Any
-) -> None:
+def _measure_sizes(fast: Any, now: Any, point: Any, y: Any, sizes: Any) -> None:
+    """What the peaks are taken of, but for the distance."""
+    own, k, h = blocks(y, fast.at), point.k, point.h
+    deviation, u, error = 0.0, 0.0, 0.0
+    for i in range(fast.at.n):
+        deviation += (now.x[i] - now.plan.x[i]) ** 2
+    for j in range(fast.at.m):
+        acting = now.plan.u[j] + k[j] + own.u_a[j]
+        u += acting * acting
+        if fast.terms.predicts:
+            error += (own.sigma_hat[j] - h[j]) ** 2
+    sizes[_DEVIATION], sizes[_U], sizes[_SIGMA_ERROR] = np.sqrt(deviation), np.sqrt(u), np.sqrt(error)
+    sizes[_K], sizes[_H] = np.sqrt(dot(k, k)), np.sqrt(dot(h, h))
+    sizes[_XTILDE] = np.sqrt(dot(own.xtilde, own.xtilde))
+
+
+@compiled
+def _record(fast: Any, now: Any, place: int, point: Any, y: Any, sizes: Any, out: Any) -> None:
     """Peaks at the start of the step, and the values if it is an output time."""
-    n, m = x.shape[0], inputs.shape[1]
-    sizes[0] = distance
-    for q in range(7):
-        if sizes[q] > out.peaks[lane, q, 0]:
-            out.peaks[lane, q, 0], out.peaks[lane, q, 1] = sizes[q], t
+    lane, own = now.lane, blocks(y, fast.at)
+    for q in range(sizes.shape[0]):
+        if sizes[q] > out.peak[lane, q]:
+            out.peak[lane, q], out.peak_time[lane, q] = sizes[q], now.t
     if place >= 0:
-        values = out.values[lane, place]
-        copy(values[:n], x)
-        copy(values[n : 2 * n], y[:n])
-        for j in range(m):
-            values[2 * n + j], values[2 * n + m + j] = inputs[1, j], y[n + m + j]
-            values[2 * n + 2 * m + j], values[2 * n + 3 * m + j] = y[n + j], inputs[0, j]
-        values[2 * n + 4 * m] = distance
+        copy(out.x[lane, place], now.x)
+        copy(out.xtilde[lane, place], own.xtilde)
+        copy(out.k[lane, place], point.k)
+        copy(out.u_a[lane, place], own.u_a)
+        copy(out.sigma_hat[lane, place], own.sigma_hat)
+        copy(out.h[lane, place], point.h)
+        out.distance[lane, place] = sizes[_DISTANCE]

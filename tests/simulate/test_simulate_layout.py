@@ -1,0 +1,198 @@
+"""Where things are in the compiled lanes: blocks of y, terms of the loops, and what is known of the state."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import tubecert
+from tubecert.expression import as_expression, sin, symbol
+from tubecert.model import ControlAffineModel
+from tubecert.simulate.compiled import entry
+from tubecert.simulate.fast import _rate, generator
+from tubecert.simulate.grid import fast_part
+from tubecert.simulate.integrator import ladder
+from tubecert.simulate.layout import blocks, layout, slices
+from tubecert.simulate.loops import CONTROLLERS, DESIGNS
+from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.stepping import output, run, work
+from tubecert.spec.simulation import CONTROLLERS as NAMES
+from tubecert.trajectory import constant_plan
+
+ROOM = Path(tubecert.__file__).parent / "simulate"
+X, Y, T = symbol("x1"), symbol("x2"), symbol("t")
+
+
+def exact(rows):
+    return tuple(tuple(as_expression(Fraction(entry)) for entry in row) for row in rows)
+
+
+TWO = ControlAffineModel(
+    states=("x1", "x2"),
+    inputs=("u1", "u2"),
+    f=(-X + Y, sin(X) - Y),
+    B=exact([["1", "1/2"], ["-1/4", "2"]]),
+    W=exact([["1", "-1/2"], ["-1/2", "1"]]),
+    rate=Fraction(1, 2),
+    h=None,
+)
+GAINS = Gains(
+    bandwidth=7.0,
+    projection_radius=100.0,
+    predictor_gain=np.array([[-3.0, 0.5], [0.25, -2.0]]),
+    adaptation_rate=11.0,
+    sample_time=0.1,
+)
+
+
+def problem(controller, **options):
+    gains = replace(GAINS, predictor_gain=3.0) if controller == "sampled" else GAINS
+    return LoopProblem(
+        model=TWO,
+        plan=constant_plan([0, 0], [0, 0], None),
+        controller=controller,
+        horizon=1.0,
+        times=np.linspace(0, 1, 5),
+        gains=gains,
+        **options,
+    )
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 1), (3, 2), (6, 4)])
+def test_blocks_cover_y_once_and_in_order(n, m):
+    at = layout(n, m)
+    y = np.arange(at.size)
+    parts = blocks.py_func(y, at)
+    assert np.array_equal(np.concatenate(parts), y)
+    assert [len(part) for part in parts] == [n, m, m, n, n]
+    assert parts._fields == ("xtilde", "sigma_hat", "u_a", "s_hat", "v")
+    assert all(np.array_equal(y[where], part) for where, part in zip(slices(at), parts, strict=True))
+    parts.u_a[:] = -1
+    assert (y == -1).sum() == m  # they are views
+
+
+@entry
+def rate(fast, y, h, B, dy):
+    _rate(fast, False, y, h, B, dy)
+
+
+@pytest.mark.parametrize("controller", [name for name in CONTROLLERS if DESIGNS[name].terms.filters])
+def test_both_forms_of_the_right_hand_sides_agree(controller):
+    """The matrix of the exact flow and the rate that RK4 integrates, at random states."""
+    rng = np.random.default_rng(2)
+    fast = fast_part(problem(controller), np.array([0.1]), 0)
+    B = np.array([[1.0, 0.5], [-0.25, 2.0]])
+    L, E = generator(fast, B)
+    y, h = rng.normal(size=fast.at.size), rng.normal(size=2)
+    found = np.zeros_like(y)
+    rate(fast, y, h, B, found)
+    np.testing.assert_allclose(found, L @ y + E @ h, atol=1e-13)
+
+
+@pytest.mark.parametrize("controller", [name for name in CONTROLLERS if DESIGNS[name].terms.filters])
+def test_right_hand_sides_are_those_of_the_theory(controller):
+    """(0.6) less (0.1), (0.7), (0.8) and (4.5), written out a second time."""
+    rng = np.random.default_rng(3)
+    B, A = np.array([[1.0, 0.5], [-0.25, 2.0]]), GAINS.A_m(2) if controller != "sampled" else -3.0 * np.eye(2)
+    xt, sigma, u_a, s_hat, h = (rng.normal(size=2) for _ in range(5))
+    y = np.concatenate([xt, sigma, u_a, s_hat, np.zeros(2)])
+    zero = np.zeros(2)
+    expected = {
+        "reference": [zero, zero, -7 * (u_a + h), zero, B @ u_a],
+        "l1": [A @ xt + B @ (sigma - h), -11 * B.T @ xt, -7 * (u_a + sigma), zero, B @ u_a],
+        "sampled": [A @ xt + s_hat - B @ h, zero, -7 * (u_a + sigma), zero, B @ u_a],
+    }[controller]
+    fast = fast_part(problem(controller), np.array([0.1]), 0)
+    found = np.zeros(fast.at.size)
+    rate(fast, y, h, B, found)
+    np.testing.assert_allclose(found, np.concatenate(expected), atol=1e-13)
+
+
+def test_loops_are_named_alike_everywhere():
+    assert NAMES == CONTROLLERS
+    assert not DESIGNS["nominal"].disturbed
+    assert all(DESIGNS[name].disturbed for name in CONTROLLERS if name != "nominal")
+    assert all(hasattr(GAINS, need) for design in DESIGNS.values() for need in design.needs)
+
+
+# the state, and what is measured of it
+
+
+def told(controller, *, measured, **options):
+    """x (K, 2) and d(x*, x) (K,) of a loop whose controller is told that the state is `measured`, all the time."""
+    case = problem(controller, **options)
+    steps = ladder(case, (sin(T), as_expression(Fraction(1, 2))))
+    disturbance = Disturbance.from_expressions((sin(T), as_expression(Fraction(1, 2))), TWO, 1)
+    lane = steps.level(3, disturbance)._replace(exact=False)
+    memory = work(lane.fast.at, steps.point, np.zeros(1))
+    seen = memory.point.plant._replace(f=np.zeros(2), B=np.zeros((2, 2)))
+    memory = memory._replace(measured=np.array(measured, dtype=float), point=memory.point._replace(seen=seen))
+    out = output(1, len(case.times), lane.fast.at)
+    run(0, 1, lane, START, memory, out)
+    assert out.status[0] == 0
+    return case.times, out
+
+
+START = np.array([[0.3, -0.2]])
+B = np.array([[1.0, 0.5], [-0.25, 2.0]])
+M = np.linalg.inv([[1.0, -0.5], [-0.5, 1.0]])
+
+
+def test_a_controller_that_sees_the_plan_does_nothing():
+    """What is measured drives the feedback; the plant, h and the distance are those of the state."""
+    times, out = told("ccm", measured=[0, 0])
+
+    def free(t, x):
+        return np.array([-x[0] + x[1], np.sin(x[0]) - x[1]]) + B @ np.array([np.sin(t), 0.5])
+
+    expected = solve_ivp(free, (0, 1), START[0], t_eval=times, rtol=1e-10, atol=1e-12).y.T
+    np.testing.assert_allclose(out.x[0], expected, atol=1e-7)
+    assert (out.k == 0).all()
+    distance = np.sqrt(np.einsum("ki,ij,kj->k", expected, M, expected))
+    np.testing.assert_allclose(out.distance[0], distance, atol=1e-7)
+
+
+def test_the_feedback_is_that_of_the_measured_state():
+    measured = np.array([0.2, 0.4])
+    _, out = told("ccm", measured=measured)
+    f = np.array([-measured[0] + measured[1], np.sin(measured[0]) - measured[1]])
+    m = M @ measured
+    phi0, phi1 = 2 * m @ f + 2 * 0.5 * measured @ m, 2 * B.T @ m
+    k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(2)
+    assert phi0 > 0
+    np.testing.assert_allclose(out.k[0], np.tile(k, (len(out.k[0]), 1)), rtol=1e-12)
+
+
+def test_a_computer_predicts_from_the_measured_state():
+    """At the first sample xhat is what is measured: xtilde is 0 there, and the state is elsewhere."""
+    _, out = told("l1", measured=[0, 0], control_rate=10.0)
+    assert (out.xtilde[0, 0] == 0).all()
+    # f, B and k are those at the plan: xhat moves by dt B(u_a + sigma_hat), both 0 at first
+    assert np.abs(out.xtilde[0]).max() < 1e-12
+    assert np.abs(out.x[0]).max() > 0.3
+
+
+# the rules of the room
+
+
+def test_entries_are_counted_in_one_place():
+    counted = re.compile(r"\bn \+ m\b|\bm \+ n\b|\b[23] \* n\b|\bn \+ 2\b")
+    for path in ROOM.glob("*.py"):
+        if path.name != "layout.py":
+            for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+                assert not counted.search(line.split("#")[0]), f"{path.name}:{number}: {line}"
+
+
+def test_what_travels_together_is_passed_together():
+    for path in ROOM.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                count = len(node.args.posonlyargs + node.args.args + node.args.kwonlyargs)
+                assert count <= 7, f"{path.name}: {node.name} takes {count} arguments"
