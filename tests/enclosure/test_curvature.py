@@ -309,7 +309,7 @@ def test_curvature_that_changes_its_sign_is_needed_by_more_than_half(several):
 
 
 def test_variables_beyond_the_vertices_keep_the_whole_curvature(monkeypatch):
-    monkeypatch.setattr(taylor, "_MOST_VERTICES", 1)
+    monkeypatch.setattr(taylor, "MOST_VERTICES", 1)
     for f, least, most in (
         (x * y * 4 + x**2 + y**2, -2, 6),
         (x * y + z * x + y * z + x**2 + y**2 + z**2, -1.5, 6),
@@ -332,7 +332,7 @@ def test_any_number_of_vertices_contains(data, kept):
     hi = [a + w for a, w in zip(lo, width, strict=True)]
     point = exact_points(lo, hi, data.draw(st.lists(shares, min_size=3, max_size=3)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(taylor, "_MOST_VERTICES", kept)
+        patch.setattr(taylor, "MOST_VERTICES", kept)
         function = MatrixFunction([[[p.expression]]])
         own = [int(name[1:]) for name in function.variables]
         e = function.expand(np.array([lo])[:, own], np.array([hi])[:, own])

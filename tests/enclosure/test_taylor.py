@@ -160,7 +160,7 @@ def test_more_variables_than_vertices_are_bounded_by_their_slopes():
         function = MatrixFunction([[[case]]])
         lo, hi = np.full((1, 11), -0.5), np.full((1, 11), 1.0)
         expansion = function.expand(lo, hi)
-        assert len(expansion.signs) <= 2**taylor._MOST_VERTICES
+        assert len(expansion.signs) <= 2**taylor.MOST_VERTICES
         upper = (expansion.mid[0] + expansion.rad[0] + expansion.rest[0].sum(axis=0)).max()
         assert upper >= function.floats(hi)[0].max()
         assert upper <= 4 * function.floats(hi)[0].max()

@@ -70,6 +70,7 @@ class SumOfNorms:
         for mid, rad, rest in zip(e.mid, e.rad, e.rest, strict=True):
             value = value + spectral_norm_midrad(mid, rad).hi + norm_bound(rest.sum(axis=0))
             caused += norm_bound(rest.max(axis=2))
+        # additions only, of bounds: one for each variable in a rest and two for each matrix, below 90 u <= 1e-14
         return estimate_of(value * (1 + 1e-14), caused, e, lo, hi)
 
     def lower(self, lo: Array, hi: Array) -> Array:

@@ -38,6 +38,7 @@ class ProjectedPencil:
         filled = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
         mid = e.mid[0] - target * e.mid[1] - s * e.mid[2]
         size = np.abs(e.mid[0]) + abs(target) * np.abs(e.mid[1]) + s * np.abs(e.mid[2])
+        # mid: two products, two differences, 4 u of `size` (itself short by 4 u); 1e-15 > 9 u. Radii as in `pencil`
         rad = (filled[0] + abs(target) * filled[1] + s * filled[2]) * (1 + 1e-14) + 1e-15 * size
         excess = eigenvalues_midrad(*congruence(t, mid, rad)).hi[..., -1]
         proven = (excess <= 0).all(axis=1) if np.isfinite(target) else np.zeros(len(lo), dtype=bool)
