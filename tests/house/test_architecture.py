@@ -17,6 +17,7 @@ ROOMS = [
     "findings",
     "files",
     "kept",
+    "executor",
     "libraries",
     "verdict",
     "expression",

@@ -76,38 +76,19 @@ def _nothing(paths: Sequence[str]) -> list[Checked]:
 
 def _checked(files: Sequence[str], options: CheckOptions, jobs: int, output: Output) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
-    from tubecert.checking import check
+    from functools import partial
 
-    workers = min(jobs, len(files))
-    if workers > 1:
-        return _in_parallel(files, options, workers)
+    from tubecert.checking import check
+    from tubecert.executor import Serial, chosen
+
+    executor = chosen(jobs, len(files))
+    if not isinstance(executor, Serial):
+        return executor.map(partial(check, options=options), files)
     from tubecert.report import progress
 
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        return [check(file, options, report) for file in files]
-
-
-def _in_parallel(files: Sequence[str], options: CheckOptions, workers: int) -> list[Checked]:
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    from tubecert.checking import check
-
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts) as pool:
-        try:
-            return [task.result() for task in [pool.submit(check, file, options) for file in files]]
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _leave_interrupts() -> None:
-    """An interruption is dealt with by the command, not by each of its workers."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return executor.map(partial(check, options=options, progress=report), files)
 
 
 def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:

@@ -1,0 +1,75 @@
+"""Who does independent pieces of work: this process, or several.
+
+`map` gives the results in the order of the items, whichever is ready first. An exception of a piece is raised, a worker
+that dies is a `WorkerError`; after either, and after an interruption, no worker is left. Functions, items and results
+of `Processes` must be picklable.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class WorkerError(RuntimeError):
+    """A worker process ended in the middle of its work (it was killed, or ran out of memory)."""
+
+
+class Executor(Protocol):
+    """Something that applies a function to items."""
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """The results, in the order of the items."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Serial:
+    """One after the other, in this process."""
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """The results, in the order of the items."""
+        return [function(item) for item in items]
+
+
+@dataclass(frozen=True, slots=True)
+class Processes:
+    """At the same time, in as many processes as `workers`."""
+
+    workers: int
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """The results, in the order of the items."""
+        before = set(multiprocessing.active_children())
+        context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
+        pool = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts)
+        try:
+            return [task.result() for task in [pool.submit(function, item) for item in items]]
+        except BrokenProcessPool:
+            message = (
+                "a worker ended in the middle of its work: killed, or out of memory; fewer --jobs need less"
+            )
+            raise WorkerError(message) from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in set(multiprocessing.active_children()) - before:
+                worker.terminate()
+                worker.join()
+
+
+def chosen(workers: int, pieces: int) -> Executor:
+    """Processes where they help: no more of them than pieces of work."""
+    return Processes(min(workers, pieces)) if min(workers, pieces) > 1 else Serial()
+
+
+def _leave_interrupts() -> None:
+    """An interruption is dealt with by the command, not by each of its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
