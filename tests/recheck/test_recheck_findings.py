@@ -167,5 +167,5 @@ def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
             for order in (0, 1)
         ]
         tight = sampled[0] * place.rho + sampled[1] * place.rho**2 / 8
-        assert geodesics.unique(place, tight * Fraction(1003, 1000)).holds
-        assert not geodesics.unique(place, tight * Fraction(999, 1000)).holds
+        assert geodesics.unique(place, tight * Fraction(10002, 10000)).holds
+        assert not geodesics.unique(place, tight * Fraction(9998, 10000)).holds
