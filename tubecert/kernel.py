@@ -194,7 +194,7 @@ def _decided(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -
         verdict=_against(checked.margins.values()),
         decisive=checked,
         role=proposal.role,
-        shortfalls=_failing(checked),
+        shortfalls=_failing(checked) or blocked,
     )
 
 
