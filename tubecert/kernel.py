@@ -118,7 +118,8 @@ def _margins(problem: TubeProblem, recipe: R) -> Mapping[str, Interval]:
 def _proves(problem: TubeProblem, recipe: Recipe, margins: Mapping[str, Interval]) -> bool:
     """Whether all that the theorem asks for is proven."""
     theorem = theorem_of(type(recipe))
-    return not theorem.provisos(problem) and not theorem.unbounded(problem) and _holds(margins)
+    sound = not theorem.provisos(problem) and not theorem.unbounded(problem)
+    return sound and theorem.is_about(problem, recipe) and _holds(margins)
 
 
 def _holds(margins: Mapping[str, Interval]) -> bool:
@@ -156,6 +157,7 @@ def obstacles(problem: TubeProblem, theorem: Theorem[R]) -> tuple[Shortfall, ...
 
 def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Judgement[R]:
     """The verdict on the gains that a search proposes, or that were asked for, and the proofs beside it."""
+    proposal = _about(problem, theorem, proposal)
     decided = _decided(problem, theorem, proposal)
     provisos = theorem.provisos(problem)
     if provisos:
@@ -171,6 +173,25 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
         around={k: m.lo for k, m in margins_along(problem, proposal.around).items()}
         if proposal.around
         else {},
+    )
+
+
+def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Proposal[R]:
+    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed."""
+
+    def kept(recipe: R | None) -> R | None:
+        return recipe if recipe is not None and theorem.is_about(problem, recipe) else None
+
+    def those(recipes: Iterable[R]) -> tuple[R, ...]:
+        return tuple(recipe for recipe in recipes if theorem.is_about(problem, recipe))
+
+    return replace(
+        proposal,
+        decisive=kept(proposal.decisive),
+        hopeless=kept(proposal.hopeless),
+        beside={role: r for role, r in proposal.beside.items() if theorem.is_about(problem, r)},
+        curve=those(proposal.curve),
+        around=those(proposal.around),
     )
 
 
@@ -220,7 +241,7 @@ def _ultimate(problem: TubeProblem, decisive: Checked[R], proposal: Proposal[R])
     """What is proven of the long run at the decisive gains, by their own theorem or by the companion's."""
     if theorem_of(type(decisive.recipe)).ultimate is not None:
         return decisive.ultimate_radius
-    if proposal.companion is None or not _same_gains(decisive.recipe, proposal.companion):
+    if type(proposal.companion) not in THEOREMS or not _same_gains(decisive.recipe, proposal.companion):
         return None
     return check(problem, proposal.companion).ultimate_radius
 

@@ -63,6 +63,29 @@ LIES = {
 CASES = [(key, name) for key, lies in LIES.items() for name in lies]
 
 
+def other(**numbers):
+    """A recipe with other numbers."""
+    return lambda recipe: replace(recipe, **numbers)
+
+
+# what margins alone would let pass: the theorems are stated for this loop and for positive gains
+for _key, _lies in LIES.items():
+    _lies |= {
+        "another predictor than was asked for": other(predictor_gain=Fraction(1, 10)),
+        "a predictor that is not damped": other(predictor_gain=Fraction(-1000)),
+        "no predictor": other(predictor_gain=None),
+        "a negative bandwidth": less("bandwidth", factor=Fraction(-1)),
+        "no clip at all": other(projection_radius=Fraction(0)),
+        "a number that is none": other(bandwidth=float("nan")),
+        "a binary number": other(bandwidth=20.0),
+    }
+LIES["conditions_26"]["a negative rate"] = less("adaptation_rate", factor=Fraction(-1))
+LIES["distance"]["a negative error"] = less("prediction_error", factor=Fraction(-1))
+LIES["distance"]["a negative uncertainty"] = less("uncertainty", factor=Fraction(-1))
+LIES["sampled"]["a negative sample time"] = less("sample_time", factor=Fraction(-1))
+CASES = [(key, name) for key, lies in LIES.items() for name in lies]
+
+
 @pytest.fixture(scope="module")
 def bounded():
     """A shipped specification, up to its proven constants."""
@@ -173,7 +196,7 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
             told = honest.propose(problem, asked)
             return replace(told, beside={}, curve=tuple(map(lie, told.curve)), around=())
 
-        monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose))
+        monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose, slopes=honest.slopes))
     result = certify(load(str(CONFIG)), Options(conditions="all"))
     assert result["verdict"] == "certified"
     found = recheck(certificate.dump(certificate.seal(result, {})), "made")
@@ -184,6 +207,24 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
 
 
 # --- the kernel itself
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.key)
+def test_a_recipe_of_another_theorem_proves_nothing_here(kind, problem):
+    for stranger in KINDS:
+        found = PROPOSERS[stranger.theorem.recipe].propose(problem, Asked())
+        section = kind.section(problem, replace(found, companion=None, around=()))
+        assert (section.verdict is Verdict.CERTIFIED) == (stranger is kind)
+        assert bool(section.curve) == (stranger is kind)
+
+
+def test_a_general_predictor_cannot_be_exchanged():
+    almost = ((Fraction("-3.5"), Fraction(1, 10**12)), (Fraction(0), Fraction("-3.5")))
+    for kind in KINDS:
+        honest = PROPOSERS[kind.theorem.recipe].propose(alive(A_m=almost), Asked()).decisive
+        assert isinstance(check(alive(A_m=almost), honest), Proof)
+        swapped = replace(honest, predictor_gain=Fraction(4) if honest.predictor_gain is None else None)
+        assert not kind.theorem.is_about(alive(A_m=almost), swapped)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.key)

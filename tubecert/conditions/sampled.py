@@ -192,4 +192,5 @@ THEOREM = Theorem(
     formula=_at_once,
     obstacles=obstacles,
     ultimate=ultimate_radius,
+    own_predictor=True,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import Any, Generic, Protocol, TypeVar, cast
 
@@ -36,6 +36,8 @@ class Recipe(Protocol):
 
 R = TypeVar("R", bound=Recipe)
 
+_AUXILIARY = ("speed", "prediction_error", "uncertainty")  # bounds, which may be 0; all else are gains
+
 
 def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
     del problem
@@ -50,7 +52,8 @@ class Theorem(Generic[R]):
     recipe with the same gains, so that one that is not positive refutes the gains. `obstacles`: what no gains can
     overcome. `provisos`: why the formulas that the problem asks for prove nothing, if so. `formula`: everything that
     the margins contain, in floats at some gains, to record which constants it needs. `ultimate`: |x - x*| is at most
-    this in the long run, for a recipe that is proven.
+    this in the long run, for a recipe that is proven. `own_predictor`: where a general matrix A_m is asked for, the
+    theorem is about -g I with a gain of its own.
     """
 
     recipe: type[R]
@@ -60,6 +63,35 @@ class Theorem(Generic[R]):
     obstacles: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     ultimate: Callable[[TubeProblem, R], float] | None = None
+    own_predictor: bool = False
+
+    def is_about(self, problem: TubeProblem, recipe: object) -> bool:
+        """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its predictor.
+
+        The theorems are stated for positive gains; a negative g would make q = 2 g, and with it the bound of the
+        prediction error, smaller than it is.
+        """
+        if type(recipe) is not self.recipe:
+            return False
+        numbers = {item.name: getattr(recipe, item.name) for item in fields(cast("Any", recipe))}
+        g = numbers.pop("predictor_gain")
+        sizes = [value for name, value in numbers.items() if name in _AUXILIARY]
+        gains = [
+            *(value for name, value in numbers.items() if name not in _AUXILIARY),
+            *([] if g is None else [g]),
+        ]
+        signed = all(isinstance(x, Fraction) and x > 0 for x in gains) and all(
+            isinstance(x, Fraction) and x >= 0 for x in sizes
+        )
+        return signed and self._fits(problem, g)
+
+    def _fits(self, problem: TubeProblem, g: Fraction | None) -> bool:
+        """Whether -g I (None: the matrix A_m) is the predictor of the problem, or free to be chosen."""
+        if problem.A_m is None:
+            return g is not None
+        if problem.predictor_gain is not None:
+            return g == problem.predictor_gain
+        return (g is not None) if self.own_predictor else g is None
 
     def needs(self, problem: TubeProblem) -> frozenset[str]:
         """The constants that the formulas contain with the options of the problem, by field name; recorded."""
