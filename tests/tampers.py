@@ -300,7 +300,15 @@ MAY_BE_ADDED = [
     r"plan\.samples",
     r"run\b.*",
 ]
+
+
+def another_name(old, new):
+    """An input of another name: inputs enter through the columns of B, and occur nowhere else."""
+    return isinstance(new, str) and re.fullmatch(r"[A-Za-z]\w{0,39}", new) and new not in BAD_NAMES
+
+
 OF_STRUCTURE = [
+    (r"spec\.effective\.system\.inputs\[\]", another_name),
     (r"spec\.effective\.(name|expect|simulation|obstacles)\b.*", anything),
     (r"spec\.effective\.system\.(units|parameters)\b.*", anything),
     (r"spec\.effective\.trajectory\.(Q|R|knots|file)\b.*", anything),  # how the plan was found
