@@ -121,12 +121,12 @@ def straight(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
 def case(name: str, Gamma: float, omega: float, horizon: float) -> tuple[Any, Any, np.ndarray]:
     """Problem, disturbance of one lane and start; the plan is the origin, as in the numpy loops."""
     from tubecert.model import build
-    from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+    from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
     from tubecert.spec import load
     from tubecert.trajectory import constant_plan
 
     model = build(load(str(ROOT / "configs" / f"{name}.yaml")))
-    gains = Gains(bandwidth=omega, projection_radius=100.0, adaptation_rate=Gamma)
+    gains = LoopGains(bandwidth=omega, projection_radius=100.0, adaptation_rate=Gamma)
     n = len(model.states)
     problem = LoopProblem(
         model=model,

@@ -16,7 +16,7 @@ from tubecert.certificate import digest, dump, seal
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
-from tubecert.simulate.certified import adopted, plan_of, require_tube
+from tubecert.simulate.certified import adopted, certified_plan, require_tube
 from tubecert.simulate.grid import computer
 from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
@@ -111,7 +111,7 @@ def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
 
 def test_the_plan_is_that_of_the_certificate():
     spec, result = certified("two_state", "0.4")
-    plan = plan_of(spec, build(spec), result)
+    plan = certified_plan(spec, build(spec), result)
     assert plan.knots is not None
     assert plan.knots.x[0] == (Fraction("3.4"), Fraction("-2.4"))
     x, _ = plan.enclose(np.array([5.0]), np.array([5.0]))

@@ -16,7 +16,7 @@ from tubecert.expression import sin, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.compiled import COMPILING, KERNELS, compiled, entry, told
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.trajectory.plan import constant_plan
 
 X, T = symbol("x1"), symbol("t")
@@ -94,7 +94,7 @@ def test_an_interruption_ends_runs_that_would_take_minutes():
         controller="l1",
         horizon=1000.0,
         times=np.linspace(0, 1000, 3),
-        gains=Gains(bandwidth=5.0, projection_radius=50.0, adaptation_rate=1e8),
+        gains=LoopGains(bandwidth=5.0, projection_radius=50.0, adaptation_rate=1e8),
     )
     h = Disturbance.from_expressions((sin(T),), model, 4)
     starts = np.full((4, 1), 0.1)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.integrator import integrate, ladder, run
-from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.spec import load_text
 from tubecert.trajectory.plan import constant_plan
 
@@ -112,7 +112,7 @@ SIZES = {"nominal": 0, "ccm": 0, "reference": 1, "l1": 4}
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", SIZES)
 def test_loops_agree_with_dop853(controller):
-    gains = Gains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e4)
+    gains = LoopGains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e4)
     case = problem(controller, gains=gains)
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
     expected = dop853(right_hand_side(controller, gains), z0, case.times)
@@ -131,7 +131,7 @@ def test_loops_agree_with_dop853(controller):
 @pytest.mark.slow
 def test_sharp_projection_agrees_with_dop853_between_its_switches():
     """The radius is half of what h needs: the projection works for most of the time."""
-    gains = Gains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
+    gains = LoopGains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
     case = problem("l1", gains=gains, K=41)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
     assert not found.failures
@@ -182,7 +182,7 @@ def switching(gains, times):
 
 @pytest.mark.slow
 def test_smooth_projection_agrees_with_dop853():
-    gains = Gains(
+    gains = LoopGains(
         bandwidth=10.0, projection_radius=1.5, predictor_gain=2.0, adaptation_rate=400.0, smooth=0.2
     )
     case = problem("l1", gains=gains)
@@ -229,7 +229,7 @@ def sampled_reference(gains, times, h=h2):
 @pytest.mark.slow
 @pytest.mark.parametrize("radius", [50.0, 1.0])
 def test_sampled_loop_agrees_with_its_formulas(radius):
-    gains = Gains(bandwidth=20.0, projection_radius=radius, predictor_gain=3.0, sample_time=0.037)
+    gains = LoopGains(bandwidth=20.0, projection_radius=radius, predictor_gain=3.0, sample_time=0.037)
     case = problem("sampled", gains=gains)
     expected = sampled_reference(gains, case.times)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-7)
@@ -272,7 +272,7 @@ SMOOTH_H = (sin(2 * T) + Fraction(3, 10) * sin(X),)
 )
 def test_steps_have_order_four(controller, B, rate, least):
     """A system whose feedback has no kinks; Gamma such that the steps resolve the oscillation."""
-    gains = Gains(
+    gains = LoopGains(
         bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=rate, sample_time=0.5
     )
     case = LoopProblem(
@@ -291,7 +291,7 @@ def test_steps_have_order_four(controller, B, rate, least):
 
 def test_steps_far_longer_than_the_oscillation_are_accurate():
     """Gamma 1e10 turns 6000 rad in the longest step; the error is that of the slow part."""
-    gains = Gains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=1e10)
+    gains = LoopGains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=1e10)
     case = LoopProblem(
         model=scalar(STEADY, constant(1)),
         plan=ORIGIN,
@@ -346,7 +346,7 @@ def slanted_rate(controller, gains):
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["reference", "l1"])
 def test_state_dependent_inputs_agree_with_dop853(controller):
-    gains = Gains(bandwidth=10.0, projection_radius=5.0, predictor_gain=4.0, adaptation_rate=2000.0)
+    gains = LoopGains(bandwidth=10.0, projection_radius=5.0, predictor_gain=4.0, adaptation_rate=2000.0)
     case = problem(controller, model=SLANTED, gains=gains)
     start = np.array([[0.2, -0.25]])
     z0 = np.concatenate([start[0], np.zeros(SIZES[controller])])
@@ -363,7 +363,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["ccm", "reference", "l1", "sampled"])
 def test_held_controllers_converge_to_the_continuous_ones(controller):
-    gains = Gains(
+    gains = LoopGains(
         bandwidth=10.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=900.0, sample_time=0.05
     )
     h = Disturbance.from_expressions(wavy_h(), TWO, 1)
@@ -378,7 +378,7 @@ def test_held_controllers_converge_to_the_continuous_ones(controller):
 
 
 def test_the_projection_holds_under_a_control_rate():
-    gains = Gains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
+    gains = LoopGains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
     case = problem("l1", gains=gains, control_rate=200.0, K=41)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-6)
     assert 0.99 < np.abs(found.sigma_hat).max() <= 1 + 1e-12
@@ -401,7 +401,7 @@ def test_lanes_do_not_know_each_other():
         centre=np.array([0.1, 0.2]),
     )
     d.push[7] = 0.0
-    gains = Gains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
+    gains = LoopGains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
     case = problem("l1", model=UNSTABLE, gains=gains, horizon=1.0)
     together = integrate(case, starts, d, tolerance=1e-5)
     assert [item.lane for item in together.failures] == [7]
@@ -454,7 +454,7 @@ def test_disturbances_are_what_they_say():
 
 
 def test_bad_arguments_are_refused():
-    gains = Gains(bandwidth=10.0, projection_radius=1.0)
+    gains = LoopGains(bandwidth=10.0, projection_radius=1.0)
     for options in (
         {"controller": "l1", "gains": gains},
         {"controller": "sampled", "gains": gains},
@@ -466,8 +466,8 @@ def test_bad_arguments_are_refused():
         with pytest.raises(ValueError, match=r"needs|must"):
             problem(**options)
     with pytest.raises(ValueError, match="bandwidth"):
-        Gains(bandwidth=0.0, projection_radius=1.0)
-    held = Gains(bandwidth=10.0, projection_radius=1.0, sample_time=0.03)
+        LoopGains(bandwidth=0.0, projection_radius=1.0)
+    held = LoopGains(bandwidth=10.0, projection_radius=1.0, sample_time=0.03)
     case = problem("sampled", gains=held, control_rate=50.0)
     with pytest.raises(ValueError, match="multiple"):
         integrate(case, START, Disturbance.from_expressions(None, TWO, 1), tolerance=1e-3)

@@ -21,7 +21,7 @@ from tubecert.simulate.grid import fast_part
 from tubecert.simulate.integrator import ladder
 from tubecert.simulate.layout import blocks, layout, slices
 from tubecert.simulate.loops import CONTROLLERS, DESIGNS
-from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.simulate.stepping import output, run, work
 from tubecert.spec.simulation import CONTROLLERS as NAMES
 from tubecert.trajectory import constant_plan
@@ -43,7 +43,7 @@ TWO = ControlAffineModel(
     rate=Fraction(1, 2),
     h=None,
 )
-GAINS = Gains(
+GAINS = LoopGains(
     bandwidth=7.0,
     projection_radius=100.0,
     predictor_gain=np.array([[-3.0, 0.5], [0.25, -2.0]]),

@@ -17,7 +17,7 @@ from tubecert.expression import cos, sin, symbol
 from tubecert.expression.matrix import constants
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.spec import Knots
 from tubecert.trajectory.pieces import piecewise_plan
 
@@ -270,8 +270,8 @@ def agree(found, expected, fast=1e-4):
 
 
 JUMPS = [np.array([u]) for u in (1.0, -0.5, 2.0, 0.0, -1.5, 0.7)]
-L1 = Gains(bandwidth=20.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=2e4)
-C = Gains(bandwidth=20.0, projection_radius=50.0, predictor_gain=3.0, sample_time=0.037)
+L1 = LoopGains(bandwidth=20.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=2e4)
+C = LoopGains(bandwidth=20.0, projection_radius=50.0, predictor_gain=3.0, sample_time=0.037)
 
 
 @pytest.mark.slow
@@ -291,7 +291,7 @@ PAIRS = [np.array(u) for u in ((0.3, -0.2), (-0.4, 0.5), (0.2, 0.1))]
 @pytest.mark.slow
 @pytest.mark.parametrize("smooth", [None, 0.2], ids=["hard", "smooth"])
 def test_two_inputs_whose_estimate_slides_along_the_ball(smooth):
-    gains = Gains(
+    gains = LoopGains(
         bandwidth=10.0, projection_radius=RADIUS, predictor_gain=2.0, adaptation_rate=300.0, smooth=smooth
     )
     found, expected = compared(TWO_INPUTS, ("l1", gains), PAIRS, span=0.5, K=31)
@@ -306,7 +306,7 @@ def test_two_inputs_whose_estimate_slides_along_the_ball(smooth):
 
 @pytest.mark.slow
 def test_two_sampled_inputs_are_clipped_to_the_ball():
-    gains = Gains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=3.0, sample_time=0.04)
+    gains = LoopGains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=3.0, sample_time=0.04)
     found, expected = compared(TWO_INPUTS, ("sampled", gains), PAIRS, span=0.3, K=12)
     agree(found, expected)
     size = np.linalg.norm(found.sigma_hat[0], axis=1)

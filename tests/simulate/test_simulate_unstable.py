@@ -16,14 +16,14 @@ from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.problem import Disturbance, Gains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.simulate.setting import Choice, loop_of
 from tubecert.simulate.summary import outcome, summary
 from tubecert.trajectory import constant_plan
 
 T, X, Y = symbol("t"), symbol("x1"), symbol("x2")
 PLAN = constant_plan([0, 0], [0], None)
-FAST = Gains(bandwidth=30.0, projection_radius=0.6, predictor_gain=30.0, adaptation_rate=4e4)
+FAST = LoopGains(bandwidth=30.0, projection_radius=0.6, predictor_gain=30.0, adaptation_rate=4e4)
 
 
 def loop(controller="l1", *, f=(Y, -X - Y), gains=FAST, rate=100.0, horizon=10.0, limit=np.inf):

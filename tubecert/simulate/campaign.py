@@ -15,7 +15,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulate.clearance import Clearance, of_curve, of_tube
 from tubecert.simulate.compare import Comparison, check_class, compare
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.monte_carlo import Case, Report, Sample, attack, case, disturbance_of, monte_carlo
+from tubecert.simulate.monte_carlo import Case, Progress, Sample, attack, case, disturbance_of, monte_carlo
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
@@ -111,7 +111,7 @@ def simulate(
     count: int,
     seed: int,
     replay: int | None = None,
-    report: Report | None = None,
+    report: Progress | None = None,
 ) -> Campaign:
     """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
 
@@ -178,7 +178,7 @@ def _surface(setting: Setting) -> Array:
     return np.asarray(setting.centre + setting.within * np.ones(n) / np.sqrt(n))
 
 
-def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Report | None) -> Attack:
+def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None) -> Attack:
     sample = monte_carlo(setting, loop, count, seed, report)
     found, worst, measured = None, None, None
     if sample is not None and not sample.interrupted:

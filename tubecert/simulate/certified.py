@@ -127,7 +127,7 @@ def require_tube(result: Result) -> None:
     raise error
 
 
-def plan_of(spec: Spec, model: ControlAffineModel, result: Result) -> Plan:
+def certified_plan(spec: Spec, model: ControlAffineModel, result: Result) -> Plan:
     """The plan that was certified: the specification's expressions, or the certificate's knots."""
     knots = result["plan"].get("knots")
     trajectory = spec.trajectory

@@ -19,7 +19,7 @@ from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import Member, adversary, assembled, genes_of, random_member
 
-Report = Callable[[str, int, int], None]  # what is done, how many runs of how many
+Progress = Callable[[str, int, int], None]  # what is done, how many runs of how many
 
 BATCH: Final = 256
 TIMES: Final = 201  # output times of a run
@@ -79,7 +79,7 @@ def disturbance_of(setting: Setting, cases: Sequence[Case]) -> Disturbance:
 
 
 def monte_carlo(
-    setting: Setting, loop: Loop, count: int, seed: int, report: Report | None = None
+    setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None = None
 ) -> Sample | None:
     """`count` runs; fewer, or None, if the user interrupts."""
     problem = with_times(loop.problem, TIMES)
@@ -124,7 +124,7 @@ def with_times(problem: LoopProblem, count: int) -> LoopProblem:
     return replace(problem, times=np.linspace(0.0, problem.horizon, count))
 
 
-def attack(setting: Setting, loop: Loop, seed: int, report: Report | None = None) -> Case:
+def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = None) -> Case:
     """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     problem = with_times(loop.problem, 2)

@@ -16,7 +16,7 @@ from tubecert.trajectory import Plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Gains:
+class LoopGains:
     """The gains of the adaptive part; P = I.
 
     `bandwidth` in rad/s; `adaptation_rate` is Gamma, needed by "l1"; `predictor_gain` is A_m (n, n), or a number g in
@@ -71,7 +71,7 @@ class LoopProblem:
     controller: Controller
     horizon: float
     times: Array
-    gains: Gains | None = None
+    gains: LoopGains | None = None
     control_rate: float | None = None
     degree: int = 5
     limit: float = math.inf

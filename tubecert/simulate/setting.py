@@ -1,6 +1,6 @@
 """What is simulated: plan, times, starts, and each loop with its gains and what a certificate promises about it.
 
-Gains come from a certificate, or are chosen; only what a certificate covers can be falsified.
+LoopGains come from a certificate, or are chosen; only what a certificate covers can be falsified.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression
 from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulate.certified import Certified, Result, plan_of, read_numbers
+from tubecert.simulate.certified import Certified, Result, certified_plan, read_numbers
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.loops import DESIGNS, Controller
-from tubecert.simulate.problem import Gains, LoopProblem
+from tubecert.simulate.problem import LoopGains, LoopProblem
 from tubecert.simulate.promise import Kind, Promise, kind_for, promise
 from tubecert.simulate.uncertainty import Class, class_of
 from tubecert.spec import Spec
@@ -109,7 +109,7 @@ class Setting:
 def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> Setting:
     """The setting of a specification and its certification, which has a tube."""
     model = build(spec)
-    plan = plan_of(spec, model, result)
+    plan = certified_plan(spec, model, result)
     horizon = _horizon(spec, duration)
     certified = read_numbers(result)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
@@ -148,7 +148,7 @@ class _Tuning:
     `words` say where they come from.
     """
 
-    gains: Gains | None
+    gains: LoopGains | None
     kind: Kind | None
     certified: bool
     words: str
@@ -210,7 +210,7 @@ def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning
     if missing:
         raise TubecertError([_no_gains(controller, kind, missing)])
     numbers = {**found, **replaced}
-    gains = Gains(
+    gains = LoopGains(
         bandwidth=numbers["bandwidth"],
         projection_radius=numbers.get("projection_radius", _radius(setting)),
         predictor_gain=_predictor(setting, controller, numbers),
