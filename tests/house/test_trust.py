@@ -67,13 +67,17 @@ def test_what_is_trusted_imports_only_what_is_trusted(path):
 
 
 def compared(tree: ast.AST) -> set[ast.AST]:
-    """Nodes that are only compared with."""
-    return {
-        side
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Compare)
-        for side in (node.left, *node.comparators)
-    }
+    """Nodes that are only compared with: sides of comparisons, patterns, keys."""
+    found: set[ast.AST] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Compare():
+                found |= {node.left, *node.comparators}
+            case ast.MatchValue():
+                found.add(node.value)
+            case ast.Dict():
+                found |= {key for key in node.keys if key is not None}
+    return found
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
