@@ -359,6 +359,7 @@ def test_a_number_is_not_what_is_left_of_something_undefined(text: str) -> None:
 def test_what_powers_multiply_to_is_bounded_for_every_sign() -> None:
     assert refusal("((x**-12)**-12)**-12").kind == "limit"
     assert refusal("((x**12)**-12)**-2").kind == "limit"
+    assert refusal("(((x + 1)**-12 + 1)**-12 + 1)**-12").kind == "limit"
     assert refusal("(1e40)**-12*(1e300)**-12").kind == "limit"
     assert refusal("(1e300)**-12*x").kind == "limit"
 
