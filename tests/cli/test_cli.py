@@ -630,7 +630,7 @@ def test_a_log_that_cannot_be_written(proven, monkeypatch):
 
 def test_errors_bring_their_code(proven):
     finding = Finding(code="TC203", message="B loses rank")
-    for error, code in ((SpecError([finding]), 2), (ForeignError([finding]), 1)):
+    for error, code in ((SpecError([finding]), 2), (ForeignError([finding]), 2)):
         proven["result"] = error
         result = run("certify", SPEC)
         quiet_failure(result, code)

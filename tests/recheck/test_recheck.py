@@ -320,7 +320,7 @@ def test_the_command_answers_in_json(certified):
 
 def test_another_specification_is_a_named_error(certified):
     done = command(certified, "--spec", TWO)
-    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert done.exit_code == ExitCode.INVALID
     assert "TC604" in done.stderr
     assert "system" in done.stderr
 

@@ -75,7 +75,7 @@ def test_a_certificate_of_another_system_is_refused_by_what_differs():
     spec = load(str(CONFIGS / "two_state.yaml"))
     error, finding = refused(adopted, spec, result)
     assert error.exit_code is ExitCode.INVALID
-    assert "another system" in finding.message
+    assert "does not belong to" in finding.message
     assert "uncertainty" in finding.message
     assert finding.location is not None
 

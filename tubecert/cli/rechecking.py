@@ -16,8 +16,8 @@ Examples:
   tubecert recheck plant.certificate.json --json | jq .first_failing
 
 \b
-Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, the certificate is of another
-specification, or it says refuted; 2 no certificate; 4 a claim could not be decided, or it says undecided.
+Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted; 2 no
+certificate, or one of another specification; 4 a claim could not be decided, or it says undecided.
 """
 
 

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Final, cast
 
+from tubecert.certificate.belonging import compared
 from tubecert.claims import Reason
-from tubecert.errors import ExitCode, SpecError, TubecertError
+from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.records import from_json
-from tubecert.spec import Interpolation, Knots, Spec, Tube, canonical, load_text
+from tubecert.spec import Interpolation, Knots, Spec, Tube, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.words.advice import advice
@@ -25,7 +26,7 @@ from tubecert.words.claims import sentence
 
 Result = Mapping[str, Any]
 
-_FREE: Final = ("name", "obstacles", "simulation", "expect", "conditions")  # no claim depends on them
+_UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 
 
 class Values(dict[str, float]):
@@ -76,34 +77,24 @@ class Certified:
 def adopted(spec: Spec, result: Result) -> Spec:
     """The specification with what the certification had changed: radii and metric of the command line, a new metric.
 
-    Raises `SpecError` if the certificate is about another system.
+    Raises `ForeignError` if the certificate is about another system.
     """
+    compared(spec, result).require(spec, "the certificate")
     effective = result["spec"]["effective"]
     changed = result["overrides"]
     if "epsilon" in changed or "rho_a" in changed:
-        spec = replace(
-            spec, tube=Tube(**{name: Fraction(value) for name, value in effective["tube"].items()})
-        )
+        radii = {name: Fraction(value) for name, value in effective["tube"].items()}
+        spec = replace(spec, tube=Tube(**radii))
     if "metric" in changed or spec.metric is None:
         other = _without_plan(effective)
         spec = replace(spec, metric=other.metric, synthesis=other.synthesis)
-    own = canonical(spec)
-    differing = [
-        key for key in sorted({*own, *effective} - set(_FREE)) if own.get(key, {}) != effective.get(key, {})
-    ]
-    if differing:
-        message = f"the certificate is about another system: {', '.join(differing)} differ"
-        help = "give the specification that was certified, or certify this one"
-        raise SpecError(
-            [Finding(code="TC604", message=message, location=spec.location(differing[0]), help=help)]
-        )
     return spec
 
 
 def _without_plan(effective: Mapping[str, Any]) -> Spec:
     """The specification in a certificate, at rest at 0: its plan may be in a file that is elsewhere."""
     rest = {"kind": "equilibrium", "at": ["0"] * len(effective["system"]["states"])}
-    kept = {key: value for key, value in effective.items() if key not in ("initial_state", *_FREE[1:])}
+    kept = {key: value for key, value in effective.items() if key not in _UNUSED}
     return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
 
 
