@@ -291,7 +291,7 @@ def test_what_claims_rest_on_makes_another_system(files, change, words):
     path, target = files(SMALL)
     path.write_text(replaced(SMALL, change), encoding="utf-8")
     done = command(target, "--spec", path)
-    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert done.exit_code == ExitCode.INVALID
     assert "TC604" in done.stderr
     assert f"small.yaml: {words} differ" in " ".join(done.stderr.split())
 
@@ -340,7 +340,7 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     assert command(target, "--spec", path).exit_code == 0
     plan.write_text("\n".join(rows).replace("1,0,0,0", "1,0,0,0.01") + "\n", encoding="utf-8")
     done = command(target, "--spec", path)
-    assert done.exit_code == ExitCode.NOT_CERTIFIED
+    assert done.exit_code == ExitCode.INVALID
     assert "the knots of plan.csv" in " ".join(done.stderr.split())
 
 

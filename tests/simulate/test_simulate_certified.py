@@ -13,6 +13,7 @@ from simulated import CONFIGS, FLAT, certified, setting
 
 from tubecert import certificate
 from tubecert.certificate import digest, dump, seal
+from tubecert.certificate.belonging import compared
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
@@ -89,6 +90,18 @@ def test_overrides_of_the_certificate_are_adopted_and_other_radii_refused():
     other = replace(flat, tube=replace(flat.tube, epsilon=Fraction(1, 2)))
     _, finding = refused(adopted, other, plain)
     assert "tube differ" in finding.message
+
+
+def test_simulate_and_recheck_have_one_judge():
+    """Other units were refused here and accepted there, another kernel the other way round."""
+    _, result = certified("flat")
+    measured = FLAT.replace("system: {", "system: {units: {p: m}, ")
+    assert compared(load_text(measured), result).idle == ("system.units",)
+    assert adopted(load_text(measured), result).units != load_text(FLAT).units
+    another = load_text(FLAT + "conditions: {kernel: paper}\n")
+    assert compared(another, result).serious == ("conditions",)
+    error, finding = refused(adopted, another, result)
+    assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC604")
 
 
 def test_obstacles_and_simulation_are_no_part_of_the_system():
