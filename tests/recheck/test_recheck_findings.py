@@ -11,10 +11,12 @@ from rechecked import case_of, certified, digest, examine, failing, respecified,
 from systems import SMALL
 
 from tubecert import spec
+from tubecert.certificate.result import Result
 from tubecert.cli.belonging import ForeignError, belongs
 from tubecert.errors import ExitCode
 from tubecert.recheck import geodesics
 from tubecert.recheck.document import Node
+from tubecert.records import FormError
 
 GIVEN = 'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}'
 
@@ -169,3 +171,15 @@ def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
         tight = sampled[0] * place.rho + sampled[1] * place.rho**2 / 8
         assert geodesics.unique(place, tight * Fraction(10002, 10000)).holds
         assert not geodesics.unique(place, tight * Fraction(9998, 10000)).holds
+
+
+def test_what_was_asked_of_a_synthesis_survives_reading():
+    """The reader of reports knew no `synthesis.asked`: every certificate with a synthesis was an internal error."""
+    document = certified(SMALL.replace(GIVEN, "metric: {synthesise: {rate: 0.5}}"), conditions="distance")
+    read = Result.from_json(document["result"])
+    assert read.synthesis.asked.data == document["result"]["synthesis"]["asked"]
+    for asked in ({}, {"rate": 0.5}, {"objective": "condition", "speed": "1"}):
+        changed = copy.deepcopy(document["result"])
+        changed["synthesis"]["asked"] = asked
+        with pytest.raises(FormError):
+            Result.from_json(changed)

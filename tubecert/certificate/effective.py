@@ -115,3 +115,28 @@ def _read(data: Json, path: str) -> Effective:
 
 
 foreign(Effective, lambda value: dict(value.data), _read)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What metric was asked for, as canonical data (`metric.synthesise` of the specification)."""
+
+    data: Mapping[str, Tree] = field(repr=False)
+
+
+_ASKED, _MAY_ASK = ("objective", "degree", "variables", "route", "solver"), ("rate", "condition_number")
+
+
+def _read_asked(data: Json, path: str) -> Asked:
+    if not isinstance(data, dict):
+        raise FormError(path, "is not an object")
+    for key in (*_ASKED, *data):
+        if key not in data or key not in (*_ASKED, *_MAY_ASK):
+            raise FormError(f"{path}.{key}", "is missing" if key in _ASKED else "is not known")
+        words = data[key] if key == "variables" and isinstance(data[key], list) else [data[key]]
+        if not all(isinstance(word, str) for word in words):
+            raise FormError(f"{path}.{key}", "is not a text")
+    return Asked(data=data)
+
+
+foreign(Asked, lambda value: dict(value.data), _read_asked)

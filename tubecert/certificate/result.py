@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
-from tubecert.certificate.effective import Effective
+from tubecert.certificate.effective import Asked, Effective
 from tubecert.claims import Assumption, Outcome, Reason
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
@@ -199,6 +199,7 @@ class SolverData:
 class SynthesisData:
     """What was asked of a synthesis, what was tried, and why there is no metric where there is none."""
 
+    asked: Asked
     objective: str
     verdict: Verdict
     attempts: tuple[AttemptData, ...]
