@@ -7,10 +7,12 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def interruptible():
-    """A shell starts jobs in the background deaf to interruptions, and children would inherit that."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """A shell starts jobs in the background deaf to interruptions, nohup to hangups; children would inherit that."""
+    heard = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in heard.items()}
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -100,7 +100,8 @@ def test_a_changed_place_is_an_error_that_says_where_or_is_kept(where, value):
 def pruned(value):
     """Without members that are null, empty or false: whether they are written does not change what is said."""
     if isinstance(value, dict):
-        return {k: pruned(v) for k, v in value.items() if v is not None and v not in ({}, [], False)}
+        inner = {k: pruned(v) for k, v in value.items()}
+        return {k: v for k, v in inner.items() if v is not None and v not in ({}, [], False)}
     if isinstance(value, list):
         return [pruned(item) for item in value]
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value

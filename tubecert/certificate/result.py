@@ -40,6 +40,10 @@ class Start:
     at: tuple[str, ...] | None = None
     within: str | None = None
 
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.within is None):
+            raise ValueError("a start is either a point or a radius")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claimed:

@@ -1,0 +1,104 @@
+"""Every number of a promise and of a class, written a second time from the theory; each test kills a planted bug."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated import Failure, certified, runs, setting
+
+from tubecert.simulate.certified import Values, read_numbers
+from tubecert.simulate.compare import compare
+from tubecert.simulate.promise import KINDS, promise
+from tubecert.simulate.uncertainty import class_of
+
+T = np.linspace(0, 4, 81)
+
+
+@pytest.fixture
+def numbers():
+    """A certificate by hand, whose constants are all different."""
+    own = read_numbers(certified("two_state", "0.4")[1])
+    names = (
+        "feedback_gain u_star h h_t h_x h_initial prediction_error initial_distance metric_input_gain B B_x B_pinv "
+        "B_pinv_x plan_defect plan_defect_metric drift_on_plan M_x"
+    )
+    constants = Values({name: 0.3 + 0.11 * i for i, name in enumerate(names.split())})
+    return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants)
+
+
+@pytest.mark.parametrize("key", KINDS)
+def test_bounds_are_those_of_the_theory(numbers, key):
+    c, recipe = numbers.constants, numbers.sections[KINDS[key].name.key].recipe
+    R_H, kmax = recipe["projection_radius"], c["feedback_gain"] * 0.4
+    expected = {
+        "distance": 0.4,
+        "deviation": 0.7,
+        "k": kmax,
+        "u": c["u_star"] + kmax + R_H,
+        "sigma_error": c["h"] + R_H,
+    }
+    if key == "26":
+        expected["xtilde"] = c["prediction_error"] / recipe["adaptation_rate"] ** 0.5
+    if key == "distance":
+        s1, q = c["h_t"] + c["h_x"] * recipe["speed"], 2 * recipe["predictor_gain"]
+        V = (2 * (c["h"] + R_H) * s1 / q + (c["h"] + R_H) ** 2) / recipe["adaptation_rate"]  # (2.11)
+        expected["xtilde"] = V**0.5
+    assert promise(numbers, KINDS[key]).bounds == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("h_initial", [0.1, 5.0])
+def test_the_decay_of_the_sampled_kind(numbers, h_initial):
+    """(4.6) and (4.8); H1 is the smaller of Dh and H0 + s1 Ts."""
+    numbers.constants["h_initial"] = h_initial
+    c, recipe = numbers.constants, numbers.sections[KINDS["sampled"].name.key].recipe
+    Ts, g, omega, Y = (recipe[name] for name in ("sample_time", "predictor_gain", "bandwidth", "speed"))
+    s1 = c["h_t"] + c["h_x"] * Y
+    b = min(c["B_pinv"] * c["B_x"], c["B_pinv_x"] * c["B"]) * c["h"]
+    m = 1 / g - Ts / (np.exp(g * Ts) - 1)
+    decay = promise(numbers, KINDS["sampled"]).decay
+    assert decay.rest == pytest.approx(s1 * Ts / (1 - np.exp(-omega * Ts)) + m * (s1 + b * Y), rel=1e-9)
+    assert decay.first == pytest.approx(min(c["h"], h_initial + s1 * Ts), rel=1e-12)
+    assert (decay.start, decay.beta) == (c["initial_distance"], c["metric_input_gain"])
+    assert (decay.defect, decay.delay) == (c["plan_defect_metric"], Ts)
+
+
+def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
+    """B'M gamma_s changes with x by |B| A, with t by |B| A |x*'|, and |x*'| <= |f + B u*| + |p|."""
+    assert class_of(numbers, 2, 1).push is None
+    c = numbers.constants
+    c["M_x"] = c["B_x"] = 0.0
+    slope = c["B"] * 1.9
+    assert class_of(numbers, 2, 1).push == pytest.approx(
+        (slope, slope * (c["drift_on_plan"] + c["plan_defect"]))
+    )
+    assert class_of(replace(numbers, upper=None), 2, 1).push is None
+
+
+def around(share, *, of_distance=None, sign=1):
+    where = setting("flat")
+    pulse = np.exp(-((T - 2) ** 2))
+    x = np.zeros((1, len(T), 2))
+    x[:, :, 1] = sign * where.rho * share * pulse
+    return where, runs(T, x, (where.reach * (of_distance or share) * pulse)[None])
+
+
+def test_the_distance_alone_may_leave_the_tube():
+    where, found = around(0.5, of_distance=1.02)
+    assert compare(where, found, None).outside == (0,)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_half_widths_count_to_both_sides(sign):
+    where, found = around(0.5, sign=sign)
+    promised = promise(where.certified, KINDS["distance"])
+    narrow = replace(promised, half_widths=(1.0, 0.4 * where.rho), decay=None)
+    assert [item.name for item in compare(where, found, narrow).violations] == ["half-width of v"]
+
+
+@pytest.mark.parametrize(("share", "left"), [(1.9, False), (2.1, True)])
+def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
+    where, found = around(share)
+    stopped = replace(found, error=np.array([np.inf]), failures=(Failure(lane=0, t=2.5, reason="stopped"),))
+    assert compare(where, stopped, None).outside == ((0,) if left else ())
