@@ -1,9 +1,8 @@
 """Synthesis of a metric for a specification: objectives, the sweep over rates, the metric file, and why there is none.
 
-The ladder of `tubecert.synthesis` finds metrics at given rates; here they are compared by what the user wants in the end,
-which for `adaptation` and `tube` is a certification with each of them. What is returned was read back from the text
-that a metric file will hold, and proven as read.
-Trusted: `_proven`, nothing else.
+The ladder of `tubecert.synthesis` finds metrics at given rates; here they are compared by what the user wants in the
+end, which for `adaptation` and `tube` is a certification with each of them. What is returned was read back from the
+text that a metric file will hold, and is what its proof is about.
 """
 
 from __future__ import annotations
