@@ -30,8 +30,6 @@ CODES: Mapping[str, str] = {
     UNDECIDED: "the certification could not decide",
 }
 
-_SECTIONS = ("conditions_26", "distance", "sampled")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:

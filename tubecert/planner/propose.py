@@ -52,7 +52,6 @@ def course_of(
     model: ControlAffineModel,
     report: Report | None = None,
     *,
-    cached: bool = True,
     substeps: int = ilqr.SUBSTEPS,
 ) -> Course:
     """Inputs that lead to the target, from the cache if they are there and still do; raises `SpecError` without any."""
@@ -62,11 +61,11 @@ def course_of(
     t = grid(spec.trajectory.horizon, task.knots)
     name = cache.key(_content(spec) | {"substeps": substeps})
     course = Course(t=t, u=(), task=task, substeps=substeps)
-    kept = _kept(name, course, dynamics) if cached else None
+    kept = _kept(name, course, dynamics)
     if kept is not None:
         return kept
     u = _planned(spec, course, dynamics, report)
-    trouble = cache.write(name, tuple(tuple(map(number_text, row)) for row in u)) if cached else ""
+    trouble = cache.write(name, tuple(tuple(map(number_text, row)) for row in u))
     if trouble and report is not None:
         report(f"plan not kept ({trouble})", len(u), "knots")
     return replace(course, u=u)
