@@ -30,6 +30,11 @@ def _grow(children: st.SearchStrategy[str], *, smooth: bool) -> st.SearchStrateg
             children.map(lambda e: f"exp(sin({e}))"),
             children.map(lambda e: f"tan(sin({e}))"),
             children.map(lambda e: f"(2 + cos({e}))**-2"),
+            st.tuples(st.sampled_from(("tanh", "atan")), children).map(lambda v: f"{v[0]}({v[1]})"),
+            st.tuples(st.sampled_from(("asin", "acos", "sinh", "cosh")), children).map(
+                lambda v: f"{v[0]}(0.99*sin({v[1]}))"
+            ),
+            children.map(lambda e: f"log(({e})**2 + 1/8)"),
         ]
     return st.one_of(shapes)
 

@@ -100,6 +100,9 @@ def test_constants_are_folded_exactly() -> None:
     assert read("(2/3)**-2").fraction == Fraction(9, 4)
     assert [f(ZERO) for f in (sin, tan)] == [ZERO, ZERO]
     assert [f(ZERO) for f in (cos, exp)] == [ONE, ONE]
+    assert {read(f"{name}(0)") for name in ("asin", "atan", "sinh", "tanh")} == {ZERO}
+    assert read("cosh(0)") is ONE
+    assert read("log(1)") is ZERO
     assert norm([constant(-3)]).fraction == 3
     assert norm([ZERO, ZERO]) is ZERO
 
@@ -125,6 +128,13 @@ def test_division_by_zero_raises() -> None:
         ("tan(x)", "1 + tan(x)**2"),
         ("exp(x*y)", "y*exp(x*y)"),
         ("sqrt(x)", "1/(2*sqrt(x))"),
+        ("asin(x)", "1/sqrt(1 - x**2)"),
+        ("acos(3*x)", "-3/sqrt(1 - 9*x**2)"),
+        ("atan(x)", "1/(x**2 + 1)"),
+        ("sinh(x)", "cosh(x)"),
+        ("cosh(x)", "sinh(x)"),
+        ("tanh(2*x)", "2*(1 - tanh(2*x)**2)"),
+        ("log(x*y)", "y/(x*y)"),
         ("pi*x + y", "pi"),
         ("x**-2", "-2*x**(-3)"),
     ],

@@ -34,6 +34,8 @@ FEW = [
     "(3 + cos(y))**-2*x + exp(x*y)*z",
     "sqrt(4 + x)*sin(y)*cos(y)**2 - z*tan(x/2)/sqrt(4 + x)",
     "(x + 0.1*y - z)**5",
+    "tanh(3*x)*y + atan(x*y) - log(3 + z)",
+    "asin(x/3)*sinh(y) + acos(z/4)*cosh(x*y)",
 ]
 BENDING = ["exp(x) - x*y**3", "sin(2*x)*cos(3*y) + z*x**2", "(x + y)**4*z", "sqrt(3 + x*y) + z"]
 SYMMETRIC = [

@@ -382,6 +382,8 @@ ADDED = {
     "sin(0.37*x)*cos(0.74*y) - sin(0.37*x)*(1 - 2*sin(0.37*y)**2)": "sin(0.37*x) - cos(0.74*x)",
     "2*sin(x/2)**2 - 1 + cos(x)": "2*sin(x/2)**2 - 1 + cos(2*x)",
     "tan(2*x)*(1 - tan(x)**2) - 2*tan(x)": "tan(2*x)*(1 + tan(x)**2) - 2*tan(x)",
+    "tanh(2*x)*(1 + tanh(x)**2) - 2*tanh(x)": "tanh(2*x)*(1 - tanh(x)**2) - 2*tanh(x)",
+    "cosh(x)**2 - sinh(x)**2 - 1": "cosh(x)**2 + sinh(x)**2 - 1",
     "exp(x - 2*y)*exp(y)**2 - exp(x)": "exp(x - 2*y)*exp(y) - exp(x)",
     "sin(x + pi/2) - cos(x)": "sin(x + pi/2) + cos(x)",
     "sin(x - pi) + sin(x)": "sin(x - pi) - sin(x)",

@@ -261,6 +261,54 @@ def tan(a: Interval) -> Interval:
     return Interval(np.where(bad, np.nan, wide.lo - 2.0**-52), np.where(bad, np.nan, wide.hi + 2.0**-52))
 
 
+def atan(a: Interval) -> Interval:
+    """Inverse tangent."""
+    wide = _widened(np.arctan(a.lo), np.arctan(a.hi))
+    return Interval(np.maximum(wide.lo, -0.5 * PI.hi), np.minimum(wide.hi, 0.5 * PI.hi))
+
+
+def asin(a: Interval) -> Interval:
+    """Inverse sine; NaN where the operand leaves [-1, 1]."""
+    wide = _widened(np.arcsin(a.lo), np.arcsin(a.hi))
+    return _within_unit(a, wide, Interval(-0.5 * PI.hi, 0.5 * PI.hi))
+
+
+def acos(a: Interval) -> Interval:
+    """Inverse cosine; NaN where the operand leaves [-1, 1]."""
+    wide = _widened(np.arccos(a.hi), np.arccos(a.lo))
+    return _within_unit(a, wide, Interval(0.0, PI.hi))
+
+
+def _within_unit(a: Interval, wide: Interval, most: Interval) -> Interval:
+    bad = ~((a.lo >= -1) & (a.hi <= 1))
+    lo, hi = np.maximum(wide.lo, most.lo), np.minimum(wide.hi, most.hi)
+    return Interval(np.where(bad, np.nan, lo), np.where(bad, np.nan, hi))
+
+
+def log(a: Interval) -> Interval:
+    """Natural logarithm; NaN where the operand reaches 0."""
+    wide = _widened(np.log(a.lo), np.log(a.hi))
+    bad = ~(a.lo > 0)
+    return Interval(np.where(bad, np.nan, wide.lo), np.where(bad, np.nan, wide.hi))
+
+
+def sinh(a: Interval) -> Interval:
+    """Hyperbolic sine."""
+    return _widened(np.sinh(a.lo), np.sinh(a.hi))
+
+
+def cosh(a: Interval) -> Interval:
+    """Hyperbolic cosine; smallest at 0."""
+    wide = _widened(np.cosh(a.mignitude), np.cosh(a.magnitude))
+    return Interval(np.maximum(wide.lo, 1.0), wide.hi)
+
+
+def tanh(a: Interval) -> Interval:
+    """Hyperbolic tangent."""
+    wide = _widened(np.tanh(a.lo), np.tanh(a.hi))
+    return Interval(np.maximum(wide.lo, -1.0), np.minimum(wide.hi, 1.0))
+
+
 def norm(parts: list[Interval]) -> Interval:
     """Euclidean norm; of one part its absolute value."""
     if len(parts) == 1:

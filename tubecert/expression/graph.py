@@ -35,7 +35,7 @@ class Expression:
     | `symbol` | - | its name |
     | `add`, `mul`, `div` | two | - |
     | `pow` | base | integer exponent, not 0 or 1 |
-    | `sqrt`, `sin`, `cos`, `tan`, `exp` | one | - |
+    | a name in `FUNCTIONS` (`sqrt`, `sin`, `tanh`, ...) | one | - |
     | `norm` | one or more | - (Euclidean norm; of one argument: its absolute value) |
     | `direction` | those of a norm | i: component i of args/norm(args); where norm is 0, any in [-1, 1] |
     """
@@ -246,6 +246,58 @@ def exp(e: Expression) -> Expression:
     return ONE if e is ZERO else _node("exp", (e,))
 
 
+def log(e: Expression) -> Expression:
+    """Natural logarithm."""
+    return ZERO if e is ONE else _node("log", (e,))
+
+
+def asin(e: Expression) -> Expression:
+    """Inverse sine, in (-pi/2, pi/2)."""
+    return ZERO if e is ZERO else _node("asin", (e,))
+
+
+def acos(e: Expression) -> Expression:
+    """Inverse cosine, in (0, pi)."""
+    return _node("acos", (e,))
+
+
+def atan(e: Expression) -> Expression:
+    """Inverse tangent, in (-pi/2, pi/2)."""
+    return ZERO if e is ZERO else _node("atan", (e,))
+
+
+def sinh(e: Expression) -> Expression:
+    """Hyperbolic sine."""
+    return ZERO if e is ZERO else _node("sinh", (e,))
+
+
+def cosh(e: Expression) -> Expression:
+    """Hyperbolic cosine."""
+    return ONE if e is ZERO else _node("cosh", (e,))
+
+
+def tanh(e: Expression) -> Expression:
+    """Hyperbolic tangent."""
+    return ZERO if e is ZERO else _node("tanh", (e,))
+
+
+FUNCTIONS: Final[Mapping[str, Callable[[Expression], Expression]]] = {
+    "sin": sin,
+    "cos": cos,
+    "tan": tan,
+    "asin": asin,
+    "acos": acos,
+    "atan": atan,
+    "sinh": sinh,
+    "cosh": cosh,
+    "tanh": tanh,
+    "exp": exp,
+    "log": log,
+    "sqrt": sqrt,
+}
+"""The smooth functions of one argument, by name."""
+
+
 def norm(args: Iterable[Expression]) -> Expression:
     """Euclidean norm of the arguments; of one argument, its absolute value."""
     kept = tuple(arg for arg in args if arg is not ZERO)
@@ -279,9 +331,8 @@ def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
 
 def rebuild(e: Expression, args: tuple[Expression, ...]) -> Expression:
     """The operation of `e` applied to other arguments."""
-    unary = {"sqrt": sqrt, "sin": sin, "cos": cos, "tan": tan, "exp": exp}
-    if e.op in unary:
-        return unary[e.op](args[0])
+    if e.op in FUNCTIONS:
+        return FUNCTIONS[e.op](args[0])
     if e.op == "add":
         return add(*args)
     if e.op == "mul":
@@ -371,8 +422,22 @@ def _slope(e: Expression, d: list[Expression]) -> Expression:
             return -sin(u) * d[0]
         case "tan":
             return (1 + e**2) * d[0]
+        case "asin":
+            return d[0] / sqrt(1 - u**2)
+        case "acos":
+            return -d[0] / sqrt(1 - u**2)
+        case "atan":
+            return d[0] / (1 + u**2)
+        case "sinh":
+            return cosh(u) * d[0]
+        case "cosh":
+            return sinh(u) * d[0]
+        case "tanh":
+            return (1 - e**2) * d[0]
         case "exp":
             return e * d[0]
+        case "log":
+            return d[0] / u
         case "norm":
             terms = (_direction(e.args, i) * slope for i, slope in enumerate(d))
             return sum(terms, start=ZERO)

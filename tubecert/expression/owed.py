@@ -37,7 +37,7 @@ def _term(kind: Duty, argument: Expression) -> str:
 
 
 _CLOSED = frozenset({"symbol", "sin", "cos", "tan", "norm"})  # texts that need no parentheses
-_NEVER_ZERO = frozenset({"const", "pi", "exp", "sqrt"})
+_NEVER_ZERO = frozenset({"const", "pi", "exp", "cosh", "sqrt"})
 
 
 def _of_node(node: Expression) -> Iterator[_Owed]:
@@ -49,15 +49,17 @@ def _of_node(node: Expression) -> Iterator[_Owed]:
             yield from _simplest("nonzero", node.args[0])
         case "tan":
             yield from _simplest("nonzero", graph.cos(node.args[0]))
-        case "sqrt":
+        case "sqrt" | "log":
             yield from _simplest("positive", node.args[0])
+        case "asin" | "acos":
+            yield from _simplest("positive", 1 - node.args[0] ** 2)
 
 
 def _simplest(kind: Duty, e: Expression) -> Iterator[_Owed]:
     """Obligations on smaller expressions that are equivalent, given what the parts of `e` themselves owe.
 
     x/(2*y) and 0.5*x/y owe the same: rational factors and powers do not matter, a product is nonzero if its factors
-    are, a quotient if its numerator is (its divisor is owed by the quotient), pi, exp(u) and sqrt(u) always.
+    are, a quotient if its numerator is (its divisor is owed by the quotient), pi, exp(u), cosh(u) and sqrt(u) always.
     """
     q, rest = coefficient(e)
     if kind == "positive":

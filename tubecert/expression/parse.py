@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final, Literal
@@ -32,7 +32,13 @@ MAX_BITS: Final = 5_000
 
 Duty = Literal["nonzero", "positive"]
 
-_UNARY = {"sin": graph.sin, "cos": graph.cos, "tan": graph.tan, "exp": graph.exp, "sqrt": graph.sqrt}
+_POSITIVE: Final[Mapping[str, Callable[[Expression], Expression]]] = {
+    "sqrt": lambda u: u,
+    "log": lambda u: u,
+    "asin": lambda u: 1 - u**2,
+    "acos": lambda u: 1 - u**2,
+}
+"""What must be positive for the function to be defined and C1."""
 _NOT_FINITE = frozenset({"nan", "inf", "infinity"})
 _FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
 _NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
@@ -43,8 +49,8 @@ class Obligation:
     """What must hold for an operation to be defined (and C1): `argument` is `nonzero`, or `positive`.
 
     A divisor and the base of a negative power must be nonzero, so must cos(u) for tan(u); the argument of
-    sqrt must be positive (sqrt is not C1 at 0). `offset` and `width` locate the operation in its text, of
-    which `text` is that part.
+    sqrt and log must be positive (sqrt is not C1 at 0), so must 1 - u**2 for asin(u) and acos(u).
+    `offset` and `width` locate the operation in its text, of which `text` is that part.
     """
 
     kind: Duty
@@ -217,12 +223,16 @@ class _Lowering:
             return graph.norm(args)
         if name == "tan":
             self._owe("nonzero", graph.cos(args[0]), node)
-        if name == "sqrt":
-            if args[0].is_constant and args[0].fraction <= 0:
-                reason = "is not real" if args[0].fraction < 0 else "is not differentiable"
+        if name in _POSITIVE:
+            argument, at_zero = (
+                _POSITIVE[name](args[0]),
+                "is not real" if name == "log" else "is not differentiable",
+            )
+            if argument.is_constant and argument.fraction <= 0:
+                reason = "is not real" if argument.fraction < 0 else at_zero
                 raise self._error(node, f"{self._source(node)[:60]} {reason}", kind="value")
-            self._owe("positive", args[0], node)
-        return _UNARY[name](args[0])
+            self._owe("positive", argument, node)
+        return graph.FUNCTIONS[name](args[0])
 
     def _power(self, node: ast.BinOp, left: ast.expr) -> Expression:
         base, n = self.values[left], self._exponent(node)

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Final, Literal
 
+from tubecert.expression.graph import FUNCTIONS as SMOOTH
+
 MAX_LENGTH: Final = 4_000
 MAX_DEPTH: Final = 50
 MAX_SIGNS: Final = 50
@@ -21,11 +23,7 @@ MAX_NUMBER_LENGTH: Final = 40
 MAX_NUMBER_EXPONENT: Final = 300
 
 ARITIES: Final[Mapping[str, int | None]] = {
-    "sin": 1,
-    "cos": 1,
-    "tan": 1,
-    "exp": 1,
-    "sqrt": 1,
+    **dict.fromkeys(SMOOTH, 1),
     "abs": 1,
     "norm": None,
 }

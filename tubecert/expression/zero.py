@@ -1,8 +1,9 @@
 """Proves that an expression vanishes identically, by exact algebra.
 
-The expression becomes a quotient of polynomials over the rationals in *atoms* (variables, pi, sin, cos, exp
-and sqrt of canonical arguments, norms) with sin^2 = 1 - cos^2, sqrt(u)^2 = u, tan = sin/cos and the addition
-theorems. Every rule holds wherever the expression is defined, so a numerator without terms is a proof;
+The expression becomes a quotient of polynomials over the rationals in *atoms* (variables, pi, sin, cos, exp,
+sqrt, log and inverse functions of canonical arguments, norms) with sin^2 = 1 - cos^2, sqrt(u)^2 = u, tan = sin/cos,
+the hyperbolic functions in terms of exp, and the addition theorems.
+Every rule holds wherever the expression is defined, so a numerator without terms is a proof;
 anything else proves nothing, unless only variables (and pi, which is transcendental) are left.
 """
 
@@ -90,6 +91,10 @@ class _Algebra:
                 return self._product(sine, _inverse(cosine))
             case "exp":
                 return self._exponential(args[0])
+            case "sinh" | "cosh" | "tanh":
+                return self._hyperbolic(e.op, args[0])
+            case "asin" | "acos" | "atan" | "log":
+                return _variable(self._atom((e.op, _frozen(_settled(*args[0]))))), _number(Fraction(1))
             case "sqrt":
                 return self._root(args[0])
             case "norm":
@@ -206,6 +211,17 @@ class _Algebra:
             factor: Quotient = (_variable(self._atom(("unit exp", unit))), one[1])
             result = self._product(result, self._power(factor, count))
         return result
+
+    def _hyperbolic(self, op: str, u: Quotient) -> Quotient:
+        """sinh u = (e - 1/e)/2 and cosh u = (e + 1/e)/2 with e = exp(u); tanh is their quotient."""
+        e = self._exponential(u)
+        one = (_number(Fraction(1)), _number(Fraction(1)))
+        square = self._product(e, e)
+        minus = self._sum(square, (_number(Fraction(-1)), one[1]))
+        plus = self._sum(square, one)
+        if op == "tanh":
+            return self._product(minus, _inverse(plus))
+        return self._product(minus if op == "sinh" else plus, _inverse((_scaled(e[0], Fraction(2)), e[1])))
 
     def _root(self, u: Quotient) -> Quotient:
         one = _number(Fraction(1))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.terms import NOUGHT, Term, number, number_of, operation
+from tubecert.recheck.terms import NOUGHT, UNIT, Term, number, number_of, operation
 
 PI = operation("pi")
 
@@ -24,14 +24,14 @@ _POWER = 12  # of one **
 _POWERS = 144  # of nested ones, multiplied
 _BITS = 5_000  # of a constant
 
-_WAVES = ("sin", "cos", "tan", "exp", "sqrt")
+_SMOOTH = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 _KINKS = ("abs", "norm")
 _TOKEN = re.compile(
     r" *(?:(?P<number>(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
-_TAKEN = {"t", "pi", *_WAVES, *_KINKS, *keyword.kwlist, *(word.lower() for word in keyword.kwlist)}
+_TAKEN = {"t", "pi", *_SMOOTH, *_KINKS, *keyword.kwlist, *(word.lower() for word in keyword.kwlist)}
 
 
 class GrammarError(ValueError):
@@ -171,7 +171,7 @@ class _Reading:
         self._next()
         if kind == "number":
             return _bounded(number(_decimal(word)), 1)
-        if word in _WAVES or word in _KINKS:
+        if word in _SMOOTH or word in _KINKS:
             self._must("(")
             args = [self._inside()]
             while self._takes(","):
@@ -203,8 +203,10 @@ class _Reading:
             return _Value(operation("norm", *args), growth)
         if name == "tan":
             self._owe("nonzero", operation("cos", args[0]), begin)
-        if name == "sqrt":
+        if name in ("sqrt", "log"):
             self._owe("positive", args[0], begin)
+        if name in ("asin", "acos"):
+            self._owe("positive", UNIT - args[0].raised(2), begin)
         return _Value(operation(name, *args), growth)
 
     def _owe(self, kind: str, argument: Term, begin: int) -> None:

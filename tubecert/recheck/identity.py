@@ -1,7 +1,8 @@
 """Terms that vanish identically: quotients of polynomials over the rationals, exact.
 
 Variables, roots and transcendental terms are indeterminates; the relations used are the addition theorems (`angles`),
-sin^2 = 1 - cos^2, sqrt(u)^2 = u, and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces
+sin^2 = 1 - cos^2, sqrt(u)^2 = u, the hyperbolic functions in terms of exp,
+and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces
 to 0 vanishes wherever it is defined; nothing is concluded from one that does not.
 """
 
@@ -15,8 +16,11 @@ from typing import Any
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
 from tubecert.recheck.angles import by_addition
-from tubecert.recheck.terms import Term, in_order
+from tubecert.recheck.terms import UNIT, Term, in_order, number, operation, remade
 
+_INDETERMINATES = frozenset(
+    {"symbol", "pi", "asin", "acos", "atan", "exp", "log", "sqrt", "norm", "direction"}
+)
 Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
 
 
@@ -28,10 +32,10 @@ class _Quotient:
 
 def vanish(terms: Sequence[Term]) -> bool:
     """Whether every term is proven to be zero wherever it is defined."""
-    terms = by_addition(terms)
+    terms = by_addition(_exponentials(terms))
     order = in_order(terms)
     waves = [term for term in order if term.op in ("sin", "cos", "tan")]
-    others = [term for term in order if term.op in ("symbol", "pi", "sqrt", "exp", "norm", "direction")]
+    others = [term for term in order if term.op in _INDETERMINATES]
     labels = [f"v{k}" for k in range(2 * len(waves) + len(others))] or ["v0"]
     ring = fmpq_mpoly_ctx.get(labels, Ordering.lex)
     field = _Field(ring, ring.gens())
@@ -39,6 +43,20 @@ def vanish(terms: Sequence[Term]) -> bool:
     for term in order:
         value[term] = field.of(term, [value[arg] for arg in term.args])
     return all(value[term].top == 0 for term in terms)
+
+
+def _exponentials(terms: Sequence[Term]) -> list[Term]:
+    """sinh u = (e - 1/e)/2, cosh u = (e + 1/e)/2 and tanh u = sinh u/cosh u, with e = exp(u)."""
+    new: dict[Term, Term] = {}
+    for term in in_order(terms):
+        args = tuple(new[arg] for arg in term.args)
+        if term.op in ("sinh", "cosh", "tanh"):
+            e = operation("exp", *args)
+            odd, even = e - UNIT / e, e + UNIT / e
+            new[term] = odd / even if term.op == "tanh" else (odd if term.op == "sinh" else even) / number(2)
+        else:
+            new[term] = remade(term, args) if args else term
+    return [new[term] for term in terms]
 
 
 class _Field:

@@ -61,6 +61,16 @@ def _direction(args: list[Ball], index: int) -> Ball:
     return value.intersection(between(-1, 1)) if value.overlaps(between(-1, 1)) else value
 
 
+def _increasing(function: Callable[[Ball], Ball]) -> Callable[[list[Ball], int], Ball]:
+    """An increasing function, by its values at the ends of a ball: flint's own are wide on wide balls."""
+    return lambda args, _: between(function(args[0].lower()), function(args[0].upper()))
+
+
+def _cosh(args: list[Ball], index: int) -> Ball:
+    del index
+    return between(args[0].abs_lower().cosh(), args[0].abs_upper().cosh())
+
+
 _KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
     "div": lambda a, _: a[0] / a[1],
     "pow": lambda a, n: power(a[0], n),
@@ -68,7 +78,14 @@ _KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
     "sin": lambda a, _: a[0].sin(),
     "cos": lambda a, _: a[0].cos(),
     "tan": lambda a, _: a[0].tan(),
+    "asin": _increasing(Ball.asin),
+    "acos": lambda a, _: between(a[0].upper().acos(), a[0].lower().acos()),
+    "atan": _increasing(Ball.atan),
+    "sinh": _increasing(Ball.sinh),
+    "cosh": _cosh,
+    "tanh": _increasing(Ball.tanh),
     "exp": lambda a, _: a[0].exp(),
+    "log": _increasing(Ball.log),
     "norm": lambda a, _: length(a),
     "direction": _direction,
 }

@@ -110,7 +110,7 @@ UNIT = number(1)
 
 
 def function(op: str, *args: Term, value: int | None = None) -> Term:
-    """`sqrt`, `sin`, `cos`, `tan`, `exp`, `norm` or `direction` of terms."""
+    """A function of the grammar, `norm` or `direction` of terms."""
     return _make(op, *args, value=value)
 
 
@@ -137,7 +137,7 @@ def remade(term: Term, args: tuple[Term, ...]) -> Term:
     return _make(term.op, *args, value=term.value) if args else term
 
 
-_AT_ZERO = {"sin": 0, "tan": 0, "cos": 1, "exp": 1}
+_AT_ZERO = {"sin": 0, "tan": 0, "asin": 0, "atan": 0, "sinh": 0, "tanh": 0, "cos": 1, "cosh": 1, "exp": 1}
 
 
 def in_order(roots: Iterable[Term]) -> list[Term]:
@@ -170,6 +170,11 @@ def replaced(roots: Sequence[Term], values: Mapping[str, Term]) -> list[Term]:
     return [new[root] for root in roots]
 
 
+def _leg(u: Term) -> Term:
+    """sqrt(1 - u^2)."""
+    return function("sqrt", UNIT - u.raised(2))
+
+
 _PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
     "add": lambda e, i: UNIT,
     "mul": lambda e, i: e.args[1 - i],
@@ -179,7 +184,14 @@ _PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
     "sin": lambda e, i: function("cos", e.args[0]),
     "cos": lambda e, i: -function("sin", e.args[0]),
     "tan": lambda e, i: UNIT / function("cos", e.args[0]).raised(2),
+    "asin": lambda e, i: UNIT / _leg(e.args[0]),
+    "acos": lambda e, i: -(UNIT / _leg(e.args[0])),
+    "atan": lambda e, i: UNIT / (UNIT + e.args[0].raised(2)),
+    "sinh": lambda e, i: function("cosh", e.args[0]),
+    "cosh": lambda e, i: function("sinh", e.args[0]),
+    "tanh": lambda e, i: UNIT - e.raised(2),
     "exp": lambda e, i: e,
+    "log": lambda e, i: UNIT / e.args[0],
     "norm": lambda e, i: function("direction", *e.args, value=i),
 }
 """The derivative of an operation by its i-th argument (of a norm: an element of its generalised gradient)."""

@@ -14,6 +14,7 @@ from tubecert.simulate.compiled import compiled
 
 Index = NDArray[np.int64]
 _ADD, _MUL, _DIV, _POW, _SQRT, _SIN, _COS, _TAN, _EXP = range(9)
+_TANH, _ATAN, _LOG, _ASIN, _ACOS, _SINH, _COSH = range(9, 16)
 _CODES = {
     "add": _ADD,
     "mul": _MUL,
@@ -24,6 +25,13 @@ _CODES = {
     "cos": _COS,
     "tan": _TAN,
     "exp": _EXP,
+    "tanh": _TANH,
+    "atan": _ATAN,
+    "log": _LOG,
+    "asin": _ASIN,
+    "acos": _ACOS,
+    "sinh": _SINH,
+    "cosh": _COSH,
 }
 
 
@@ -114,6 +122,20 @@ def execute(steps: Any, count: int, memory: Any) -> None:
             value = np.sqrt(x)
         elif code == _TAN:
             value = np.tan(x)
-        else:
+        elif code == _EXP:
             value = np.exp(x)
+        elif code == _TANH:
+            value = np.tanh(x)
+        elif code == _ATAN:
+            value = np.arctan(x)
+        elif code == _LOG:
+            value = np.log(x)
+        elif code == _ASIN:
+            value = np.arcsin(x)
+        elif code == _ACOS:
+            value = np.arccos(x)
+        elif code == _SINH:
+            value = np.sinh(x)
+        else:
+            value = np.cosh(x)
         memory[target + i] = value

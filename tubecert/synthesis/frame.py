@@ -24,12 +24,14 @@ from tubecert.expression import (
     symbol,
     topological,
 )
+from tubecert.expression.graph import FUNCTIONS
 from tubecert.expression.matrix import Matrix, identity, jacobian, null_space, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.lifting import Lifted, at_point, lift
 
 _DEGREE = 5
 _UNKNOWNS = 900
+_ATOMS = frozenset(FUNCTIONS) - {"sin", "cos", "tan"}
 
 Field = tuple[Expression, ...]
 Unknown = tuple[int, int]  # (k, i): the coefficient of function k in component i
@@ -76,7 +78,7 @@ def _dictionary(model: ControlAffineModel, degree: int) -> list[Expression]:
         atoms += [cos(symbol(name)), sin(symbol(name))] if name in angles else [symbol(name)]
     divisors = dict.fromkeys(node.args[1] for node in nodes if node.op == "div")
     atoms += [ONE / e for e in divisors]
-    atoms += [node for node in nodes if node.op in ("exp", "sqrt")]
+    atoms += [node for node in nodes if node.op in _ATOMS]
     moved = [
         symbol(name)
         for name, row in zip(model.states, model.B, strict=True)
