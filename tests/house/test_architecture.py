@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 import tubecert
+from tubecert import kinds
+from tubecert.recheck.kinds import table as recheck_kinds
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
@@ -122,6 +124,14 @@ def test_recheck_shares_nothing_with_the_producer(path):
     rooms = {name.split(".")[1] for name in imported(tree) if name.startswith("tubecert.")}
     assert rooms <= {"errors", "findings", "recheck"}
     assert not {name.split(".")[0] for name in imported(tree)} & {"numpy", "scipy", "cvxpy", "sympy"}
+
+
+def test_recheck_knows_every_kind_and_no_other():
+    """By a table of its own; beside the file of a kind, no file of the room names one."""
+    assert [kind.key for kind in recheck_kinds.KINDS] == [name.key for name in kinds.NAMES]
+    for path in (PACKAGE / "recheck").glob("*.py"):
+        texts = {n.value for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Constant)}
+        assert not texts & set(recheck_kinds.KEYS), path.name
 
 
 @pytest.mark.slow

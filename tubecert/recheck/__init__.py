@@ -16,11 +16,14 @@ formula or rounding in the producer must not pass both.
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
 | `document`, `reading` | JSON and expressions, read and checked for form |
-| `specification`, `certificate`, `reasons`, `orientation` | closed types of all that a certificate may say |
+| `specification`, `certificate` | closed types of all that a certificate may say |
+| `plans`, `enclosures`, `reasons`, `orientation` | their parts |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
-| `filtering`, `predictor`, `conditions`, `sampling`, `gains` | the conditions A, B and C at printed gains |
+| `filtering`, `predictor`, `conditions`, `sampling` | the theorems A, B and C at printed gains |
+| `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
-| `consistency`, `refuted`, `claims` | what must agree; what refutes; all claims in their order |
+| `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |
+| `claims` | all claims in their order |
 | `uncontrollable` | the mode of the linearisation that leaves no metric |
 """

@@ -12,23 +12,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node, digest
-from tubecert.recheck.orientation import around, elasticities, run, samples, synthesis
-from tubecert.recheck.reasons import (
-    VERDICTS,
-    Assumption,
-    Enclosure,
-    Reason,
-    enclosure,
-    read_assumption,
-    read_reason,
-)
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Section
+from tubecert.recheck.kinds.table import KEYS, KINDS
+from tubecert.recheck.orientation import elasticities, run, synthesis
+from tubecert.recheck.plans import Plan, read_plan
+from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_reason
 from tubecert.recheck.specification import (
     Numbers,
     Range,
-    Resting,
-    Rows,
     Specification,
-    Tabled,
     Wanted,
     read_specification,
 )
@@ -58,21 +51,7 @@ MEASURED = (
     "input_gain_least",
     "contraction_excess",
 )
-DERIVED = (
-    "speed",
-    "uncertainty_rate",
-    "prediction_error",
-    "filter_error",
-    "theta",
-    "Psi_x",
-    "geodesic_rate",
-    "Psi_rate",
-    "zeta_1",
-    "zeta_2",
-    "zeta_3",
-)
 INFIMA = ("lower", "input_gain_least")  # constants whose lower side is used
-CLAIMS_26 = ("26a", "26b", "26c")
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,27 +77,10 @@ class Overrides:
     adaptation_rate: Fraction | None
     metric: str | None
 
-
-@dataclass(frozen=True, slots=True)
-class Knots:
-    """Exact knots of a plan, row by row."""
-
-    t: Numbers
-    x: Rows
-    u: Rows
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """The plan as it was certified: `interpolation` is None where a certification ended before there was one."""
-
-    kind: str
-    interpolation: str | None
-    curve: str | None
-    knots: Knots | None
-    samples: tuple[Numbers, Rows] | None
-    file: str | None
-    file_hash: str | None
+    @property
+    def gains(self) -> Asked:
+        """What was asked of gains."""
+        return Asked(bandwidth=self.bandwidth, adaptation_rate=self.adaptation_rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,166 +119,11 @@ class TubeSection:
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
-    """Gains of A and B: omega, Gamma, the g of A_m = -g I (None: the matrix of the specification), R_H."""
-
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction | None
-    projection_radius: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class RatePair:
-    """A pair of A with its margins."""
-
-    gains: Pair
-    margins: dict[str, Enclosure]
-
-
-@dataclass(frozen=True, slots=True)
-class DistancePair:
-    """A pair of B with its margin."""
-
-    gains: Pair
-    margin: Enclosure
-    ultimate_radius: Fraction | None
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """A point of a curve of gains."""
-
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction | None
-
-
-@dataclass(frozen=True, slots=True)
-class Around:
-    """Proven margins along the bandwidth, by claim; None where nothing is proven."""
-
-    bandwidths: Numbers
-    adaptation_rate: Fraction
-    predictor_gain: Fraction | None
-    margins: dict[str, tuple[Fraction | None, ...]]
-
-
-@dataclass(frozen=True, slots=True)
-class Shortfall:
-    """A condition that is not proven, with its margin."""
-
-    condition: str
-    margin: Enclosure
-
-
-@dataclass(frozen=True, slots=True)
-class Predictor:
-    """A_m, P and Q as printed."""
-
-    A_m: Rows
-    P: Rows
-    Q: Rows
-
-
-@dataclass(frozen=True, slots=True)
-class RateSection:
-    """Certificate A."""
-
-    verdict: str
-    pair: RatePair | None
-    predictor: Predictor | None
-    ultimate_radius: Fraction | None
-    least_adaptation: RatePair | None
-    curve: tuple[Point, ...]
-    around: Around | None
-    binds: str | None
-    below_twice_rate: bool
-    shortfalls: tuple[Shortfall, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DistanceSection:
-    """Certificate B."""
-
-    verdict: str
-    split: DistancePair | None
-    least_adaptation: DistancePair | None
-    asked: DistancePair | None
-    ultimate_radius: Fraction | None
-    curve: tuple[Point, ...]
-    around: Around | None
-    shortfalls: tuple[Shortfall, ...]
-
-    @property
-    def pairs(self) -> dict[str, DistancePair]:
-        """By name, the one that the verdict is about first."""
-        named = {"asked": self.asked, "least_adaptation": self.least_adaptation, "split": self.split}
-        return {name: pair for name, pair in named.items() if pair is not None}
-
-
-@dataclass(frozen=True, slots=True)
-class SampledPair:
-    """Gains of C: Ts, omega, g, R_H."""
-
-    sample_time: Fraction
-    bandwidth: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class SampledSection:
-    """Certificate C; a curve is of (omega, Ts)."""
-
-    verdict: str
-    pair: SampledPair | None
-    margin: Enclosure | None
-    ultimate_radius: Fraction | None
-    curve: tuple[tuple[Fraction, Fraction], ...]
-    shortfalls: tuple[Shortfall, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DistanceRecipe:
-    """Y, e and S of theorem B at its gains."""
-
-    gains: Pair
-    speed: Fraction
-    prediction_error: Fraction
-    uncertainty: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class SampledRecipe:
-    """Y of theorem C at its gains."""
-
-    gains: SampledPair
-    speed: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class Recipes:
-    """`result.proof`, section by section."""
-
-    rates: Pair | None
-    distance: DistanceRecipe | None
-    sampled: SampledRecipe | None
-
-
-@dataclass(frozen=True, slots=True)
 class Sections:
-    """A, B and C, with those that decide."""
+    """The section of every kind by its key, with those that decide."""
 
-    rates: RateSection
-    distance: DistanceSection
-    sampled: SampledSection
+    by_key: dict[str, Section]
     decided_by: tuple[str, ...]
-
-    @property
-    def by_name(self) -> dict[str, RateSection | DistanceSection | SampledSection]:
-        """Each by its key."""
-        return {"conditions_26": self.rates, "distance": self.distance, "sampled": self.sampled}
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,7 +141,7 @@ class Result:
     assumptions: tuple[Assumption, ...]
     declared: dict[str, Fraction]
     reasons: tuple[Reason, ...]
-    recipes: Recipes
+    recipes: dict[str, object]  # `result.proof`, by the key of the kind
     synthesised: Wanted | None
     metric: MetricSection | None
     tube: TubeSection | None
@@ -360,7 +167,7 @@ def read_certificate(document: Node) -> Certificate:
 
 def read_result(node: Node) -> Result:
     """`result`; one that says `certified` must have every section."""
-    last = ("constants", "tube", "conditions_26", "distance", "sampled", "decided_by", "elasticities")
+    last = ("constants", "tube", *KEYS, "decided_by", "elasticities")
     own = node.closed(
         "verdict",
         "formulas",
@@ -394,7 +201,7 @@ def read_result(node: Node) -> Result:
         effective_hash=spec["effective_hash"].text(),
         claim=_claim(own["claim"], states),
         overrides=_overrides(own["overrides"]),
-        plan=_plan(own["plan"], specification),
+        plan=read_plan(own["plan"], specification),
         safe_set=_box(own["safe_set"], states, Node.decimal),
         assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
         declared=_declared(own["declared"]),
@@ -467,38 +274,6 @@ def _declared(node: Node) -> dict[str, Fraction]:
     return {key: value.decimal() for key, value in node.items()}
 
 
-def _plan(node: Node, specification: Specification) -> Plan:
-    n, m = len(specification.plant.states), len(specification.plant.inputs)
-    optional = ["interpolation", "samples"]
-    if not isinstance(specification.trajectory, Resting) and specification.trajectory.kind != "expressions":
-        optional += ["curve", "knots"]
-    if isinstance(specification.trajectory, Tabled):
-        optional += ["file", "file_hash"]
-    own = node.closed("kind", optional=optional)
-    knots = own.get("knots", lambda item: _knots(item, n, m))
-    if "interpolation" in own:
-        own.require(*(key for key in optional if key != "samples"))
-    return Plan(
-        kind=own["kind"].text(),
-        interpolation=own.get("interpolation", lambda item: item.word("exact", "hold", "linear")),
-        curve=own.get("curve", Node.text),
-        knots=knots,
-        samples=own.get("samples", lambda item: samples(item, n)),
-        file=own.get("file", Node.text),
-        file_hash=own.get("file_hash", Node.text),
-    )
-
-
-def _knots(node: Node, n: int, m: int) -> Knots:
-    own = node.closed("t", "x", "u")
-    t = own["t"].exacts()
-    x, u = (
-        tuple(tuple(e.exact() for e in row) for row in own[key].rows(len(t), size))
-        for key, size in (("x", n), ("u", m))
-    )
-    return Knots(t, x, u)
-
-
 # -- what is measured ----------------------------------------------------------------------------------------------
 
 
@@ -538,9 +313,9 @@ def _tube(node: Node, states: tuple[str, ...]) -> TubeSection:
 
 
 def _constants(node: Node, result: Members) -> dict[str, Enclosure]:
-    """Every constant there is, and no other; those that follow from gains only where gains of A are printed."""
-    has_gains = "conditions_26" in result and result["conditions_26"].mapping().get("bandwidth") is not None
-    names = (*MEASURED, *(DERIVED if has_gains else ()))
+    """Every constant there is, and no other; those that follow from gains only where such gains are printed."""
+    derived = (kind.derived(result[kind.key]) for kind in KINDS if kind.key in result)
+    names = (*MEASURED, *(name for names in derived for name in names))
     own = node.closed(*names)
     n = len(result["safe_set"].mapping())
     return {name: _constant(own[name], n) for name in names}
@@ -563,190 +338,11 @@ def _constant(node: Node, n: int) -> Enclosure:
 
 
 def _sections(own: Members, n: int) -> Sections:
-    elasticities(own["elasticities"], MEASURED)
-    return Sections(
-        rates=_rates(own["conditions_26"], n),
-        distance=_distance(own["distance"]),
-        sampled=_sampled(own["sampled"]),
-        decided_by=own["decided_by"].texts(),
-    )
+    elasticities(own["elasticities"], [kind.key for kind in KINDS if kind.elastic], MEASURED)
+    read = {kind.key: kind.read(own[kind.key], n) for kind in KINDS}
+    return Sections(read, own["decided_by"].texts())
 
 
-def _gains(own: Members) -> Pair:
-    return Pair(
-        bandwidth=own["bandwidth"].decimal(),
-        adaptation_rate=own["adaptation_rate"].decimal(),
-        predictor_gain=own.known("predictor_gain", Node.decimal),
-        projection_radius=own["projection_radius"].decimal(),
-    )
-
-
-_GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
-
-
-def _margins(node: Node) -> dict[str, Enclosure]:
-    own = node.closed(*CLAIMS_26)
-    return {claim: enclosure(own[claim]) for claim in CLAIMS_26}
-
-
-def _rates(node: Node, n: int) -> RateSection:
-    gains = ("bandwidth", "adaptation_rate", "projection_radius", "margins")
-    own = node.closed(
-        "verdict",
-        *gains,
-        "A_m",
-        "P",
-        "Q",
-        "ultimate_radius",
-        "least_adaptation",
-        "curve",
-        "bandwidth_infimum",
-        "binds",
-        "below_twice_rate",
-        "shortfalls",
-        optional=("margins_around",),
-    )
-    own.known("bandwidth_infimum", Node.number)
-    verdict = own["verdict"].word(*VERDICTS)
-    matrices = [own.known(key, lambda item: _matrix(item, n)) for key in ("A_m", "P", "Q")]
-    A_m, P, Q = matrices
-    predictor = None if A_m is None or P is None or Q is None else Predictor(A_m, P, Q)
-    present = [own[key].value is not None for key in gains]
-    if any(present) != all(present) or (verdict == "certified" and not (all(present) and predictor)):
-        raise node.refused("has a part of its gains only")
-    pair = None
-    if all(present):
-        pair = RatePair(
-            Pair(
-                own["bandwidth"].decimal(),
-                own["adaptation_rate"].decimal(),
-                None if predictor is None else _scalar(predictor.A_m),
-                own["projection_radius"].decimal(),
-            ),
-            _margins(own["margins"]),
-        )
-    return RateSection(
-        verdict=verdict,
-        pair=pair,
-        predictor=predictor,
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        least_adaptation=own.known("least_adaptation", _rate_pair),
-        curve=tuple(_point(item) for item in own["curve"].entries()),
-        around=own.get("margins_around", lambda item: _around(item, CLAIMS_26)),
-        binds=own.known("binds", Node.text),
-        below_twice_rate=own["below_twice_rate"].flag(),
-        shortfalls=_shortfalls(own["shortfalls"]),
-    )
-
-
-def _matrix(node: Node, n: int) -> Rows:
-    return tuple(tuple(e.decimal() for e in row) for row in node.rows(n, n))
-
-
-def _scalar(A: Rows) -> Fraction | None:
-    """The g > 0 of A = -g I."""
-    g = -A[0][0]
-    same = all(e == (-g if i == j else 0) for i, row in enumerate(A) for j, e in enumerate(row))
-    return g if same and g > 0 else None
-
-
-def _rate_pair(node: Node) -> RatePair:
-    own = node.closed(*_GAINS, "margins")
-    return RatePair(_gains(own), _margins(own["margins"]))
-
-
-def _distance_pair(node: Node) -> DistancePair:
-    own = node.closed(*_GAINS, "margin", "ultimate_radius")
-    radius = own.known("ultimate_radius", Node.number)
-    return DistancePair(_gains(own), enclosure(own["margin"]), radius)
-
-
-def _point(node: Node) -> Point:
-    own = node.closed("bandwidth", "adaptation_rate", "predictor_gain")
-    gains = own["bandwidth"].decimal(), own["adaptation_rate"].decimal()
-    return Point(*gains, own.known("predictor_gain", Node.decimal))
-
-
-def _around(node: Node, claims: tuple[str, ...]) -> Around:
-    bandwidths, rate, gain, margins = around(node, claims)
-    return Around(bandwidths, rate, gain, margins)
-
-
-def _shortfalls(node: Node) -> tuple[Shortfall, ...]:
-    found = []
-    for item in node.entries():
-        own = item.closed("condition", "margin", "allowed", "needed", "missing", optional=("constant",))
-        own.get("constant", Node.text)
-        for key in ("allowed", "needed", "missing"):
-            own.known(key, Node.number)
-        found.append(Shortfall(own["condition"].text(), enclosure(own["margin"])))
-    return tuple(found)
-
-
-def _distance(node: Node) -> DistanceSection:
-    keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "curve", "shortfalls")
-    own = node.closed(*keys, optional=("margins_around",))
-    found = DistanceSection(
-        verdict=own["verdict"].word(*VERDICTS),
-        split=own.known("split", _distance_pair),
-        least_adaptation=own.known("least_adaptation", _distance_pair),
-        asked=own.known("asked", _distance_pair),
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        curve=tuple(_point(item) for item in own["curve"].entries()),
-        around=own.get("margins_around", lambda item: _around(item, ("margin",))),
-        shortfalls=_shortfalls(own["shortfalls"]),
-    )
-    if not found.pairs and (found.verdict == "certified" or found.curve or found.around):
-        raise node.refused("has no pair of gains")
-    return found
-
-
-_SAMPLED = ("sample_time", "bandwidth", "predictor_gain", "projection_radius")
-
-
-def _sampled_pair(own: Members) -> SampledPair:
-    return SampledPair(*(own[key].decimal() for key in _SAMPLED))
-
-
-def _sampled(node: Node) -> SampledSection:
-    keys = ("verdict", "margin", "ultimate_radius", "sample_time_limit", "curve", "shortfalls")
-    own = node.closed(*_SAMPLED, *keys)
-    own.known("sample_time_limit", Node.number)
-    verdict = own["verdict"].word(*VERDICTS)
-    present = [own[key].value is not None for key in (*_SAMPLED, "margin")]
-    if any(present) != all(present) or (verdict == "certified" and not all(present)):
-        raise node.refused("has a part of its gains only")
-    curve = []
-    for item in own["curve"].entries():
-        point = item.closed("bandwidth", "sample_time")
-        curve.append((point["bandwidth"].decimal(), point["sample_time"].decimal()))
-    if curve and not all(present):
-        raise node.refused("has a curve and no gains")
-    return SampledSection(
-        verdict=verdict,
-        pair=_sampled_pair(own) if all(present) else None,
-        margin=own.known("margin", enclosure),
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        curve=tuple(curve),
-        shortfalls=_shortfalls(own["shortfalls"]),
-    )
-
-
-def _recipes(node: Node) -> Recipes:
-    own = node.closed(optional=("conditions_26", "distance", "sampled"))
-    return Recipes(
-        rates=own.get("conditions_26", lambda item: _gains(item.closed(*_GAINS))),
-        distance=own.get("distance", _distance_recipe),
-        sampled=own.get("sampled", _sampled_recipe),
-    )
-
-
-def _distance_recipe(node: Node) -> DistanceRecipe:
-    own = node.closed(*_GAINS, "speed", "prediction_error", "uncertainty")
-    numbers = (own[key].decimal() for key in ("speed", "prediction_error", "uncertainty"))
-    return DistanceRecipe(_gains(own), *numbers)
-
-
-def _sampled_recipe(node: Node) -> SampledRecipe:
-    own = node.closed(*_SAMPLED, "speed")
-    return SampledRecipe(_sampled_pair(own), own["speed"].decimal())
+def _recipes(node: Node) -> dict[str, object]:
+    own = node.closed(optional=KEYS)
+    return {kind.key: kind.read_recipe(own[kind.key]) for kind in KINDS if kind.key in own}

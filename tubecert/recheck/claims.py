@@ -1,29 +1,20 @@
-"""All claims of a certificate in their order, each with everything it depends on as its key.
-
-Equal keys mean equal outcomes: a memory of outcomes may be shared between certificates that differ in a field or two.
-"""
+"""All claims of a certificate in their order."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, MutableMapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import claimed, consistency, gains, geodesics, metric, planned, start
+from tubecert.recheck import claimed, consistency, geodesics, metric, planned, start
 from tubecert.recheck.balls import exact
 from tubecert.recheck.certificate import (
-    DERIVED,
     INFIMA,
-    DistanceSection,
     MetricSection,
-    Pair,
-    RateSection,
     Result,
-    SampledSection,
     Sections,
     TubeSection,
 )
@@ -32,45 +23,17 @@ from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import digest
+from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.examination import SHARP, Claim
+from tubecert.recheck.kinds.kind import Ground
+from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.place import Place
-from tubecert.recheck.predictor import Gains
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.reasons import Enclosure
 from tubecert.recheck.specification import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.times import time_range
 
-_BITS = 64  # for boxes
-_SHARP = 160  # for formulas at decimals
 _ROUND_UP = Fraction(1001, 1000)
-
-Memory = MutableMapping[str, Outcome]
-
-
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A statement of the certificate, what it depends on (None: it is examined each time), and how to examine it."""
-
-    name: str
-    key: tuple[object, ...] | None
-    examine: Callable[[], Outcome] = field(repr=False)
-    bits: int = _BITS
-
-    def outcome(self, memory: Memory | None = None) -> Outcome:
-        """The outcome; what arithmetic cannot represent is undecided."""
-        if memory is None or self.key is None:
-            return self._examined()
-        name = json.dumps([self.name, self.key], default=str, sort_keys=True)
-        if name not in memory:
-            memory[name] = self._examined()
-        return memory[name]
-
-    def _examined(self) -> Outcome:
-        with ctx.workprec(self.bits):
-            try:
-                return self.examine()
-            except (ArithmeticError, ValueError) as error:
-                return Outcome(verdict="undecided", why=f"it cannot be evaluated: {error}")
 
 
 @dataclass(frozen=True)
@@ -88,7 +51,7 @@ class Case:
     @cached_property
     def curve(self) -> Curve:
         """The plan."""
-        with ctx.workprec(_SHARP):
+        with ctx.workprec(SHARP):
             return curve_of(self.result.specification, self.result.plan, self.system)
 
     @cached_property
@@ -123,7 +86,7 @@ class Case:
     @cached_property
     def setting(self) -> Setting:
         """The constants on their safe sides."""
-        with ctx.workprec(_SHARP):
+        with ctx.workprec(SHARP):
             bounds = {name: self.bound_if_any(name) for name in USED}
             # what has no bound is not a number: no comparison with what rests on it can hold
             values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
@@ -242,7 +205,7 @@ def _tube(case: Case) -> Iterator[Claim]:
             "the plan serves its task",
             (*case.whole, case.knots),
             lambda: planned.serves(trajectory, plan),
-            _SHARP,
+            SHARP,
         )
     yield Claim(
         "what is drawn of the plan lies on it",
@@ -253,7 +216,7 @@ def _tube(case: Case) -> Iterator[Claim]:
         f"rho = {float(place.rho):.6g} is large enough",
         (*case.over_tube, lower, upper),
         lambda: start.radius(place, case.bound("lower"), case.bound("upper")),
-        _SHARP,
+        SHARP,
     )
     yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))
     for i, (name, width) in enumerate((case.tube.half_widths or {}).items()):
@@ -308,122 +271,13 @@ def _largest(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
 
 
 def _gains(case: Case) -> Iterator[Claim]:
-    radii = [pair.projection_radius for pair in _pairs(case.sections)]
-    R_H = radii[0] if radii else Fraction(0)
-    yield from _rates(case, case.sections.rates, R_H)
-    yield from _distance(case, case.sections.distance, R_H)
-    yield from _sampled(case, case.sections.sampled)
-
-
-def _pairs(sections: Sections) -> Iterator[Pair]:
-    """All pairs of A and B."""
-    for pair in (sections.rates.pair, sections.rates.least_adaptation, *sections.distance.pairs.values()):
-        if pair is not None:
-            yield pair.gains
-
-
-def _formula(case: Case, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
-    return Claim(name, (*case.numbers, *parts), examine, _SHARP)
-
-
-def _rates(case: Case, A: RateSection, R_H: Fraction) -> Iterator[Claim]:
-    setting, recipe = case.setting, case.result.recipes.rates
-    pair, least, radius = A.pair, A.least_adaptation, A.ultimate_radius
-    if A.predictor is not None and pair is not None:
-        printed = A.predictor
-        yield _formula(case, "A: the predictor", (printed,), lambda: gains.loop(printed, case.system))
-    if pair is not None:
-        at, shown = gains.gains_of(pair.gains), {name: case.constants[name] for name in DERIVED}
-        yield _formula(
-            case,
-            "A: derived constants",
-            (at, shown),
-            lambda: gains.derived_constants(case.constants, setting, at),
-        )
-        if A.verdict == "certified":
-            yield _formula(
-                case,
-                f"A: (26a)-(26c) at {_words(at)}",
-                (pair,),
-                lambda: gains.margins(pair.margins, setting, at),
-            )
-            yield _formula(
-                case,
-                "A: its recipe",
-                (pair, recipe),
-                lambda: metric.stated(recipe == pair.gains, "it is for other gains"),
-            )
-        if radius is not None:
-            yield _formula(
-                case, "A: ultimate radius", (at, radius), lambda: gains.ultimate_26(radius, setting, at)
-            )
-        yield _formula(
-            case, "A: below twice the rate", (A,), lambda: gains.below_twice_rate(A, case.system.rate)
-        )
-    if least is not None:
-        own = gains.gains_of(least.gains)
-        yield _formula(
-            case,
-            f"A: (26a)-(26c) at {_words(own)}",
-            (least,),
-            lambda: gains.margins(least.margins, setting, own),
-        )
-    yield _formula(
-        case, "A: the curve is feasible", (A.curve, R_H), lambda: gains.curve_26(A.curve, R_H, setting)
+    sections, recipes = case.sections, case.result.recipes
+    radii = [r for kind in KINDS for r in kind.projection_radii(sections.by_key[kind.key])]
+    ground = Ground(
+        setting=case.setting,
+        constants=case.constants,
+        depends=case.numbers,
+        projection_radius=radii[0] if radii else Fraction(0),
     )
-    around = A.around
-    if around is not None:
-        yield _formula(
-            case, "A: margins around", (around, R_H), lambda: gains.around_26(around, R_H, setting)
-        )
-
-
-def _distance(case: Case, B: DistanceSection, R_H: Fraction) -> Iterator[Claim]:
-    setting, recipe = case.setting, case.result.recipes.distance
-    for k, (name, pair) in enumerate(B.pairs.items()):
-        decides = k == 0
-        if name == "asked" and B.verdict != "certified":
-            continue
-        own = recipe if decides and B.verdict == "certified" else None
-        missing = decides and B.verdict == "certified" and recipe is None
-        yield _formula(
-            case,
-            f"B: sup D < dbar at {_words(gains.gains_of(pair.gains))}",
-            (pair, own, missing),
-            lambda pair=pair, own=own, missing=missing: (  # type: ignore[misc]
-                metric.stated(False, "it has no recipe")
-                if missing
-                else gains.distance_pair(pair, setting, own)
-            ),
-        )
-        if decides:
-            yield _formula(case, "B: ultimate radius", (B, pair), lambda pair=pair: gains.agreed(B, pair))  # type: ignore[misc]
-    yield _formula(
-        case, "B: the curve is feasible", (B.curve, R_H), lambda: gains.distance_curve(B.curve, R_H, setting)
-    )
-    around = B.around
-    if around is not None:
-        yield _formula(
-            case, "B: margins around", (around, R_H), lambda: gains.around_distance(around, R_H, setting)
-        )
-
-
-def _sampled(case: Case, C: SampledSection) -> Iterator[Claim]:
-    setting, recipe, pair = case.setting, case.result.recipes.sampled, C.pair
-    if C.verdict == "certified" and pair is not None:
-        words = f"omega = {float(pair.bandwidth):.6g}, Ts = {float(pair.sample_time):.6g}"
-        yield _formula(
-            case,
-            f"C: sup D < dbar at {words}",
-            (C, recipe),
-            lambda: (
-                metric.stated(False, "it has no recipe")
-                if recipe is None
-                else gains.sampled(C, setting, recipe)
-            ),
-        )
-    yield _formula(case, "C: the curve is feasible", (C.curve, pair), lambda: gains.sampled_curve(C, setting))
-
-
-def _words(at: Gains) -> str:
-    return f"omega = {float(at.bandwidth):.6g}, Gamma = {float(at.adaptation_rate):.6g}"
+    for kind in KINDS:
+        yield from kind.claims(sections.by_key[kind.key], recipes.get(kind.key), ground)

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tubecert.recheck.certificate import Geodesics, Result, Sections
+from tubecert.recheck.certificate import Geodesics, Result
 from tubecert.recheck.cover import Outcome
+from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.metric import CONFIRMED, stated
-from tubecert.recheck.reasons import Assumption, Enclosure
+from tubecert.recheck.reasons import Assumption
 from tubecert.recheck.specification import Metric, Planned, Tabled, Wanted
 from tubecert.recheck.system import System
 
@@ -64,24 +66,8 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
         yield own in (None, value), f"overrides.{name} is not what spec.effective has"
     if sections is None:
         return
-    asked = {"bandwidth": given.bandwidth, "adaptation_rate": given.adaptation_rate}
-    judged = {"conditions_26": sections.rates.pair, "distance": sections.distance.asked}
-    for section, pair in judged.items():
-        for name, own in asked.items():
-            same = own is None or pair is None or getattr(pair.gains, name) == own
-            yield same, f"overrides.{name} is not what {section} judges"
-    asked_for = any(own is not None for own in asked.values())
-    yield sections.distance.asked is None or asked_for, "distance.asked was not asked for"
-    certified = sections.distance.verdict == "certified"
-    yield (
-        not (asked_for and certified and sections.distance.asked is None),
-        "distance is certified for gains that were not asked for",
-    )
-    sampled = sections.sampled.pair
-    yield (
-        sampled is None or given.bandwidth in (None, sampled.bandwidth),
-        "overrides.bandwidth is not what sampled judges",
-    )
+    for kind in KINDS:
+        yield from kind.asked(sections.by_key[kind.key], given.gains)
 
 
 def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:
@@ -139,12 +125,12 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     deciding = sections.decided_by
     yield bool(deciding) and len(set(deciding)) == len(deciding), "decided_by is not a list of sections"
     for name in deciding:
-        section = sections.by_name.get(name)
+        section = sections.by_key.get(name)
         if section is None:
             yield False, f"decided_by names {name[:40]!r}, which is no section"
             return
         yield section.verdict == "certified", f"{_CLAIMS_ONLY} {name}, which decides, is not"
-    for name, section in sections.by_name.items():
+    for name, section in sections.by_key.items():
         whole = section.verdict != "certified" or not section.shortfalls
         yield whole, f"{name} is certified and lists shortfalls"
     for reason in result.reasons:
@@ -152,24 +138,9 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
         yield reason.claim == "gains_suffice", f"{_CLAIMS_ONLY} a reason is not that gains suffice"
         named = reason.parameters["section"]
         yield named in deciding, f"a reason names {str(named)[:40]!r}, which does not decide"
-        own = _said(sections, str(named))
-        same = all(value == own.get(key) for key, value in reason.parameters.items())
+        own = next(kind.said(sections.by_key[kind.key]) for kind in KINDS if kind.key == named)
+        same = all(value == own.get(key) for key, value in reason.parameters.items() if key != "section")
         yield same, f"a reason repeats {named} otherwise than it is"
-
-
-def _said(sections: Sections, name: str) -> dict[str, object]:
-    """What a reason may repeat of a section that is certified."""
-    A, B, C = sections.rates, sections.distance, sections.sampled
-    if name == "conditions_26" and A.pair is not None:
-        below = {claim: margin.below for claim, margin in A.pair.margins.items()}
-        own = {"section": name, "margins": below, "below_twice_rate": A.below_twice_rate}
-        return own if A.binds is None else {**own, "binds": A.binds}
-    if name == "distance" and B.pairs:
-        return {"section": name, "margins": {name: next(iter(B.pairs.values())).margin.below}}
-    if name == "sampled" and C.pair is not None and C.margin is not None:
-        margins = {name: C.margin.below}
-        return {"section": name, "margins": margins, "predictor_gain": C.pair.predictor_gain}
-    return {}
 
 
 def assumptions(result: Result, s: System) -> Outcome:

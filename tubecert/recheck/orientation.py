@@ -5,20 +5,18 @@ What of them is a statement after all (points of the plan, margins around the ga
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from fractions import Fraction
+from collections.abc import Collection, Sequence
 
 from tubecert.recheck.document import Node
+from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.reasons import read_outcome, read_reason
-from tubecert.recheck.specification import Numbers, Rows, Wanted, read_wanted
+from tubecert.recheck.specification import Wanted, read_wanted
 
 NOT_EXAMINED = (
     "effort",
     "elasticities",
     "synthesis",
-    "conditions_26.bandwidth_infimum",
-    "conditions_26.binds",
-    "sampled.sample_time_limit",
+    *(f"{kind.key}.{member}" for kind in KINDS for member in kind.unread),
 )
 """By path: members that are shown and not verified."""
 
@@ -33,36 +31,13 @@ def run(node: Node) -> None:
         version.text()
 
 
-def samples(node: Node, n: int) -> tuple[Numbers, Rows]:
-    """Times and points of the plan."""
-    own = node.closed("t", "x")
-    t = own["t"].numbers()
-    return t, tuple(tuple(e.number() for e in row) for row in own["x"].rows(len(t), n))
-
-
-def elasticities(node: Node, names: Collection[str]) -> None:
+def elasticities(node: Node, kinds: Sequence[str], names: Collection[str]) -> None:
     """How the least rates react to each constant."""
-    own = node.closed("conditions_26", "distance")
-    for key in ("conditions_26", "distance"):
+    own = node.closed(*kinds)
+    for key in kinds:
         own[key].closed(optional=names)
         for _, slope in own[key].items():
             slope.number()
-
-
-def around(
-    node: Node, claims: tuple[str, ...]
-) -> tuple[Numbers, Fraction, Fraction | None, dict[str, tuple[Fraction | None, ...]]]:
-    """Margins along the bandwidth: bandwidths, the rate and the predictor of the pair, and each margin there."""
-    own = node.closed("bandwidth", "adaptation_rate", "predictor_gain", *claims)
-    bandwidths = own["bandwidth"].decimals()
-    margins = {
-        claim: tuple(
-            None if item.value is None else item.number() for item in own[claim].sized(len(bandwidths))
-        )
-        for claim in claims
-    }
-    gain = own.known("predictor_gain", Node.decimal)
-    return bandwidths, own["adaptation_rate"].decimal(), gain, margins
 
 
 def synthesis(node: Node, n: int) -> Wanted:

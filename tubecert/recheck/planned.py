@@ -6,10 +6,10 @@ from bisect import bisect_right
 from fractions import Fraction
 
 from tubecert.recheck.balls import Ball, exact, length
-from tubecert.recheck.certificate import Plan
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.plans import Plan
 from tubecert.recheck.specification import Planned
 
 _MISS = Fraction(1, 1000)  # of 1 + |target|: how far from its target a planned curve may end

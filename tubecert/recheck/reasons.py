@@ -11,27 +11,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node
+from tubecert.recheck.enclosures import enclosure, maybe
+from tubecert.recheck.kinds.kind import VERDICTS
+from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specification import Numbers
-
-_CONDITIONS = ("26a", "26b", "26c", "distance", "sampled")
-VERDICTS = ("certified", "refuted", "undecided")
 
 Reads = Callable[[Node], object]
 Form = tuple[Mapping[str, Reads], Mapping[str, Reads]]  # members that must be there, and those that may
 Parameters = dict[str, object]
-
-
-@dataclass(frozen=True, slots=True)
-class Enclosure:
-    """[below, above]; None where there is no bound."""
-
-    below: Fraction | None
-    above: Fraction | None
-
-    @property
-    def is_interval(self) -> bool:
-        """Whether its ends, as far as there are any, are in order."""
-        return self.below is None or self.above is None or self.below <= self.above
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,23 +39,12 @@ class Assumption:
     parameters: Parameters
 
 
-def maybe(node: Node) -> Fraction | None:
-    """A number, or null."""
-    return None if node.value is None else node.number()
-
-
-def enclosure(node: Node) -> Enclosure:
-    """[below, above]; either may be null."""
-    low, high = node.pair()
-    return Enclosure(maybe(low), maybe(high))
-
-
 def _word(*words: str) -> Reads:
     return lambda node: node.word(*words)
 
 
 def _margins(node: Node) -> dict[str, Fraction]:
-    node.closed(optional=_CONDITIONS)
+    node.closed(optional=CONDITIONS)
     return {key: value.number() for key, value in node.items()}
 
 

@@ -14,10 +14,11 @@ from flint import arb
 from tubecert.recheck import metric, uncontrollable
 from tubecert.recheck.balls import Ball, exact, is_indefinite
 from tubecert.recheck.certificate import Result
-from tubecert.recheck.claims import Case, Claim
+from tubecert.recheck.claims import Case
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.gains import SECTIONS
+from tubecert.recheck.examination import Claim
+from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
@@ -51,7 +52,7 @@ def _refutation(case: Case, reason: Reason) -> Outcome:
     if name == "tube_in_safe_set" and at is not None:
         return _leaves(case, at[0])
     section = str(reason.parameters.get("section"))
-    if name == "condition_holds" and section in SECTIONS and result.sections is not None:
+    if name == "condition_holds" and section in KEYS and result.sections is not None:
         return _gains_fail(result, section)
     return Outcome(verdict="undecided", why="refutations of this kind are not examined")
 
@@ -120,7 +121,7 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
 def _gains_fail(result: Result, name: str) -> Outcome:
     """No margin of the section that is printed is proven; its upper end is not positive."""
     assert result.sections is not None
-    section = result.sections.by_name[name]
+    section = result.sections.by_key[name]
     if section.verdict == "certified":
         return metric.stated(False, "the section is certified")
     ends = [item.margin.above for item in section.shortfalls]

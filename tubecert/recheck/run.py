@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
 from tubecert.recheck.certificate import Certificate, read_certificate
-from tubecert.recheck.claims import Case, Claim, Memory, of_certified, of_every
+from tubecert.recheck.claims import Case, of_certified, of_every
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import read
+from tubecert.recheck.examination import Claim, Memory
 from tubecert.recheck.metric import stated
 from tubecert.recheck.orientation import NOT_EXAMINED
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
-from tubecert.recheck.certificate import Plan
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
 from tubecert.recheck.document import wrong
 from tubecert.recheck.grammar import Owed
+from tubecert.recheck.plans import Plan
 from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import (
     Expressed,

@@ -1,0 +1,233 @@
+"""Certificate B: a bound of the Riemannian distance to the plan. Implements: theory 4, theorem B."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, exact
+from tubecert.recheck.conditions import DistanceProof, Setting, distance_bound, margin, own_distance_proof
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Node
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.examination import Claim
+from tubecert.recheck.kinds import printed
+from tubecert.recheck.kinds.bounds import all_of, at_least, margin_at_least, ultimate, words
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
+from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
+from tubecert.recheck.metric import stated
+from tubecert.recheck.predictor import Gains
+
+
+@dataclass(frozen=True, slots=True)
+class DistancePair:
+    """A pair with its margin."""
+
+    gains: Gains
+    margin: Enclosure
+    ultimate_radius: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceRecipe:
+    """Y, e and S of theorem B at its gains."""
+
+    gains: Gains
+    speed: Fraction
+    prediction_error: Fraction
+    uncertainty: Fraction
+
+    @property
+    def proof(self) -> DistanceProof:
+        """As balls."""
+        return DistanceProof(
+            speed=exact(self.speed),
+            prediction_error=exact(self.prediction_error),
+            uncertainty=exact(self.uncertainty),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceSection(Section):
+    """The pairs of least bandwidth, of least rate, the one asked for; the curve."""
+
+    split: DistancePair | None
+    least_adaptation: DistancePair | None
+    asked: DistancePair | None
+    ultimate_radius: Fraction | None
+    curve: tuple[Point, ...]
+    around: Around | None
+
+    @property
+    def pairs(self) -> dict[str, DistancePair]:
+        """By name, the one that the verdict is about first."""
+        named = {"asked": self.asked, "least_adaptation": self.least_adaptation, "split": self.split}
+        return {name: pair for name, pair in named.items() if pair is not None}
+
+
+class Distance(Kind[DistanceSection, DistanceRecipe]):
+    """Certificate B."""
+
+    key: ClassVar = "distance"
+    conditions: ClassVar = ("distance",)
+    elastic: ClassVar = True
+
+    def read(self, node: Node, n: int) -> DistanceSection:
+        """The section `distance`."""
+        del n
+        return _section(node)
+
+    def read_recipe(self, node: Node) -> DistanceRecipe:
+        """Gains, Y, e and S."""
+        own = node.closed(*GAINS, "speed", "prediction_error", "uncertainty")
+        numbers = (own[key].decimal() for key in ("speed", "prediction_error", "uncertainty"))
+        return DistanceRecipe(read_gains(own), *numbers)
+
+    def projection_radii(self, section: DistanceSection) -> Iterator[Fraction]:
+        """Those of its pairs."""
+        for pair in section.pairs.values():
+            yield pair.gains.projection_radius
+
+    def asked(self, section: DistanceSection, given: Asked) -> Statements:
+        """There is a pair that was asked for if gains were, and it has them."""
+        own = section.asked
+        for name in ("bandwidth", "adaptation_rate"):
+            wanted: Fraction | None = getattr(given, name)
+            same = wanted is None or own is None or getattr(own.gains, name) == wanted
+            yield same, f"overrides.{name} is not what {self.key} judges"
+        yield own is None or given.anything, "distance.asked was not asked for"
+        other = given.anything and own is None and section.verdict == "certified"
+        yield not other, "distance is certified for gains that were not asked for"
+
+    def said(self, section: DistanceSection) -> dict[str, object]:
+        """The margin."""
+        pair = next(iter(section.pairs.values()), None)
+        return {} if pair is None else {"margins": {self.key: pair.margin.below}}
+
+    def claims(
+        self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground
+    ) -> Iterator[Claim]:
+        """Every pair with its margin and radius, the curve."""
+        certified = section.verdict == "certified"
+        for k, (name, pair) in enumerate(section.pairs.items()):
+            decides = k == 0
+            if name == "asked" and not certified:
+                continue
+            yield _pair_claim(pair, recipe, ground, by_recipe=decides and certified)
+            if decides:
+                yield ground.claim(
+                    "B: ultimate radius",
+                    (section, pair),
+                    lambda pair=pair: _agreed(section, pair),  # type: ignore[misc]
+                )
+        setting, R_H, curve, around = (
+            ground.setting,
+            ground.projection_radius,
+            section.curve,
+            section.around,
+        )
+        yield ground.claim(
+            "B: the curve is feasible", (curve, R_H), lambda: _curve_holds(curve, R_H, setting)
+        )
+        if around is not None:
+            yield ground.claim(
+                "B: margins around", (around, R_H), lambda: _around_holds(around, R_H, setting)
+            )
+
+
+# -- reading
+
+
+def _section(node: Node) -> DistanceSection:
+    keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "curve", "shortfalls")
+    own = node.closed(*keys, optional=("margins_around",))
+    found = DistanceSection(
+        verdict=own["verdict"].word(*VERDICTS),
+        split=own.known("split", _pair),
+        least_adaptation=own.known("least_adaptation", _pair),
+        asked=own.known("asked", _pair),
+        ultimate_radius=own.known("ultimate_radius", Node.number),
+        curve=printed.read_curve(own["curve"]),
+        around=own.get("margins_around", lambda item: printed.read_around(item, ("margin",))),
+        shortfalls=printed.read_shortfalls(own["shortfalls"]),
+    )
+    if not found.pairs and (found.verdict == "certified" or found.curve or found.around):
+        raise node.refused("has no pair of gains")
+    return found
+
+
+def _pair(node: Node) -> DistancePair:
+    own = node.closed(*GAINS, "margin", "ultimate_radius")
+    radius = own.known("ultimate_radius", Node.number)
+    return DistancePair(read_gains(own), enclosure(own["margin"]), radius)
+
+
+# -- claims
+
+
+def _pair_claim(
+    pair: DistancePair, recipe: DistanceRecipe | None, ground: Ground, *, by_recipe: bool
+) -> Claim:
+    """Theorem B at a pair: by the recipe, which must be for these gains, or by a proof that is found here."""
+    setting = ground.setting
+
+    def examined() -> Outcome:
+        if not by_recipe:
+            return _pair_holds(pair, setting, own_distance_proof(setting, pair.gains))
+        if recipe is None:
+            return stated(False, "it has no recipe")
+        if recipe.gains != pair.gains:
+            return stated(False, "the recipe is for other gains")
+        return _pair_holds(pair, setting, recipe.proof)
+
+    parts = (pair, recipe if by_recipe else None, by_recipe)
+    return ground.claim(f"B: sup D < dbar at {words(pair.gains)}", parts, examined)
+
+
+def _pair_holds(pair: DistancePair, setting: Setting, proof: DistanceProof) -> Outcome:
+    found = margin_at_least(_margin(setting, pair.gains, proof), pair.margin, "the distance")
+    radius = pair.ultimate_radius
+    return ultimate(radius, setting, pair.gains, proof) if found.holds and radius is not None else found
+
+
+def _margin(setting: Setting, at: Gains, proof: DistanceProof) -> Ball:
+    bound = distance_bound(setting, at, proof)
+    return arb("nan") if bound is None else margin(setting, bound.supremum())
+
+
+def _own_margin(setting: Setting, at: Gains) -> Ball:
+    return _margin(setting, at, own_distance_proof(setting, at)) if at.sensible else arb("nan")
+
+
+def _agreed(section: DistanceSection, decisive: DistancePair) -> Outcome:
+    """The radius in the long run that B prints is that of its pair."""
+    own, shown = decisive.ultimate_radius, section.ultimate_radius
+    return stated(shown is None or (own is not None and own <= shown), "it is not that of the pair")
+
+
+def _curve_holds(curve: tuple[Point, ...], R_H: Fraction, setting: Setting) -> Outcome:
+    """Every point of the curve is feasible."""
+    return all_of(
+        stated(
+            bool(_own_margin(setting, point.at(R_H)) > 0),
+            f"the point at bandwidth {float(point.bandwidth):.6g} is not feasible",
+        )
+        for point in curve
+    )
+
+
+def _around_holds(around: Around, R_H: Fraction, setting: Setting) -> Outcome:
+    """The margins that are printed along the bandwidth."""
+    return all_of(
+        at_least(
+            _own_margin(setting, around.at(k, R_H)),
+            below,
+            f"the distance at bandwidth {float(around.bandwidths[k]):.6g}",
+        )
+        for k, below in enumerate(around.margins["margin"])
+        if below is not None
+    )

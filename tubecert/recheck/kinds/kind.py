@@ -1,0 +1,114 @@
+"""What a kind of certificate offers to the rest of recheck."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar, Generic, TypeVar
+
+from tubecert.recheck.conditions import Setting
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Node
+from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.examination import SHARP, Claim
+
+VERDICTS = ("certified", "refuted", "undecided")
+
+Statements = Iterator[tuple[bool, str]]
+"""What must hold, each with what to say where it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shortfall:
+    """A condition that is not proven, with its margin."""
+
+    condition: str
+    margin: Enclosure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """The section of a kind, read."""
+
+    verdict: str
+    shortfalls: tuple[Shortfall, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """Gains that the command line asked for; None: not asked for."""
+
+    bandwidth: Fraction | None
+    adaptation_rate: Fraction | None
+
+    @property
+    def anything(self) -> bool:
+        """Whether any was."""
+        return self.bandwidth is not None or self.adaptation_rate is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ground:
+    """What claims about gains rest on: the constants on their safe sides, and as they are printed.
+
+    `depends` is everything that the setting was made of; `projection_radius` is that of the pairs of A and B.
+    """
+
+    setting: Setting
+    constants: Mapping[str, Enclosure]
+    depends: tuple[object, ...]
+    projection_radius: Fraction
+
+    def claim(self, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
+        """A claim about formulas at decimals, which depends on `parts` beside the setting."""
+        return Claim(name, (*self.depends, *parts), examine, SHARP)
+
+
+S = TypeVar("S", bound=Section)
+R = TypeVar("R")
+
+
+class Kind(ABC, Generic[S, R]):
+    """One kind: S is its section, R its recipe.
+
+    `conditions` are those that it may say are not proven, `unread` the members of its section that are shown and not
+    verified; `elastic` says whether a certificate tells how its least rate reacts to each constant.
+    """
+
+    key: ClassVar[str]
+    conditions: ClassVar[tuple[str, ...]]
+    unread: ClassVar[tuple[str, ...]] = ()
+    elastic: ClassVar[bool] = False
+
+    @abstractmethod
+    def read(self, node: Node, n: int) -> S:
+        """The section of a system with n states; raises `CertificateError` for whatever is not of its form."""
+
+    @abstractmethod
+    def read_recipe(self, node: Node) -> R:
+        """Its recipe in `result.proof`."""
+
+    @abstractmethod
+    def said(self, section: S) -> dict[str, object]:
+        """What a reason may repeat of a section that is certified, `section` apart."""
+
+    @abstractmethod
+    def claims(self, section: S, recipe: R | None, ground: Ground) -> Iterator[Claim]:
+        """Everything that is examined of it. One that is not certified does not claim its gains, but the rest."""
+
+    def asked(self, section: S, given: Asked) -> Statements:
+        """That what was asked for is what is judged."""
+        del section, given
+        yield from ()
+
+    def derived(self, node: Node) -> tuple[str, ...]:
+        """Constants that stand beside those of the tube because of this section, which is not read yet."""
+        del node
+        return ()
+
+    def projection_radii(self, section: S) -> Iterator[Fraction]:
+        """R_H of every pair of gains that shares its controller with A and B."""
+        del section
+        yield from ()

@@ -1,0 +1,155 @@
+"""Certificate C: piecewise-constant adaptation with a sample time. Implements: theory 4b, theorem C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+from tubecert.recheck.balls import exact
+from tubecert.recheck.conditions import Setting
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Members, Node
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.examination import Claim
+from tubecert.recheck.kinds import printed
+from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
+from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.sampling import SampledGains, sampled_margin
+
+GAINS = ("sample_time", "bandwidth", "predictor_gain", "projection_radius")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledSection(Section):
+    """The gains; the curve is of (omega, Ts)."""
+
+    pair: SampledGains | None
+    margin: Enclosure | None
+    ultimate_radius: Fraction | None
+    curve: tuple[tuple[Fraction, Fraction], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SampledRecipe:
+    """Y of theorem C at its gains."""
+
+    gains: SampledGains
+    speed: Fraction
+
+
+class Sampled(Kind[SampledSection, SampledRecipe]):
+    """Certificate C."""
+
+    key: ClassVar = "sampled"
+    conditions: ClassVar = ("sampled",)
+    unread: ClassVar = ("sample_time_limit",)
+
+    def read(self, node: Node, n: int) -> SampledSection:
+        """The section `sampled`."""
+        del n
+        return _section(node)
+
+    def read_recipe(self, node: Node) -> SampledRecipe:
+        """Gains and Y."""
+        own = node.closed(*GAINS, "speed")
+        return SampledRecipe(_gains(own), own["speed"].decimal())
+
+    def asked(self, section: SampledSection, given: Asked) -> Statements:
+        """The bandwidth is the one asked for."""
+        same = section.pair is None or given.bandwidth in (None, section.pair.bandwidth)
+        yield same, f"overrides.bandwidth is not what {self.key} judges"
+
+    def said(self, section: SampledSection) -> dict[str, object]:
+        """The margin, and the gain of the predictor."""
+        if section.pair is None or section.margin is None:
+            return {}
+        margins = {self.key: section.margin.below}
+        return {"margins": margins, "predictor_gain": section.pair.predictor_gain}
+
+    def claims(
+        self, section: SampledSection, recipe: SampledRecipe | None, ground: Ground
+    ) -> Iterator[Claim]:
+        """The gains with their margin and radius, the curve."""
+        setting, pair, curve = ground.setting, section.pair, section.curve
+        if section.verdict == "certified" and pair is not None:
+            words = f"omega = {float(pair.bandwidth):.6g}, Ts = {float(pair.sample_time):.6g}"
+            yield ground.claim(
+                f"C: sup D < dbar at {words}",
+                (section, recipe),
+                lambda: _holds(section, pair, recipe, setting),
+            )
+        yield ground.claim(
+            "C: the curve is feasible", (curve, pair), lambda: _curve_holds(curve, pair, setting)
+        )
+
+
+# -- reading
+
+
+def _gains(own: Members) -> SampledGains:
+    return SampledGains(*(own[key].decimal() for key in GAINS))
+
+
+def _section(node: Node) -> SampledSection:
+    keys = ("verdict", "margin", "ultimate_radius", "sample_time_limit", "curve", "shortfalls")
+    own = node.closed(*GAINS, *keys)
+    own.known("sample_time_limit", Node.number)
+    verdict = own["verdict"].word(*VERDICTS)
+    present = [own[key].value is not None for key in (*GAINS, "margin")]
+    if any(present) != all(present) or (verdict == "certified" and not all(present)):
+        raise node.refused("has a part of its gains only")
+    curve = []
+    for item in own["curve"].entries():
+        point = item.closed("bandwidth", "sample_time")
+        curve.append((point["bandwidth"].decimal(), point["sample_time"].decimal()))
+    if curve and not all(present):
+        raise node.refused("has a curve and no gains")
+    return SampledSection(
+        verdict=verdict,
+        pair=_gains(own) if all(present) else None,
+        margin=own.known("margin", enclosure),
+        ultimate_radius=own.known("ultimate_radius", Node.number),
+        curve=tuple(curve),
+        shortfalls=printed.read_shortfalls(own["shortfalls"]),
+    )
+
+
+# -- claims
+
+
+def _holds(
+    section: SampledSection, at: SampledGains, recipe: SampledRecipe | None, setting: Setting
+) -> Outcome:
+    """Theorem C at the sample time, by the recipe."""
+    shown, radius = section.margin, section.ultimate_radius
+    if recipe is None or shown is None:
+        return stated(False, "it has no recipe")
+    if recipe.gains != at:
+        return stated(False, "the recipe is for other gains")
+    value, ultimate = sampled_margin(setting, at, exact(recipe.speed))
+    found = margin_at_least(value, shown, "the distance with sampled adaptation")
+    return at_most(ultimate, radius, "the ultimate radius") if found.holds and radius is not None else found
+
+
+def _curve_holds(
+    curve: tuple[tuple[Fraction, Fraction], ...], pair: SampledGains | None, setting: Setting
+) -> Outcome:
+    """Every point of the curve is feasible, at some predictor gain: that of the pair, or those that search proposes."""
+    if pair is None:
+        return CONFIRMED
+    R_H, g = pair.projection_radius, pair.predictor_gain
+
+    def feasible(omega: Fraction, Ts: Fraction) -> bool:
+        proposed = (g, omega, 10 * omega, *((1 / Ts, 10 / Ts) if Ts > 0 else ()))
+        return any(
+            bool(sampled_margin(setting, SampledGains(Ts, omega, gain, R_H), None)[0] > 0)
+            for gain in proposed
+        )
+
+    return all_of(
+        stated(feasible(omega, Ts), f"the point at bandwidth {float(omega):.6g} is not feasible")
+        for omega, Ts in curve
+    )

@@ -1,0 +1,70 @@
+"""The plan as a certificate holds it: its kind, its knots, points to draw it by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tubecert.recheck.document import Node
+from tubecert.recheck.specification import Numbers, Resting, Rows, Specification, Tabled
+
+
+@dataclass(frozen=True, slots=True)
+class Knots:
+    """Exact knots of a plan, row by row."""
+
+    t: Numbers
+    x: Rows
+    u: Rows
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The plan as it was certified: `interpolation` is None where a certification ended before there was one."""
+
+    kind: str
+    interpolation: str | None
+    curve: str | None
+    knots: Knots | None
+    samples: tuple[Numbers, Rows] | None
+    file: str | None
+    file_hash: str | None
+
+
+def read_plan(node: Node, specification: Specification) -> Plan:
+    """`result.plan`; the members that it has depend on the kind of trajectory."""
+    n, m = len(specification.plant.states), len(specification.plant.inputs)
+    optional = ["interpolation", "samples"]
+    if not isinstance(specification.trajectory, Resting) and specification.trajectory.kind != "expressions":
+        optional += ["curve", "knots"]
+    if isinstance(specification.trajectory, Tabled):
+        optional += ["file", "file_hash"]
+    own = node.closed("kind", optional=optional)
+    knots = own.get("knots", lambda item: _knots(item, n, m))
+    if "interpolation" in own:
+        own.require(*(key for key in optional if key != "samples"))
+    return Plan(
+        kind=own["kind"].text(),
+        interpolation=own.get("interpolation", lambda item: item.word("exact", "hold", "linear")),
+        curve=own.get("curve", Node.text),
+        knots=knots,
+        samples=own.get("samples", lambda item: _samples(item, n)),
+        file=own.get("file", Node.text),
+        file_hash=own.get("file_hash", Node.text),
+    )
+
+
+def _knots(node: Node, n: int, m: int) -> Knots:
+    own = node.closed("t", "x", "u")
+    t = own["t"].exacts()
+    x, u = (
+        tuple(tuple(e.exact() for e in row) for row in own[key].rows(len(t), size))
+        for key, size in (("x", n), ("u", m))
+    )
+    return Knots(t, x, u)
+
+
+def _samples(node: Node, n: int) -> tuple[Numbers, Rows]:
+    """Times and points of the plan."""
+    own = node.closed("t", "x")
+    t = own["t"].numbers()
+    return t, tuple(tuple(e.number() for e in row) for row in own["x"].rows(len(t), n))
