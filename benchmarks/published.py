@@ -37,8 +37,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     for (epsilon, rho_a), (omega, Gamma) in PUBLISHED.items():
         radii = {"epsilon": Fraction(epsilon), "rho_a": Fraction(rho_a)}
-        printed = certify(spec, Options(**radii, formulas="as-printed"))
-        proven = certify(spec, Options(**radii, conditions="all"))
+        printed = certify(spec, Options(**radii, formulas="as-printed")).to_json()
+        proven = certify(spec, Options(**radii, conditions="all")).to_json()
         print(
             f"| {epsilon}, {rho_a} | {omega} / {Gamma:.0e} | {pair(printed['conditions_26'])} "
             f"| {pair(proven['conditions_26'])} | {pair(proven['distance']['least_adaptation'])} "

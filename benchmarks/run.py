@@ -92,7 +92,7 @@ def growth() -> None:
     for rho in ("0.1", "0.3", "0.6"):
         seconds, result = timed(lambda rho=rho: certify(spec, Options(epsilon=Fraction(rho))))
         reference = reference or seconds
-        print(f"epsilon {rho}: {seconds:.2f} s ({seconds / reference:.2f} x), {result['verdict']}")
+        print(f"epsilon {rho}: {seconds:.2f} s ({seconds / reference:.2f} x), {result.verdict}")
 
 
 def once(work: Callable[[], object]) -> tuple[float, object]:

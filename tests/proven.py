@@ -28,5 +28,5 @@ def shipped(name: str, **options: Any) -> Any:
 
 @cache
 def _made(text: str, options: pipeline.Options) -> str:
-    result = pipeline.certify(load_text(text, "spec.yaml"), options)
+    result = pipeline.certify(load_text(text, "spec.yaml"), options).to_json()
     return certificate.dump(certificate.seal(result, {}))

@@ -35,7 +35,7 @@ def certified(name: str, epsilon: str | None = None) -> tuple[Spec, dict[str, An
     """A specification and its result."""
     spec = load_text(FLAT) if name == "flat" else load(str(CONFIGS / f"{name}.yaml"))
     options = pipeline.Options(epsilon=None if epsilon is None else Fraction(epsilon))
-    result = pipeline.certify(spec, options)
+    result = pipeline.certify(spec, options).to_json()
     return adopted(spec, result), result
 
 

@@ -21,7 +21,7 @@ RATE, RHO = 1.74, 0.5
 def result(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        return certify(load(str(CONFIG)), Options(epsilon=Fraction(2, 5)))
+        return certify(load(str(CONFIG)), Options(epsilon=Fraction(2, 5))).to_json()
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
+from tubecert.certificate.result import Result
 from tubecert.checking import Checked, cache
 from tubecert.checking.expectations import Claim
 from tubecert.cli.app import app
@@ -59,6 +60,9 @@ def certified(monkeypatch):
     done = []
 
     def certify(spec, options, progress=None):
+        return Result.from_json(told(spec, options))
+
+    def told(spec, options):
         done.append((spec, options))
         found = certificates.certified()
         found["tube"]["rho"], found["conditions_26"]["bandwidth"] = 0.0391, 18.29

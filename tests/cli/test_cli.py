@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
+from tubecert.certificate.result import Result
 from tubecert.cli.app import app
 from tubecert.cli.belonging import ForeignError
 from tubecert.errors import SpecError
@@ -50,7 +51,7 @@ def proven(monkeypatch):
         asked.update(spec=spec, options=options)
         if isinstance(asked["result"], BaseException):
             raise asked["result"]
-        return asked["result"]
+        return Result.from_json(asked["result"])
 
     monkeypatch.setattr(pipeline, "certify", certify)
     return asked

@@ -30,7 +30,7 @@ def spec(*changes):
 
 @pytest.fixture(scope="module")
 def result():
-    return certify(spec(), Options())
+    return certify(spec(), Options()).to_json()
 
 
 @pytest.mark.slow
@@ -75,14 +75,14 @@ def test_the_largest_rate_is_the_closed_form(result):
     ],
 )
 def test_a_violated_killing_condition_is_refuted_at_a_point(change):
-    result = certify(spec(change), Options())
+    result = certify(spec(change), Options()).to_json()
     assert result["verdict"] == "refuted"
     assert result["reasons"][0]["claim"] == "metric_killing"
     assert "at" in result["reasons"][0]
 
 
 def test_too_high_a_rate_is_refuted():
-    result = certify(spec(("rate: 1.5", "rate: 1.77")), Options())
+    result = certify(spec(("rate: 1.5", "rate: 1.77")), Options()).to_json()
     assert result["verdict"] == "refuted"
     below, above = result["reasons"][0]["largest_rate"]
     assert 1.76 < below <= above < 1.77

@@ -29,7 +29,7 @@ from tubecert import certificate, pipeline, spec  # noqa: E402
 
 def certified(path: str) -> dict[str, object]:
     """The certificate of a specification, as it is written and read."""
-    result = pipeline.certify(spec.load(path), pipeline.Options(conditions="all"))
+    result = pipeline.certify(spec.load(path), pipeline.Options(conditions="all")).to_json()
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "certificate.json"
         certificate.write(str(target), certificate.seal(result, {}))

@@ -116,7 +116,7 @@ def test_errata_mentioned_elsewhere_exist():
 def test_theorem_b_can_be_checked_from_the_file_alone():
     """The check that docs/guarantee describes, (4.1)-(4.4), in plain floats."""
     text = (ROOT / "configs" / "three_state.yaml").read_text(encoding="utf-8")
-    result = certify(load_text(text, "three.yaml"), Options(conditions="all"))
+    result = certify(load_text(text, "three.yaml"), Options(conditions="all")).to_json()
     proof = {name: float(value) for name, value in result["proof"]["distance"].items()}
     c = {name: value["above"] for name, value in result["constants"].items()}
     rate, rho = result["metric"]["rate"], result["tube"]["rho"]

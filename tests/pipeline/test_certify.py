@@ -11,7 +11,7 @@ import pytest
 from problems import judged_26, judged_distance, judged_sampled, problem_of
 
 from tubecert.bounds.suprema import Suprema
-from tubecert.certificate import exit_code, seal
+from tubecert.certificate import seal
 from tubecert.claims import Reason
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
@@ -19,6 +19,7 @@ from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.records import from_json
 from tubecert.spec import load_text
+from tubecert.verdict import Verdict
 from tubecert.words.claims import message
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -45,7 +46,7 @@ def with_metric(text, metric, following="tube:"):
 
 
 def run(text, **options):
-    return certify(load_text(text, "spec.yaml"), Options(**options))
+    return certify(load_text(text, "spec.yaml"), Options(**options)).to_json()
 
 
 def captured_problem(text, **options):
@@ -64,7 +65,7 @@ def three():
 
 def test_three_state_is_certified_in_every_number(three):
     assert three["verdict"] == "certified"
-    assert exit_code(three) == 0
+    assert Verdict(three["verdict"]).exit_code == 0
     for section in ("conditions_26", "distance", "sampled"):
         assert three[section]["verdict"] == "certified"
     for name, constant in three["constants"].items():
@@ -129,7 +130,7 @@ def test_as_printed_reproduces_the_papers_own_formulas():
 def test_false_metrics_are_refuted_with_a_point_and_the_largest_rate(text, largest):
     result = run(text)
     assert result["verdict"] == "refuted"
-    assert exit_code(result) == 1
+    assert Verdict(result["verdict"]).exit_code == 1
     (reason,) = result["reasons"]
     assert reason["claim"] == "metric_contraction"
     assert largest in message(from_json(Reason, reason, "reason"))

@@ -117,9 +117,9 @@ def lying(key, lie, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(("key", "name"), CASES)
 def test_a_search_that_lies_certifies_nothing(key, name, bounded, monkeypatch):
-    honest = result_of_answer(judge_gains(bounded))
+    honest = result_of_answer(judge_gains(bounded)).to_json()
     lying(key, LIES[key][name], monkeypatch)
-    result = result_of_answer(judge_gains(bounded))
+    result = result_of_answer(judge_gains(bounded)).to_json()
     assert honest["verdict"] == honest[key]["verdict"] == "certified"
     assert result[key]["verdict"] != "certified"
     assert result["verdict"] != "certified"
@@ -178,9 +178,9 @@ def test_an_ultimate_radius_needs_a_companion_at_the_same_gains_that_is_proven(p
 )
 def test_elasticities_that_lie_change_no_claim(slopes, bounded, monkeypatch):
     recipe = KINDS[0].theorem.recipe
-    honest = result_of_answer(judge_gains(bounded))
+    honest = result_of_answer(judge_gains(bounded)).to_json()
     monkeypatch.setitem(PROPOSERS, recipe, replace(PROPOSERS[recipe], slopes=slopes))
-    result = result_of_answer(judge_gains(bounded))
+    result = result_of_answer(judge_gains(bounded)).to_json()
     for key in ("conditions_26", "distance", "sampled", "proof", "verdict", "constants"):
         assert result[key] == honest[key]
 
@@ -197,7 +197,7 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
             return replace(told, beside={}, curve=tuple(map(lie, told.curve)), around=())
 
         monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose, slopes=honest.slopes))
-    result = certify(load(str(CONFIG)), Options(conditions="all"))
+    result = certify(load(str(CONFIG)), Options(conditions="all")).to_json()
     assert result["verdict"] == "certified"
     found = recheck(certificate.dump(certificate.seal(result, {})), "made")
     assert found.verdict == "confirmed", found.failing

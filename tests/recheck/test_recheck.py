@@ -180,7 +180,7 @@ def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
     system = spec.load(THREE)
     with monkeypatch.context() as patch:
         patch.setattr(place, name, broken)
-        result = pipeline.certify(system, pipeline.Options(conditions="all"))
+        result = pipeline.certify(system, pipeline.Options(conditions="all")).to_json()
     assert result["verdict"] == "certified", "the bug must pass the producer to be of interest"
     found = examine(written(result), 5_000)
     assert found.exit_code != ExitCode.CERTIFIED
@@ -265,7 +265,7 @@ def test_another_metric_in_the_section_alone_is_named(shipped):
 
 def test_a_refuted_metric_is_confirmed_at_its_witness():
     text = THREE.read_text(encoding="utf-8").replace("rate: 0.9999", "rate: 1")
-    result = pipeline.certify(spec.load_text(text, "faster.yaml"), pipeline.Options())
+    result = pipeline.certify(spec.load_text(text, "faster.yaml"), pipeline.Options()).to_json()
     assert result["verdict"] == "refuted"
     found = examine(written(result))
     assert found.exit_code == ExitCode.NOT_CERTIFIED
@@ -280,7 +280,7 @@ def test_a_refuted_metric_is_confirmed_at_its_witness():
 @pytest.mark.slow
 def test_as_printed_formulas_never_certify():
     options = pipeline.Options(formulas="as-printed")
-    result = pipeline.certify(spec.load(THREE), options)
+    result = pipeline.certify(spec.load(THREE), options).to_json()
     assert examine(written(result)).exit_code == ExitCode.UNDECIDED
     result["verdict"] = "certified"
     assert examine(written(result), 2_000).exit_code == ExitCode.NOT_CERTIFIED

@@ -33,7 +33,7 @@ def plans(tmp_path_factory):
     (folder / "plan.csv").write_text(ROWS, encoding="utf-8")
     path = folder / "small.yaml"
     path.write_text(SMALL.replace(PLAN, "trajectory: {kind: csv, file: plan.csv}"), encoding="utf-8")
-    result = pipeline.certify(spec.load(path), pipeline.Options(conditions="distance"))
+    result = pipeline.certify(spec.load(path), pipeline.Options(conditions="distance")).to_json()
     moving = SMALL.replace(PLAN, MOVING).replace(START, "initial_state: {at: [0.05, 0.1]}")
     return {
         "expressions": certified(moving, conditions="distance"),

@@ -332,7 +332,7 @@ def test_a_plan_file_is_compared_knot_by_knot(tmp_path):
     text = replaced(SMALL, (PLAN, "trajectory: {kind: csv, file: plan.csv, interpolation: hold}"))
     path.write_text(text, encoding="utf-8")
     options = pipeline.Options(conditions="distance")
-    result = pipeline.certify(spec.load(path), options)
+    result = pipeline.certify(spec.load(path), options).to_json()
     assert result["verdict"] == "certified", result["reasons"]
     target.write_text(certificate.dump(certificate.seal(result, {})), encoding="utf-8")
     assert command(target, "--spec", path).exit_code == 0

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
 from tubecert.bounds.constants import DERIVED, TABLE
-from tubecert.certificate.result import Certificate
+from tubecert.certificate.result import Certificate, Result
 from tubecert.claims import Assumption
 from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
@@ -61,13 +61,13 @@ def sealed(result):
 def orbit():
     """A real certificate with a plan that moves, an obstacle beside the tube, and units."""
     text = ORBIT + "\nobstacles:\n  - {states: [x2, x1], disc: {center: [3, 3], radius: 1/2}}\n"
-    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()))))
+    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()).to_json())))
 
 
 @pytest.fixture(scope="module")
 def regulated():
     """A real certificate of three states at an equilibrium."""
-    result = certify(load(str(CONFIGS / "three_state.yaml")), Options())
+    result = certify(load(str(CONFIGS / "three_state.yaml")), Options()).to_json()
     return json.loads(certificate.dump(sealed(result)))
 
 
@@ -75,7 +75,7 @@ def regulated():
 def outside():
     """A real refusal with a witness: the tube leaves the safe set."""
     text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8").replace("rho_a: 0.01", "rho_a: 0.09")
-    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()))))
+    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()).to_json())))
 
 
 @pytest.fixture(params=["orbit", "regulated", "outside", *MADE])
@@ -558,7 +558,7 @@ def proven(monkeypatch):
 
     def answer(spec, options, progress=None):
         calls.append(spec)
-        return certificates.certified()
+        return Result.from_json(certificates.certified())
 
     monkeypatch.setattr(pipeline, "certify", answer)
     return calls

@@ -278,7 +278,9 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     path, old, new, options = VARIANTS[name]
     text = path.read_text("utf-8")
     assert old in text
-    result = pipeline.certify(load_text(text.replace(old, new) if old else text), pipeline.Options(**options))
+    result = pipeline.certify(
+        load_text(text.replace(old, new) if old else text), pipeline.Options(**options)
+    ).to_json()
     sealed = json.loads(
         certificate.dump(
             certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})

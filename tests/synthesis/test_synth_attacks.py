@@ -211,29 +211,30 @@ def test_the_file_says_what_is_true_of_what_it_holds(name, tmp_path):
     found = pipeline.synthesise(spec, wanted, Options())
     assert found.verdict == "certified"
     target = tmp_path / "m.json"
-    target.write_text(json.dumps(found.file))
+    file = found.file.to_json()
+    target.write_text(json.dumps(file))
     again = with_metric(spec, str(target))
     assert build(again).W == build(found.spec).W
     assert again.metric.rate == found.spec.metric.rate
     assert wanted.rate in (None, again.metric.rate)
     assert again.safe_set == spec.safe_set
-    assert found.file["verified_on"] == {"x": [-0.3, 0.3], "y": [-0.25, 0.25]}
+    assert file["verified_on"] == {"x": [-0.3, 0.3], "y": [-0.25, 0.25]}
     proof = verify_metric(build(again), again.safe_set, Effort())
     assert proof.verdict == "certified"
-    low, high = found.file["margin"]
+    low, high = file["margin"]
     rate = float(again.metric.rate)
     true, least, most = sampled(again)
     assert 0 < low <= true - rate + 1e-9
     assert true - rate <= high + 0.02 * (1 + high)
     for key, value in (("lower", 1 / most), ("upper", 1 / least)):
-        assert found.file[key][0] <= found.file[key][1]
-        assert found.file[key][0] <= value * 1.001
-    assert found.file["lower"][0] <= 1 / most * (1 + 1e-9)
-    assert found.file["upper"][1] >= 1 / least * (1 - 1e-9)
-    assert found.file["condition_number"][1] >= most / least * (1 - 1e-9)
-    assert found.file["condition_number"][0] <= most / least * 1.01
+        assert file[key][0] <= file[key][1]
+        assert file[key][0] <= value * 1.001
+    assert file["lower"][0] <= 1 / most * (1 + 1e-9)
+    assert file["upper"][1] >= 1 / least * (1 - 1e-9)
+    assert file["condition_number"][1] >= most / least * (1 - 1e-9)
+    assert file["condition_number"][0] <= most / least * 1.01
     if wanted.condition_number is not None:
-        assert found.file["condition_number"][1] <= wanted.condition_number
+        assert file["condition_number"][1] <= wanted.condition_number
 
 
 def test_the_greatest_margin_falls_back_on_the_metric_at_the_rate(monkeypatch):
@@ -242,7 +243,7 @@ def test_the_greatest_margin_falls_back_on_the_metric_at_the_rate(monkeypatch):
     monkeypatch.setattr(synthesis.SynthesisRun, "_at_rate", lambda self, metric, rate: None)
     found = run.run(sweep=False)
     assert found.verdict == "certified"
-    assert found.file["rate"] == 0.5
+    assert found.file.rate == Fraction(1, 2)
 
 
 def test_a_metric_too_long_to_be_read_is_not_written(monkeypatch):

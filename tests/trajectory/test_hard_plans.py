@@ -84,7 +84,7 @@ TUBE = "tube: {epsilon: 0.3, rho_a: 0.1}\n"
 
 def verdict(text: str):
     """The verdict and the claim that decided it."""
-    result = certify(load_text(text, "spec.yaml"), Options())
+    result = certify(load_text(text, "spec.yaml"), Options()).to_json()
     reason = from_json(Reason, result["reasons"][-1], "reason")
     return result["verdict"], title(reason.claim), message(reason)
 

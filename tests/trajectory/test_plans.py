@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tubecert.certificate import exit_code, seal
+from tubecert.certificate import seal
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import SumOfNorms
@@ -26,6 +26,7 @@ from tubecert.spec.table import MAX_ROWS
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import TAU, piecewise_plan
 from tubecert.tube import Tube, containment
+from tubecert.verdict import Verdict
 
 x, y = symbol("x"), symbol("y")
 EYE = ((constant(1), constant(0)), (constant(0), constant(1)))
@@ -489,7 +490,7 @@ def resting(count: int) -> str:
 
 @pytest.mark.slow
 def test_a_plan_from_a_file_is_certified_and_recorded(tmp_path):
-    result = certify(load(str(written(tmp_path, resting(21)))), Options(conditions="all"))
+    result = certify(load(str(written(tmp_path, resting(21)))), Options(conditions="all")).to_json()
     assert result["verdict"] == "certified"
     assert result["constants"]["plan_defect"]["above"] < 1e-12
     assert result["constants"]["u_star"]["above"] == pytest.approx(0.5)
@@ -509,15 +510,15 @@ def test_the_initial_state_is_the_first_row_unless_it_is_given(tmp_path):
     assert load(str(path)).x0 == (Fraction(1, 2), Fraction(1, 2))
     text = path.read_text(encoding="utf-8") + "initial_state: {at: [0.6, 0.5]}\n"
     spec = load_text(text, str(path))
-    result = certify(spec, Options())
+    result = certify(spec, Options()).to_json()
     assert result["constants"]["initial_distance"]["above"] == pytest.approx(0.1)
 
 
 def test_a_plan_outside_the_safe_set_is_refuted_with_time_and_point(tmp_path):
     rows = "t,p,q,u\n0,0,0,0\n1,0,1.7,0\n2,0,0,0\n"
-    result = certify(load(str(written(tmp_path, rows))), Options())
+    result = certify(load(str(written(tmp_path, rows))), Options()).to_json()
     assert result["verdict"] == "refuted"
-    assert exit_code(result) == 1
+    assert Verdict(result["verdict"]).exit_code == 1
     (reason,) = result["reasons"]
     assert reason["claim"] == "tube_in_safe_set"
     assert 0.5 < reason["at"]["t"] < 1.5
@@ -527,7 +528,7 @@ def test_a_plan_outside_the_safe_set_is_refuted_with_time_and_point(tmp_path):
 def test_a_plan_that_goes_where_the_dynamics_are_undefined_is_refuted_at_a_knot(tmp_path):
     rows = "t,p,q,u\n0,0,0,0\n1,-5,0,0\n2,0,0,0\n"
     text = written(tmp_path, rows).read_text(encoding="utf-8").replace('"q - p"', '"q - p - sqrt(3 + p)"')
-    result = certify(load_text(text, str(tmp_path / "spec.yaml")), Options())
+    result = certify(load_text(text, str(tmp_path / "spec.yaml")), Options()).to_json()
     assert result["verdict"] == "refuted"
     (reason,) = result["reasons"]
     assert reason["at"]["t"] == 1
@@ -545,7 +546,7 @@ def test_a_plan_that_goes_where_the_dynamics_are_undefined_is_refuted_at_a_knot(
     ],
 )
 def test_extreme_plans_are_judged_without_an_exception(tmp_path, rows):
-    result = certify(load(str(written(tmp_path, "t,p,q,u\n" + rows))), Options(budget=100_000))
+    result = certify(load(str(written(tmp_path, "t,p,q,u\n" + rows))), Options(budget=100_000)).to_json()
     assert result["verdict"] in {"refuted", "undecided", "certified"}
     assert result["reasons"]
     seal(result, {})
@@ -554,7 +555,7 @@ def test_extreme_plans_are_judged_without_an_exception(tmp_path, rows):
 @pytest.mark.slow
 def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):
     rows = "t,p,q,u\n0,0,0,0\n1,1,1,0\n2,-1,-1,0\n"
-    result = certify(load(str(written(tmp_path, rows))), Options(conditions="distance"))
+    result = certify(load(str(written(tmp_path, rows))), Options(conditions="distance")).to_json()
     assert result["verdict"] == "refuted"
     assert result["distance"]["shortfalls"][0]["condition"] == "plan_defect"
     (reason,) = result["reasons"]

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
-from tubecert.errors import ExitCode, TargetError
+from tubecert.errors import TargetError
 from tubecert.files import STDIN, Kind, read, read_stdin, replace
 from tubecert.findings import Finding
 from tubecert.printable import printable_json, visible
@@ -28,11 +28,6 @@ STDOUT = "-"
 REMEDY = "choose another file with -o FILE, or -o - for stdout"
 
 _VERSIONED = re.compile(r"tubecert-certificate/\d{1,9}", re.ASCII)
-_CODES = {
-    "certified": ExitCode.CERTIFIED,
-    "refuted": ExitCode.NOT_CERTIFIED,
-    "undecided": ExitCode.UNDECIDED,
-}
 
 
 def canonical_bytes(data: Any) -> bytes:
@@ -49,11 +44,6 @@ def digest(data: Any) -> str:
 def seal(result: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
     """The certificate: what was proven, its hash, and how it was made (versions, times, command line)."""
     return {"format": FORMAT, "hash": digest(result), "result": dict(result), "run": dict(run)}
-
-
-def exit_code(result: Mapping[str, Any]) -> ExitCode:
-    """What a verdict means to the shell."""
-    return _CODES[result["verdict"]]
 
 
 def dump(certificate: Mapping[str, Any]) -> str:

@@ -1,17 +1,17 @@
-"""Values as the JSON of a certificate: constants, metric, declared bounds, assumptions.
+"""What is proven as the values of a certificate: claim, metric, plan, constants, declared bounds, assumptions.
 
-Numbers are written so that a reader of exact decimals reads a bound: see `enclosure.constant`.
+Numbers are rounded so that a reader of exact decimals reads a bound: see `enclosure.constant`.
 """
 
 from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
-from tubecert.bounds.constants import Constant, Meaning, Witness
+from tubecert.bounds.constants import Constant, Meaning
+from tubecert.certificate.result import Bound, Claimed, KnotTexts, MetricData, PlanData, Samples, Start
 from tubecert.claims import (
     Assumption,
     ExactGeodesics,
@@ -34,8 +34,8 @@ from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
+from tubecert.verdict import Verdict
 
-Result = dict[str, Any]
 _SAMPLES = 201
 
 
@@ -60,44 +60,39 @@ def _exactly(value: Fraction) -> Constant:
     return Constant(below=printable_below(value), above=printable_above(value))
 
 
-def declared_data(spec: Spec) -> Result:
+def declared_data(spec: Spec) -> dict[str, float]:
     """What is believed, not proven: bounds of an h that is not given as expressions."""
     if spec.uncertainty.h is not None or spec.uncertainty.bounds is None:
         return {}
     return {name: constant.above for name, constant in declared_uncertainty(spec).items()}
 
 
-def safe_set_data(spec: Spec) -> dict[str, Any]:
-    """[low, high] of every state, as decimals."""
-    return {
-        name: [decimal_data(low), decimal_data(high)]
-        for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
-    }
-
-
-def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Result:
+def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
     """`result.claim`: what is claimed, in words of its own. `period` of h as (q, whether times pi), in s.
 
     The checker derives it again from its own reading of the specification. `bounds` count beside an expression only
     if |h| itself is declared: else H0 is that of the expression.
     """
     horizon, bounds = spec.trajectory.horizon, spec.uncertainty.bounds
-    for_ever = None if horizon is not None else "autonomous" if period is None else "periodic"
-    covers = "expression" if bounds is None or bounds.h is None else "expression or bounds"
-    return {
-        "id": "tube",
-        "horizon": None if horizon is None else number_text(horizon),
-        "for_all_time": for_ever,
-        "period": None if for_ever != "periodic" or period is None else _period_text(*period),
-        "domain": {
-            name: [number_text(low), number_text(high)]
+    periodic = horizon is None and period is not None
+    return Claimed(
+        id="tube",
+        horizon=None if horizon is None else number_text(horizon),
+        for_all_time=None if horizon is not None else "periodic" if periodic else "autonomous",
+        period=_period_text(*period) if periodic and period is not None else None,
+        domain={
+            name: (number_text(low), number_text(high))
             for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
         },
-        "start": {"at": [number_text(value) for value in spec.x0]}
+        start=Start(at=tuple(map(number_text, spec.x0)))
         if spec.within is None
-        else {"within": number_text(spec.within)},
-        "uncertainty": "bounds" if spec.uncertainty.h is None else covers,
-    }
+        else Start(within=number_text(spec.within)),
+        uncertainty="bounds"
+        if spec.uncertainty.h is None
+        else "expression"
+        if bounds is None or bounds.h is None
+        else "expression or bounds",
+    )
 
 
 def _period_text(q: Fraction, of_pi: bool) -> str:
@@ -105,46 +100,44 @@ def _period_text(q: Fraction, of_pi: bool) -> str:
     return str(q) if not of_pi else "pi" if q == 1 else f"{q}*pi"
 
 
-def metric_data(spec: Spec, proof: MetricProof) -> Result:
+def metric_data(spec: Spec, proof: MetricProof) -> MetricData:
     """`result.metric` as far as C1-C3 on the safe set tell."""
     metric = spec.metric
-    assert metric is not None
-    data: Result = {
-        "rate": decimal_data(metric.rate),
-        "dual_metric": canonical(spec)["metric"]["dual_metric"],
-        "verdict": proof.verdict,
-    }
-    for name in ("margin", "largest_rate", "lower_on_set", "upper_on_set"):
-        if (value := getattr(proof, name)) is not None:
-            data[name] = pair_data(value.printable())
-    return data
+    if metric is None:
+        raise ValueError("a proof is about a metric")
+    return MetricData(
+        rate=metric.rate,
+        dual_metric=tuple(map(tuple, canonical(spec)["metric"]["dual_metric"])),
+        verdict=Verdict(proof.verdict),
+        margin=_printable(proof.margin),
+        largest_rate=_printable(proof.largest_rate),
+        lower_on_set=_printable(proof.lower_on_set),
+        upper_on_set=_printable(proof.upper_on_set),
+    )
 
 
-def plan_data(spec: Spec, plan: Plan) -> Result:
+def _printable(value: Constant | None) -> Constant | None:
+    return None if value is None else value.printable()
+
+
+def plan_data(spec: Spec, plan: Plan) -> PlanData:
     """The plan as it was certified: `exact` expressions, or every knot with the rule that fills the gaps."""
-    trajectory = spec.trajectory
-    knots = plan.knots
+    kind, table, knots = spec.trajectory.kind, spec.trajectory.table, plan.knots
     if knots is None:
-        return {"kind": trajectory.kind, "interpolation": "exact", **_samples(plan)}
-    data: Result = {
-        "kind": trajectory.kind,
-        **_samples(plan),
-        "interpolation": knots.interpolation,
-        "curve": "hermite",  # between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*
-        "knots": {
-            "t": [number_text(t) for t in knots.t],
-            **{
-                name: [[number_text(value) for value in row] for row in rows]
-                for name, rows in (("x", knots.x), ("u", knots.u))
-            },
-        },
-    }
-    if trajectory.table is not None:
-        data |= {"file": trajectory.table.file, "file_hash": f"sha256:{trajectory.table.sha256}"}
-    return data
+        return PlanData(kind=kind, interpolation="exact", samples=_samples(plan))
+    x, u = (tuple(tuple(map(number_text, row)) for row in rows) for rows in (knots.x, knots.u))
+    return PlanData(
+        kind=kind,
+        interpolation=knots.interpolation,
+        curve="hermite",  # between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*
+        knots=KnotTexts(t=tuple(map(number_text, knots.t)), x=x, u=u),
+        samples=_samples(plan),
+        file=None if table is None else table.file,
+        file_hash=None if table is None else f"sha256:{table.sha256}",
+    )
 
 
-def _samples(plan: Plan) -> Result:
+def _samples(plan: Plan) -> Samples | None:
     """Points of the plan, to draw it: 7 digits, no part of any proof. A constant plan is one point."""
     end = 0.0 if plan.horizon is None else float(plan.horizon)
     t = np.zeros(1) if plan.is_constant else np.linspace(0.0, np.nextafter(end, 0.0), _SAMPLES)
@@ -152,46 +145,25 @@ def _samples(plan: Plan) -> Result:
     with np.errstate(invalid="ignore"):  # a curve that is not bounded
         middle = 0.5 * x.lo + 0.5 * x.hi
     if not np.all(np.isfinite(middle)):
-        return {}
-    rows = [[float(f"{value:.7g}") for value in row] for row in middle]
-    return {"samples": {"t": [float(f"{value:.7g}") for value in t], "x": rows}}
-
-
-def constant_data(value: Constant, meaning: Meaning) -> Result:
-    """One entry of `result.constants`."""
-    data: Result = {
-        "below": _number(value.below),
-        "above": _number(value.above),
-        "symbol": meaning.symbol,
-        "equation": meaning.equation,
-        "unit": meaning.unit,
-    }
-    if value.at is not None:
-        data["at"] = witness_data(value.at)
-    return data
-
-
-def witness_data(at: Witness) -> Result:
-    """A time (if it matters) and a state."""
-    return {**({} if at.t is None else {"t": at.t}), "x": list(at.x)}
-
-
-def pair_data(value: Constant) -> list[float | None]:
-    """[below, above]."""
-    return [_number(value.below), _number(value.above)]
-
-
-def _number(value: float) -> float | None:
-    """A bound for JSON: null where there is none."""
-    return value if math.isfinite(value) else None
-
-
-def decimal_data(value: Fraction | None) -> float | str | None:
-    """An exact number: a JSON number where one of at most 15 digits is exact, else a text `p/q`."""
-    if value is None:
         return None
-    near = float(value)
-    return near if Fraction(repr(near)) == value else f"{value.numerator}/{value.denominator}"
+    rows = tuple(tuple(float(f"{value:.7g}") for value in row) for row in middle)
+    return Samples(t=tuple(float(f"{value:.7g}") for value in t), x=rows)
+
+
+def constant_data(value: Constant, meaning: Meaning) -> Bound:
+    """One entry of `result.constants`; no number where there is no bound."""
+    return Bound(
+        below=_finite(value.below),
+        above=_finite(value.above),
+        symbol=meaning.symbol,
+        equation=meaning.equation,
+        unit=meaning.unit,
+        at=value.at,
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def assumptions(

@@ -112,9 +112,8 @@ def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> 
     kept = cache.read_outcome(name)
     if kept is None:
         from tubecert import pipeline
-        from tubecert.certificate.result import Result
 
         effort = pipeline.Options(gap=options.gap, budget=options.budget)
-        kept = outcome(Result.from_json(pipeline.certify(spec, effort, progress)))
+        kept = outcome(pipeline.certify(spec, effort, progress))
         cache.write_outcome(name, kept)
     return kept

@@ -23,7 +23,7 @@ from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Certificate
+    from tubecert.certificate.result import Certificate, Result
     from tubecert.spec import Spec
 
 
@@ -48,14 +48,14 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         result = pipeline.certify(system, options, report)
-    sealed = certificate.seal(result, _record(started, time.perf_counter() - clock))
+    sealed = certificate.seal(result.to_json(), _record(started, time.perf_counter() - clock))
     if target != certificate.STDOUT:
         certificate.write(target, sealed)
     metric = _kept_metric(result, kept)
     told = read_certificate(sealed)
     write_pages(pages, told)
     _report(sealed, told, target, {"metric": metric, "pages": pages}, output)
-    return certificate.exit_code(result)
+    return result.verdict.exit_code
 
 
 def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -127,14 +127,16 @@ def _synthesised(path: str) -> bool:
     return isinstance(content, dict) and "solver" in content and "verified_on" in content
 
 
-def _kept_metric(result: Mapping[str, Any], target: str | None) -> str | None:
+def _kept_metric(result: Result, target: str | None) -> str | None:
     """The file in which a synthesised metric was kept, None if there is none."""
-    if target is None or "synthesis" not in result or result.get("metric", {}).get("verdict") != "certified":
-        return None
-    from tubecert.pipeline import metric_file
+    from tubecert.certificate.metric_file import metric_file
+    from tubecert.verdict import Verdict
 
-    content = metric_file(result["safe_set"], result["metric"], result["synthesis"]["solver"])
-    certificate.write(target, content)
+    metric, synthesis = result.metric, result.synthesis
+    solver = None if synthesis is None else synthesis.solver
+    if target is None or solver is None or metric is None or metric.verdict is not Verdict.CERTIFIED:
+        return None
+    certificate.write(target, metric_file(result.safe_set, metric, solver).to_json())
     return target
 
 

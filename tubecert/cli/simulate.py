@@ -171,7 +171,7 @@ def _certificate(
         if report is not None:
             report(f"certifying: {step.name}", step.boxes, step.boxes)
 
-    result = pipeline.certify(system, options, show)
+    result = pipeline.certify(system, options, show).to_json()
     sealed = certificate.seal(result, {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)

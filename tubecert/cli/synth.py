@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Never
+from typing import TYPE_CHECKING, Any, Never
 
 from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
@@ -17,6 +17,9 @@ from tubecert.findings import Finding
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.synthesis import solver_name
+
+if TYPE_CHECKING:
+    from tubecert.pipeline import Synthesised
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
@@ -51,13 +54,13 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
             system, wanted, options, report, sweep=bool(given["sweep"] or given["plot"])
         )
     if found.file is not None and target != certificate.STDOUT:
-        certificate.write(target, found.file)
+        certificate.write(target, found.file.to_json())
     if given["plot"] and found.rows:
         from tubecert.report.sweep import draw
 
-        certificate.write_text(given["plot"], draw([row.data() for row in found.rows]))
+        certificate.write_text(given["plot"], draw(found.data().table))
     _report(found, system, target, output)
-    return certificate.exit_code({"verdict": found.verdict})
+    return found.verdict.exit_code
 
 
 def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -> Synthesis:
@@ -114,15 +117,17 @@ def _refuse(option: str, text: str, message: str) -> Never:
     raise SpecError([Finding(code="TC112", message=message, location=place)])
 
 
-def _report(found: Any, system: Spec, target: str, output: Output) -> None:
+def _report(found: Synthesised, system: Spec, target: str, output: Output) -> None:
     """The report on stdout, or the metric file, with the verdict line on stderr."""
+    from tubecert.records import to_json
     from tubecert.report import synthesis
 
+    data, file = found.data(), found.file
     present(
         output,
-        synthesis.verdict_line(found.data(), found.file, system.name),
-        lambda: synthesis.report(found.data(), found.file, system, target),
-        certificate.dump(found.data() if found.file is None else found.file)
+        synthesis.verdict_line(data, file, system.name),
+        lambda: synthesis.report(data, file, system, target),
+        certificate.dump(to_json(data if file is None else file))
         if output.json or target == certificate.STDOUT
         else None,
     )

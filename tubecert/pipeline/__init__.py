@@ -1,6 +1,6 @@
 """Certification from a specification to a result: the rooms in their order.
 
-In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every verdict. Trusted: yes, for the order.
+In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdict. Trusted: yes, for the order.
 
 | module | what it does |
 |---|---|
@@ -12,6 +12,7 @@ In: a `Spec` and `Options`. Out: the `result` object of a certificate, for every
 
 from dataclasses import replace
 
+from tubecert.certificate.result import Result
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.findings import Severity
@@ -19,12 +20,12 @@ from tubecert.model import domain_findings
 from tubecert.pipeline.certification import answer, result
 from tubecert.pipeline.checks import inspect, missing_parts
 from tubecert.pipeline.synthesis import SynthesisRun
-from tubecert.pipeline.synthesised import Synthesised, metric_file
+from tubecert.pipeline.synthesised import Synthesised
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options, Progress, Step, overridden
 from tubecert.stages.question import Question, Stopped
-from tubecert.stages.result import Result, Stage
+from tubecert.stages.result import Stage
 from tubecert.stages.time import time_of
 from tubecert.synthesis.bridge import required
 
@@ -37,7 +38,6 @@ __all__ = [
     "Synthesised",
     "certify",
     "inspect",
-    "metric_file",
     "synthesise",
 ]
 

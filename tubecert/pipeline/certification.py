@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import sqrt
 from typing import Any
 
+from tubecert.certificate.result import Result
 from tubecert.claims import MendPlan, Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
@@ -21,7 +22,7 @@ from tubecert.stages.judged import Judged, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.options import Step
 from tubecert.stages.question import Question, Stopped
-from tubecert.stages.result import Explanation, Result, Stage, result_of
+from tubecert.stages.result import Explanation, Stage, result_of
 from tubecert.stages.tube import Planned, find_tube, lay, room_of
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
@@ -48,7 +49,7 @@ def answer(question: Question) -> Stage | Stopped:
 
 
 def result(end: Stage | Stopped) -> Result:
-    """The `result` of a certificate, with what explains it."""
+    """The result of a certificate, with what explains it."""
     return result_of(end, explain(end) if isinstance(end, Judged) else Explanation())
 
 

@@ -14,7 +14,9 @@ from fractions import Fraction
 from math import isfinite, sqrt
 from typing import Any
 
-from tubecert.certificate.sections import decimal_data, metric_data, safe_set_data
+from tubecert.certificate.metric_file import metric_file
+from tubecert.certificate.result import SolverData
+from tubecert.certificate.sections import metric_data
 from tubecert.claims import (
     AskForRateBelow,
     AskForRateUpTo,
@@ -43,7 +45,8 @@ from tubecert.expression import to_text
 from tubecert.kinds import DISTANCE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
-from tubecert.pipeline.synthesised import Row, Synthesised, metric_file
+from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.records import exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.judged import Judged
@@ -99,13 +102,13 @@ class SynthesisRun:
         """The metric that was asked for, or why there is none."""
         rank = rank_decision(self.model, self.spec.safe_set, self.effort)
         if rank.verdict != "proven":
-            verdict = "refuted" if rank.verdict == "refuted" else "undecided"
+            verdict = Verdict.REFUTED if rank.verdict == "refuted" else Verdict.UNDECIDED
             at = Witness(x=tuple(rank.at.get(name, 0.0) for name in self.model.states)) if rank.at else None
             return self._failed(RankUnproven(), ShrinkSafeSet(), verdict=verdict, at=at)
         rate = self.wanted.rate
         if rate is not None and (mode := self._limiting_mode(rate)) is not None:
             lower = AskForRateBelow(rate=mode.limit) if mode.bound > 0 else GiveInput()
-            verdict = "refuted" if mode.excludes(rate) else "undecided"
+            verdict = Verdict.REFUTED if mode.excludes(rate) else Verdict.UNDECIDED
             at = Witness(x=tuple(map(float, mode.at)))
             return self._failed(mode.failure(), lower, verdict=verdict, at=at)
         try:
@@ -236,22 +239,28 @@ class SynthesisRun:
         if proof.failed is not None:
             return self._failed(NotProvenAsWritten(condition=proof.failed), RaiseBudget())
         return Synthesised(
-            verdict="certified",
+            verdict=Verdict(proof.verdict),
             wanted=self.wanted,
             spec=spec,
-            file=metric_file(safe_set_data(spec), metric_data(spec, proof), _solver(metric)),
+            file=metric_file(
+                dict(zip(spec.states, spec.safe_set, strict=True)), metric_data(spec, proof), _solver(metric)
+            ),
             rows=tuple(sorted(self.rows, key=lambda row: (row.rate, row.floor))),
             attempts=tuple(self.ladder.attempts),
         )
 
     def _failed(
-        self, failure: Failure, *relax: Relax, verdict: str = "undecided", at: Witness | None = None
+        self,
+        failure: Failure,
+        *relax: Relax,
+        verdict: Verdict = Verdict.UNDECIDED,
+        at: Witness | None = None,
     ) -> Synthesised:
         claim = MetricFound(failure=failure)
         return Synthesised(
             verdict=verdict,
             wanted=self.wanted,
-            reason=Reason(claim=claim, verdict=Verdict(verdict), at=at, relax=relax),
+            reason=Reason(claim=claim, verdict=verdict, at=at, relax=relax),
             rows=tuple(self.rows),
             attempts=tuple(self.ladder.attempts),
         )
@@ -322,19 +331,18 @@ class SynthesisRun:
             self.progress(Step(name=f"synthesis, {words}", boxes=self.said, unit="steps"))
 
 
-def _solver(metric: VerifiedMetric) -> dict[str, Any]:
-    """How a metric was found."""
-    return {
-        "route": metric.proposal.route,
-        "degree": metric.family.degree,
-        "variables": list(metric.family.variables),
-        "digits": metric.digits,
-    }
+def _solver(metric: VerifiedMetric) -> SolverData:
+    return SolverData(
+        route=metric.proposal.route,
+        degree=metric.family.degree,
+        variables=tuple(metric.family.variables),
+        digits=metric.digits,
+    )
 
 
 def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
     return {
-        "rate": decimal_data(metric.rate),
+        "rate": exact_json(metric.rate),
         "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],
     }
 
@@ -342,7 +350,7 @@ def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
 def _judged(row: Row, end: Stage | Stopped) -> Row:
     """The row with what a certification with its metric came to."""
     if isinstance(end, Stopped):
-        return replace(row, verdict=str(end.reason.verdict))
+        return replace(row, verdict=end.reason.verdict)
     if not isinstance(end, Judged):
         raise TypeError("a certification ends in a verdict")
     problem, distance = end.bounded.problem, end.sections[DISTANCE.key]
@@ -350,7 +358,7 @@ def _judged(row: Row, end: Stage | Stopped) -> Row:
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     return replace(
         row,
-        verdict=str(end.verdict),
+        verdict=end.verdict,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
         ultimate_radius=distance.judgement.ultimate_radius,

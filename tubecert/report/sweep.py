@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import StringIO
-from typing import Any
+
+from tubecert.certificate.result import MetricRow
 
 _PANELS = (
     ("condition_number", "condition number"),
@@ -17,13 +18,13 @@ _FLOORS = {
 }
 
 
-def draw(rows: Sequence[Mapping[str, Any]]) -> str:
+def draw(rows: Sequence[MetricRow]) -> str:
     """An SVG with one panel a quantity that any of the rows has; the same rows give the same bytes."""
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    panels = [(key, label) for key, label in _PANELS if any(row.get(key) is not None for row in rows)]
+    panels = [(key, label) for key, label in _PANELS if any(getattr(row, key) is not None for row in rows)]
     with mpl.rc_context({"svg.hashsalt": "tubecert", "svg.fonttype": "none", "font.size": 9}):
         figure = Figure(figsize=(5.5, 0.6 + 2.0 * len(panels)), layout="constrained")
         FigureCanvasSVG(figure)
@@ -31,9 +32,9 @@ def draw(rows: Sequence[Mapping[str, Any]]) -> str:
             axes = figure.add_subplot(len(panels), 1, index)
             for floor, (words, color, marker) in _FLOORS.items():
                 points = sorted(
-                    (float(row["rate"]), float(row[key]))
+                    (float(row.rate), getattr(row, key))
                     for row in rows
-                    if row["floor"] == floor and row.get(key) is not None
+                    if row.floor == floor and getattr(row, key) is not None
                 )
                 if points:
                     axes.plot(

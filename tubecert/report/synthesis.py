@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.numbers import UNKNOWN, down, exact, short, up
-from tubecert.report.reasons import outcome_of, reason_of
 from tubecert.report.sections import VERDICTS, place
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
@@ -17,91 +16,87 @@ from tubecert.words.claims import message, outcome
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from tubecert.certificate.metric_file import MetricFile
+    from tubecert.certificate.result import AttemptData, MetricRow, SynthesisData
     from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
 
 
-def verdict_line(data: Mapping[str, Any], file: Mapping[str, Any] | None, name: str) -> Text:
+def verdict_line(data: SynthesisData, file: MetricFile | None, name: str) -> Text:
     """What came of it, on one line."""
     if file is None:
-        line = Text.assemble((data["verdict"], f"bold {VERDICTS[data['verdict']]}"), (f" {name}: ", "bold"))
-        line.append(message(reason_of(data["reason"])))
-        return line
+        line = Text.assemble((data.verdict, f"bold {VERDICTS[data.verdict]}"), (f" {name}: ", "bold"))
+        return line if data.reason is None else line.append(message(data.reason))
     line = Text.assemble(("metric proven", "bold green"), (f" {name}: ", "bold"))
-    line.append(f"rate {exact(file['rate'])} 1/s, condition number {up(file['condition_number'][1])}")
-    if "margin" in file:
-        line.append(f", margin {down(file['margin'][0], 3)} 1/s")
+    line.append(f"rate {exact(file.rate)} 1/s, condition number {up(file.condition_number.above)}")
+    if file.margin is not None:
+        line.append(f", margin {down(file.margin.below, 3)} 1/s")
     return line
 
 
-def report(
-    data: Mapping[str, Any], file: Mapping[str, Any] | None, system: Spec, target: str
-) -> list[RenderableType]:
+def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: str) -> list[RenderableType]:
     """The whole report as renderables; `target` is the metric file."""
     name = system.name
     parts: list[RenderableType] = [verdict_line(data, file, name)]
     if file is not None:
         parts += map(indented, _proven(file))
-    if rows := data.get("table"):
-        parts += titled("Metrics compared", [_compared(rows)])
+    if data.table:
+        parts += titled("Metrics compared", [_compared(data.table)])
     if file is None:
         return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify SPEC --metric {target}"
     return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
 
 
-def _failure(data: Mapping[str, Any], states: Sequence[str]) -> list[RenderableType]:
+def _failure(data: SynthesisData, states: Sequence[str]) -> list[RenderableType]:
     """What would help, and what was tried."""
     parts: list[RenderableType] = []
-    reason = reason_of(data["reason"])
-    if reason.at is not None:
+    reason = data.reason
+    if reason is not None and reason.at is not None:
         parts.append(indented(Text(f"at {place(states, reason.at)}")))
-    if relax := advice(reason.relax):
+    if reason is not None and (relax := advice(reason.relax)):
         parts.append(indented(Text.assemble(("help: ", "green"), relax)))
-    if attempts := data["attempts"]:
-        parts += titled("Tried", _tried(attempts))
+    if data.attempts:
+        parts += titled("Tried", _tried(data.attempts))
     return parts
 
 
-def _proven(file: Mapping[str, Any]) -> list[Text]:
+def _proven(file: MetricFile) -> list[Text]:
     sides = ", ".join(
-        f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in file["verified_on"].items()
+        f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in file.verified_on.items()
     )
-    solver = file["solver"]
-    depends = ", ".join(solver["variables"]) if solver["degree"] else ""
-    kind = f"of degree {solver['degree']} in {depends}" if depends else "constant"
-    lower, upper = file["lower"], file["upper"]
-    found = f"{solver['digits']} digits ({solver['route']})"
+    solver = file.solver
+    depends = ", ".join(solver.variables) if solver.degree else ""
+    kind = f"of degree {solver.degree} in {depends}" if depends else "constant"
+    found = f"{solver.digits} digits ({solver.route})"
     return [
         Text(f"proven on {sides}: C1 and C2 by branch and bound, C3 exactly"),
-        Text(f"{down(1 / upper[1])} I <= W <= {up(1 / lower[0])} I; W is {kind}, {found}"),
+        Text(f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I; W is {kind}, {found}"),
     ]
 
 
-def _compared(rows: Sequence[Mapping[str, Any]]) -> RenderableType:
+def _compared(rows: Sequence[MetricRow]) -> RenderableType:
     shown = plain_table(
         ">rate", "least", ">condition number", ">beta/sqrt(a)", ">rho", ">Gamma (B)", "verdict"
     )
     for row in rows:
-        verdict = row.get("verdict", "")
         shown.add_row(
-            exact(row["rate"]),
-            FLOORS[row["floor"]],
-            up(row["condition_number"]),
-            _number(row.get("input_gain")),
-            _number(row.get("rho")),
-            _number(row.get("adaptation_rate")),
-            Text(verdict, style=VERDICTS.get(verdict, "")),
+            exact(row.rate),
+            FLOORS[row.floor],
+            up(row.condition_number),
+            _number(row.input_gain),
+            _number(row.rho),
+            _number(row.adaptation_rate),
+            Text() if row.verdict is None else Text(row.verdict, style=VERDICTS[row.verdict]),
         )
     return shown
 
 
-def _tried(attempts: Sequence[Mapping[str, Any]]) -> list[Text]:
+def _tried(attempts: Sequence[AttemptData]) -> list[Text]:
     lines = [
-        Text(f"rate {short(a['rate'], 6)}, degree {a['degree']}: {outcome(outcome_of(a['outcome']))}")
-        for a in attempts[-_SHOWN:]
+        Text(f"rate {short(a.rate, 6)}, degree {a.degree}: {outcome(a.outcome)}") for a in attempts[-_SHOWN:]
     ]
     left = len(attempts) - len(lines)
     return [*([Text(f"({left} attempts before these)", style="dim")] if left else []), *lines]

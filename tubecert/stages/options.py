@@ -7,10 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
-from tubecert.certificate.sections import decimal_data
-from tubecert.printable import visible
 from tubecert.spec import Spec
 
 
@@ -22,7 +20,7 @@ class Options:
     epsilon: Fraction | None = None
     metric: Path | None = None
     conditions: str = "26"
-    formulas: str = "corrected"
+    formulas: Literal["corrected", "as-printed"] = "corrected"
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     gap: Fraction = Fraction(1, 100)
@@ -54,17 +52,3 @@ def overridden(spec: Spec, options: Options) -> Spec:
         rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
     )
     return replace(spec, tube=tube)
-
-
-def overrides_data(options: Options) -> dict[str, Any]:
-    """`result.overrides`: what the command line changed."""
-    given = {
-        "rho_a": options.rho_a,
-        "epsilon": options.epsilon,
-        "bandwidth": options.bandwidth,
-        "adaptation_rate": options.adaptation_rate,
-    }
-    result: dict[str, Any] = {name: decimal_data(value) for name, value in given.items() if value is not None}
-    if options.metric is not None:
-        result["metric"] = visible(options.metric.name)
-    return result

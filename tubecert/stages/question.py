@@ -9,6 +9,7 @@ from typing import Any
 
 from tubecert.bounds.start import InitialState, KnownStart, StartWithin
 from tubecert.bounds.suprema import Suprema
+from tubecert.certificate.result import SynthesisData
 from tubecert.certificate.sections import declared_metric, declared_uncertainty
 from tubecert.claims import Claim, Reason, Relax
 from tubecert.enclosure.branch_and_bound import Effort
@@ -33,7 +34,7 @@ class Question:
     spec: Spec
     options: Options
     time: Range | None
-    synthesis: Mapping[str, Any] | None = None
+    synthesis: SynthesisData | None = None
     progress: Progress | None = field(default=None, repr=False, compare=False)
     memory: Memory = field(default_factory=Memory, repr=False, compare=False)
 

@@ -1,38 +1,47 @@
-"""Any stage as `result` of a certificate: what it holds, and what the stages before it hold."""
+"""How a certification ended as the `Result` of a certificate: what its last stage holds, and those before it."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tubecert.bounds.compute import Radius
+from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
+from tubecert.certificate.result import (
+    Bound,
+    Geodesics,
+    MetricData,
+    Overrides,
+    PlanData,
+    Recipes,
+    Result,
+    Source,
+    TubeData,
+    Work,
+)
 from tubecert.certificate.sections import (
     assumptions,
     claim_data,
     constant_data,
-    decimal_data,
     declared_data,
     metric_data,
-    pair_data,
     plan_data,
-    safe_set_data,
 )
 from tubecert.claims import Reason
 from tubecert.metric.verify import MetricProof
-from tubecert.records import to_json
-from tubecert.spec import canonical
+from tubecert.printable import visible
+from tubecert.spec import Spec, canonical
 from tubecert.stages.bounded import Bounded, Enclosed
 from tubecert.stages.judged import Judged
 from tubecert.stages.metric import ProvenMetric
-from tubecert.stages.options import overrides_data
+from tubecert.stages.options import Options
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.time import period_of
 from tubecert.stages.tube import Planned, TubeFound, radii
 
-Result = dict[str, Any]
 Stage = Question | ProvenMetric | Planned | TubeFound | Enclosed | Bounded | Judged
 
 
@@ -44,101 +53,143 @@ class Explanation:
     elasticities: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Reached:
+    """The stages that were reached, and what was found on the way to the one that failed."""
+
+    question: Question
+    metric: ProvenMetric | None = None
+    planned: Planned | None = None
+    enclosed: Enclosed | None = None
+    bounded: Bounded | None = None
+    judged: Judged | None = None
+    partial: object = None
+
+
 def result_of(end: Stage | Stopped, why: Explanation) -> Result:
-    """The `result` for the last stage that was reached, with the claim that ended it, if one did."""
-    if not isinstance(end, Stopped):
-        return _stage(end) | {"reasons": to_json(list(why.reasons)), "elasticities": dict(why.elasticities)}
-    data = _stage(end.at) | {"reasons": [to_json(end.reason)], "verdict": str(end.reason.verdict)}
-    if isinstance(end.partial, MetricProof):
-        return data | {"metric": metric_data(end.question.spec, end.partial)}
-    if isinstance(end.partial, Radius):
-        return data | {"tube": _radii(end.question) | {"rho": decimal_data(end.partial.rho)}}
-    return data
+    """The `Result` for the end of a certification: a verdict on gains, or the claim that ended it before.
+
+    Raises `TypeError` for a stage that is not the last.
+    """
+    if isinstance(end, Stopped):
+        reached = replace(_reached(end.at), partial=end.partial)
+        verdict, reasons = end.reason.verdict, [end.reason]
+    elif isinstance(end, Judged):
+        reached, verdict, reasons = _reached(end), end.verdict, list(why.reasons)
+    else:
+        raise TypeError("a certification ends in a verdict")
+    question, judged, bounded = reached.question, reached.judged, reached.bounded
+    spec, options = question.spec, question.options
+    return Result(
+        verdict=verdict,
+        formulas=options.formulas,
+        spec=_source(spec),
+        claim=claim_data(spec, period_of(spec)),
+        overrides=_overrides(options),
+        effort=Work(gap=options.gap, budget=options.budget),
+        plan=_plan(reached),
+        safe_set=dict(zip(spec.states, spec.safe_set, strict=True)),
+        assumptions=assumptions(spec, question.model, None if bounded is None else bounded.geodesics),
+        declared=declared_data(spec),
+        reasons=tuple(reasons),
+        proof=Recipes(of=_recipes(judged)),
+        synthesis=question.synthesis,
+        metric=_metric(reached),
+        tube=_tube(reached),
+        constants=_constants(reached),
+        sections={} if judged is None else {key: each.data() for key, each in judged.sections.items()},
+        elasticities=None if judged is None else why.elasticities,
+        decided_by=() if judged is None else judged.deciding,
+    )
 
 
-def _stage(stage: Stage) -> Result:
-    """What a stage adds, to what those before it hold."""
+def _reached(stage: Stage) -> _Reached:
     match stage:
         case Question():
-            return _question(stage)
+            return _Reached(question=stage)
         case ProvenMetric():
-            metric = metric_data(stage.question.spec, stage.proof)
-            return _stage(stage.question) | {"metric": metric}
+            return replace(_reached(stage.question), metric=stage)
         case Planned():
-            return _stage(stage.metric) | {"plan": plan_data(stage.question.spec, stage.plan)}
+            return replace(_reached(stage.metric), planned=stage)
         case TubeFound():
-            return _stage(stage.planned)
+            return _reached(stage.planned)
         case Enclosed():
-            return _enclosed(stage)
+            return replace(_reached(stage.tube), enclosed=stage)
         case Bounded():
-            return _bounded(stage)
+            return replace(_reached(stage.enclosed), bounded=stage)
         case Judged():
-            return _judged(stage)
+            return replace(_reached(stage.bounded), judged=stage)
 
 
-def _question(question: Question) -> Result:
-    spec, options = question.spec, question.options
-    text = canonical(spec)
-    data = {
-        "formulas": options.formulas,
-        "spec": {
-            "effective": text,
-            "effective_hash": digest(text),
-            "file_hash": "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
-        },
-        "claim": claim_data(spec, period_of(spec)),
-        "overrides": overrides_data(options),
-        "effort": {"gap": decimal_data(options.gap), "budget": options.budget},
-        "plan": {"kind": spec.trajectory.kind},
-        "safe_set": safe_set_data(spec),
-        "assumptions": to_json(assumptions(spec, question.model)),
-        "declared": declared_data(spec),
-        "proof": {},
-    }
-    return data if question.synthesis is None else data | {"synthesis": dict(question.synthesis)}
+def _source(spec: Spec) -> Source:
+    effective = canonical(spec)
+    return Source(
+        effective=Effective.of(effective),
+        effective_hash=digest(effective),
+        file_hash="sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
+    )
 
 
-def _enclosed(stage: Enclosed) -> Result:
-    data, constants = _stage(stage.tube), stage.constants
-    bounds = {"lower": pair_data(constants.lower), "upper": pair_data(constants.upper)}
-    return data | {
-        "metric": data["metric"] | bounds,
-        "constants": {name: constant_data(value, meaning) for name, value, meaning in constants.items()},
-    }
+def _overrides(options: Options) -> Overrides:
+    return Overrides(
+        rho_a=options.rho_a,
+        epsilon=options.epsilon,
+        bandwidth=options.bandwidth,
+        adaptation_rate=options.adaptation_rate,
+        metric=None if options.metric is None else visible(options.metric.name),
+    )
 
 
-def _bounded(stage: Bounded) -> Result:
-    data, rho = _stage(stage.enclosed), stage.enclosed.tube.rho
-    _, rho_a = radii(stage.question)
-    unique = {"value": pair_data(stage.geodesics.value.printable()), "holds": stage.geodesics.holds}
-    return data | {
-        "tube": _radii(stage.question)
-        | {
-            "rho_r": decimal_data(rho - rho_a),
-            "rho": decimal_data(rho),
-            "half_widths": dict(stage.half_widths),
-        },
-        "metric": data["metric"] | {"unique_geodesics": unique},
-        "assumptions": to_json(assumptions(stage.question.spec, stage.question.model, stage.geodesics)),
-    }
+def _plan(reached: _Reached) -> PlanData:
+    spec, planned = reached.question.spec, reached.planned
+    return PlanData(kind=spec.trajectory.kind) if planned is None else plan_data(spec, planned.plan)
 
 
-def _judged(stage: Judged) -> Result:
-    data, sections = _stage(stage.bounded), stage.sections
-    derived = {name: constant_data(value, meaning) for name, (value, meaning) in stage.derived().items()}
-    return data | {
-        **{key: to_json(section.data()) for key, section in sections.items()},
-        "constants": data["constants"] | derived,
-        "proof": {
-            key: to_json(section.proof.recipe)
-            for key, section in sections.items()
-            if section.proof is not None
-        },
-        "decided_by": list(stage.deciding),
-        "verdict": str(stage.verdict),
-    }
+def _metric(reached: _Reached) -> MetricData | None:
+    """C1-C3 as far as they were decided, then the bounds over the tube, then the test of its geodesics."""
+    proof = reached.partial if reached.metric is None else reached.metric.proof
+    if not isinstance(proof, MetricProof):
+        return None
+    data = metric_data(reached.question.spec, proof)
+    if reached.enclosed is None:
+        return data
+    constants, bounded = reached.enclosed.constants, reached.bounded
+    return replace(
+        data,
+        lower=constants.lower,
+        upper=constants.upper,
+        unique_geodesics=None
+        if bounded is None
+        else Geodesics(value=bounded.geodesics.value.printable(), holds=bounded.geodesics.holds),
+    )
 
 
-def _radii(question: Question) -> Result:
-    epsilon, rho_a = radii(question)
-    return {"epsilon": decimal_data(epsilon), "rho_a": decimal_data(rho_a)}
+def _tube(reached: _Reached) -> TubeData | None:
+    """The radii, once the tube is bounded; before that the radius that failed, if one did."""
+    bounded, failed = reached.bounded, reached.partial
+    if isinstance(failed, Radius):
+        epsilon, rho_a = radii(reached.question)
+        return TubeData(epsilon=epsilon, rho_a=rho_a, rho=failed.rho)
+    if bounded is None:
+        return None
+    epsilon, rho_a = radii(reached.question)
+    rho = bounded.enclosed.tube.rho
+    return TubeData(
+        epsilon=epsilon, rho_a=rho_a, rho=rho, rho_r=rho - rho_a, half_widths=dict(bounded.half_widths)
+    )
+
+
+def _constants(reached: _Reached) -> dict[str, Bound]:
+    """Those over the tube, and those at the gains found."""
+    enclosed, judged = reached.enclosed, reached.judged
+    if enclosed is None:
+        return {}
+    own = {name: constant_data(value, meaning) for name, value, meaning in enclosed.constants.items()}
+    derived = {} if judged is None else judged.derived()
+    return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
+
+
+def _recipes(judged: Judged | None) -> dict[str, Any]:
+    """What proves the gains of each kind that is certified."""
+    sections = {} if judged is None else judged.sections
+    return {key: each.proof.recipe for key, each in sections.items() if each.proof is not None}
