@@ -47,6 +47,7 @@ CSV = "t,p,v,u\n0,0,0,0\n1,%s,0,0\n"
 CASES = {
     "unused": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1}")]),
     "unused but mentioned": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1} # m is the mass")]),
+    "unused definition": ("TC130", "7:20", [("{k: 2}", "{k: 2}\n  definitions: {d: p}")]),
     "case": ("TC131", "6:25", [("{k: 2}", "{k: 2, K: 1}"), ("-k*p", "-k*K*p")]),
     "shape": ("TC131", "6:27", [("{k: 2}", "{l1: 2, II: 1}"), ("-k*p", "-l1*II*p")]),
     "function": ("TC131", "6:21", [("{k: 2}", "{Sin: 2}"), ("-k*p", "-Sin*p")]),

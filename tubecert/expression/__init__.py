@@ -39,6 +39,7 @@ from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
 from tubecert.expression.scan import (
     FUNCTIONS,
+    MAX_LENGTH,
     MAX_NAME_LENGTH,
     MAX_NUMBER_EXPONENT,
     RESERVED,
@@ -47,11 +48,12 @@ from tubecert.expression.scan import (
     near,
     suggestion,
 )
-from tubecert.expression.text import number_text, to_text
+from tubecert.expression.text import longest_text, number_text, to_text
 from tubecert.expression.zero import is_zero
 
 __all__ = [
     "FUNCTIONS",
+    "MAX_LENGTH",
     "MAX_NAME_LENGTH",
     "MAX_NUMBER_EXPONENT",
     "ONE",
@@ -73,6 +75,7 @@ __all__ = [
     "full_text",
     "is_name",
     "is_zero",
+    "longest_text",
     "near",
     "norm",
     "number_text",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Literal
 
@@ -74,11 +74,13 @@ def parse(
     symbols: Mapping[str, Expression],
     kinks: bool = False,
     refused: Mapping[str, str] | None = None,
+    owed: Mapping[str, tuple[Obligation, ...]] | None = None,
 ) -> Parsed:
     """The expression that `text` stands for; raises `ExpressionError`.
 
     `symbols` are the names it may use (with what they stand for), `kinks` allows abs and norm, and `refused`
-    gives the reason why a name that exists elsewhere is not allowed here. A variable with the name of a constant, a
+    gives the reason why a name that exists elsewhere is not allowed here; `owed` is what the use of a name owes, which
+    stands for more than a variable. A variable with the name of a constant, a
     function or a keyword (`pi`, `True`) would be read as that: no text is parsed with one.
     """
     for name in symbols:
@@ -86,7 +88,7 @@ def parse(
             raise ExpressionError(f"{name[:60]!r} cannot be the name of a variable", kind="symbol")
     line = normalise_spaces(text)
     scan(line, Vocabulary(symbols=symbols.keys(), kinks=kinks, refused=refused or {}))
-    return _Lowering(line, symbols).run(_tree(line))
+    return _Lowering(line, symbols, owed or {}).run(_tree(line))
 
 
 def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fraction:
@@ -149,8 +151,10 @@ def _tree(line: str) -> ast.expr:
 class _Lowering:
     """Builds the graph bottom-up, without recursion, and collects obligations on the way."""
 
-    def __init__(self, line: str, symbols: Mapping[str, Expression]) -> None:
-        self.line, self.symbols = line, symbols
+    def __init__(
+        self, line: str, symbols: Mapping[str, Expression], owed: Mapping[str, tuple[Obligation, ...]]
+    ) -> None:
+        self.line, self.symbols, self.owed = line, symbols, dict(owed)
         self.obligations: list[Obligation] = []
         self.values: dict[ast.expr, Expression] = {}
         self.growth: dict[ast.expr, int] = {}  # the product of the exponents above a leaf
@@ -211,6 +215,9 @@ class _Lowering:
             case ast.Name("pi"):
                 return graph.PI
             case ast.Name(name):
+                offset, width = self._place(node)
+                for item in self.owed.pop(name, ()):  # once is enough
+                    self.obligations.append(replace(item, offset=offset, width=width))
                 return self.symbols[name]
         return graph.constant(Fraction(self._source(node)))
 

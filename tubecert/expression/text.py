@@ -72,6 +72,21 @@ def _integer(n: int) -> str:
     return f"({' + '.join(parts)})"
 
 
+def longest_text(e: Expression) -> int:
+    """A bound of the length of the text, found without writing it: shared parts are written wherever they occur."""
+    length: dict[Expression, int] = {}
+    for node in topological([e]):
+        own = sum(length[arg] + 4 for arg in node.args) + 8
+        if node.is_constant:
+            own = node.fraction.numerator.bit_length() + node.fraction.denominator.bit_length() + 8
+        elif node.op == "symbol":
+            own = len(str(node.value))
+        elif node.op == "pow":
+            own *= 1 + abs(int(str(node.value))) // _LARGEST_EXPONENT
+        length[node] = own
+    return length[e]
+
+
 def to_text(e: Expression) -> str:
     """Text in the specification's grammar that parses back to the same expression."""
     text: dict[Expression, tuple[str, int]] = {}

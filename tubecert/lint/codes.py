@@ -28,7 +28,7 @@ COLLISION: Final = "TC408"
 OBSTACLE_OUTSIDE: Final = "TC409"
 
 CODES: Final[Mapping[str, str]] = {
-    UNUSED: "a parameter is never used",
+    UNUSED: "a parameter or a definition is never used",
     CONFUSABLE: "two names, or a name and a function, are easily confused",
     UNITS: "some states or inputs have a unit and others have none",
     IDLE_STATE: "a state cannot change",

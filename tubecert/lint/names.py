@@ -21,22 +21,23 @@ def name_findings(spec: Spec) -> list[Finding]:
 
 
 def _unused(spec: Spec) -> Iterator[Finding]:
-    """Parameters are substituted when they are read, so their names are looked for in the text."""
+    """Parameters and definitions are substituted when they are read, so their names are looked for in the text."""
     text = "\n".join(re.sub(r"(^|\s)#.*", "", line) for line in spec.source.splitlines())
     words = re.findall(r"\b[A-Za-z]\w*", text)
-    for name, _ in spec.parameters:
+    named = [("parameter", name) for name, _ in spec.parameters]
+    for what, name in [*named, *(("definition", name) for name in spec.definitions)]:
         if words.count(name) < 2:
             yield Finding(
                 code=codes.UNUSED,
                 severity=Severity.WARNING,
-                message=f"the parameter {name} is never used",
-                location=spec.location(f"system.parameters.{name}"),
+                message=f"the {what} {name} is never used",
+                location=spec.location(f"system.{what}s.{name}"),
                 help="remove it, or use it",
             )
 
 
 def _confusable(spec: Spec) -> Iterator[Finding]:
-    names = [*spec.states, *spec.inputs, *(name for name, _ in spec.parameters)]
+    names = [*spec.states, *spec.inputs, *(name for name, _ in spec.parameters), *spec.definitions]
     for name in names:
         word = next((word for word in _WORDS if word == name.lower()), None)
         if word is not None:
@@ -65,7 +66,7 @@ def _place(spec: Spec, name: str) -> Location | None:
     for key, names in (("states", spec.states), ("inputs", spec.inputs)):
         if name in names:
             return spec.location(f"system.{key}[{names.index(name)}]")
-    return spec.location(f"system.parameters.{name}")
+    return spec.location(f"system.{'definitions' if name in spec.definitions else 'parameters'}.{name}")
 
 
 def _units(spec: Spec) -> Iterator[Finding]:

@@ -78,7 +78,9 @@ def _read(root: Field) -> Spec | None:
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
-        entries["system"].mapping(required=("states", "inputs", "f", "B"), optional=("parameters", "units"))
+        entries["system"].mapping(
+            required=("states", "inputs", "f", "B"), optional=("parameters", "definitions", "units")
+        )
         if "system" in entries
         else None
     )
@@ -118,6 +120,7 @@ def _read_named(
         inputs=names.inputs,
         units=units,
         parameters=names.parameters,
+        definitions=tuple(name for name, _ in names.definitions),
         f=dynamics[0],
         B=dynamics[1],
         safe_set=box,

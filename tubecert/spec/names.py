@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import MAX_NAME_LENGTH, RESERVED, Expression, constant, is_name, symbol
+from tubecert.expression import (
+    MAX_NAME_LENGTH,
+    ONE,
+    RESERVED,
+    Expression,
+    Parsed,
+    constant,
+    free_symbols,
+    is_name,
+    symbol,
+    topological,
+)
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.reader import Field, Scope
@@ -19,32 +30,18 @@ _RESERVED: Final = frozenset(
     RESERVED
     | {TIME, *(word.lower() for word in RESERVED)}
     | {"nan", "inf", "null", "yes", "no", "on", "off"}
-    | {
-        "log",
-        "ln",
-        "asin",
-        "acos",
-        "atan",
-        "atan2",
-        "sinh",
-        "cosh",
-        "tanh",
-        "min",
-        "max",
-        "sign",
-        "floor",
-        "ceil",
-    }
+    | {"ln", "atan2", "min", "max", "sign", "floor", "ceil", "deg"}
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """The names of a system and the values of its parameters."""
+    """The names of a system, the values of its parameters, and what its definitions stand for."""
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     parameters: tuple[tuple[str, Fraction], ...]
+    definitions: tuple[tuple[str, Parsed], ...] = ()
 
     @property
     def values(self) -> dict[str, Fraction]:
@@ -57,18 +54,29 @@ class Names:
             TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
             **self._inputs_refused(),
         }
-        return Scope(symbols=self._constants() | _symbols(self.states), refused=refused)
+        return self._scope(self.states, refused)
 
     def of_uncertainty(self) -> Scope:
         """For h: states, time and parameters; abs and norm are allowed."""
-        symbols = self._constants() | _symbols((*self.states, TIME))
-        return Scope(symbols=symbols, refused=self._inputs_refused(), kinks=True)
+        return self._scope((*self.states, TIME), self._inputs_refused(), kinks=True)
 
     def of_plan(self) -> Scope:
         """For a trajectory: time and parameters."""
         refused = {name: f"{name} is a state; a plan is a function of t alone" for name in self.states}
         refused |= {name: f"{name} is an input; a plan is a function of t alone" for name in self.inputs}
-        return Scope(symbols=self._constants() | _symbols((TIME,)), refused=refused)
+        return self._scope((TIME,), refused)
+
+    def _scope(self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False) -> Scope:
+        """Parameters, variables, and the definitions that stand for expressions of these."""
+        symbols = self._constants() | _symbols(variables)
+        owed = {}
+        for name, parsed in self.definitions:
+            why = _foreign(name, parsed, variables, refused, kinks=kinks)
+            if why is None:
+                symbols[name], owed[name] = parsed.expression, parsed.obligations
+            else:
+                refused = {**refused, name: why}
+        return Scope(symbols=symbols, refused=refused, kinks=kinks, owed=owed)
 
     def _constants(self) -> dict[str, Expression]:
         return {name: constant(value) for name, value in self.parameters}
@@ -78,6 +86,18 @@ class Names:
             name: f"{name} is an input; inputs enter through B only (x' = f(x) + B(x) u)"
             for name in self.inputs
         }
+
+
+def _foreign(
+    name: str, parsed: Parsed, variables: Collection[str], refused: Mapping[str, str], *, kinks: bool
+) -> str | None:
+    """Why a definition may not be used in an expression of some variables."""
+    parts = [parsed.expression, *(owed.argument for owed in parsed.obligations)]
+    for variable in sorted(free_symbols(parts) - set(variables)):
+        return f"{name} depends on {variable}: {refused.get(variable, 'it is not known here')}"
+    if not kinks and any(node.op == "norm" for node in topological(parts)):
+        return f"{name} contains abs or norm, which are only allowed in h"
+    return None
 
 
 def _symbols(names: tuple[str, ...]) -> dict[str, Expression]:
@@ -99,7 +119,8 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
             f"{len(inputs)} inputs for {len(states)} states: B cannot have independent columns",
         )
         return None
-    return Names(states=states, inputs=inputs, parameters=parameters)
+    names = Names(states=states, inputs=inputs, parameters=parameters)
+    return _with_definitions(names, system.get("definitions"), taken)
 
 
 def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[str, ...] | None:
@@ -164,6 +185,31 @@ def _read_parameters(field: Field | None, taken: dict[str, str]) -> tuple[tuple[
                 Fraction(1) if value is None else value
             )  # the finding stands; users of it are not wrong too
     return tuple(values.items())
+
+
+def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
+    """Definitions in the order of the file; each may use those before it. One that cannot be read stands as 1."""
+    if field is None:
+        return names
+    pairs = field.pairs("of names to expressions") or []
+    later = [key.text for key, _ in pairs]
+    for key, node in pairs:
+        later.remove(key.text)
+        entry = field.child(key, node)
+        name = _name(key.text, _key_field(field, key), "definition", taken)
+        scope = names.of_uncertainty()
+        refused = {
+            word: f"{word} is defined further down; a definition may use those above it" for word in later
+        }
+        if name is not None:
+            refused[name] = f"{name} is defined by itself"
+        term = entry.term(replace(scope, refused={**scope.refused, **refused}))
+        if name is not None:
+            meant = Parsed(expression=ONE, obligations=())
+            if term is not None:
+                meant = Parsed(expression=term.expression, obligations=term.obligations)
+            names = replace(names, definitions=(*names.definitions, (name, meant)))
+    return names
 
 
 def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:

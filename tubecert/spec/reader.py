@@ -12,9 +12,14 @@ from fractions import Fraction
 from typing import Final, TypeVar
 
 from tubecert.expression import (
+    MAX_LENGTH,
     MAX_NUMBER_EXPONENT,
     Expression,
     ExpressionError,
+    Obligation,
+    Parsed,
+    full_text,
+    longest_text,
     near,
     parse,
     parse_number,
@@ -42,11 +47,36 @@ _CODE_OF_KIND = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scope:
-    """The names that an expression may use here, and why other names of the file may not occur."""
+    """The names that an expression may use here, and why other names of the file may not occur.
+
+    `owed` is what the use of a definition owes; one that owes nothing is there as well.
+    """
 
     symbols: Mapping[str, Expression]
     refused: Mapping[str, str] = field(default_factory=dict)
     kinks: bool = False
+    owed: Mapping[str, tuple[Obligation, ...]] = field(default_factory=dict)
+
+    def parse(self, text: str) -> Parsed:
+        """The expression of a text; raises `ExpressionError`."""
+        parsed = parse(text, symbols=self.symbols, kinks=self.kinks, refused=self.refused, owed=self.owed)
+        if self.owed:
+            self._check_written_out(parsed)
+        return parsed
+
+    def _check_written_out(self, parsed: Parsed) -> None:
+        """What definitions stand for is written out in certificates, and must be an expression of the grammar there."""
+        parts = [parsed.expression, *(owed.argument for owed in parsed.obligations)]
+        try:
+            if sum(map(longest_text, parts)) > 8 * MAX_LENGTH:
+                raise ExpressionError("it is longer than that", kind="limit")
+            parse(full_text(parsed.expression, parsed.obligations), symbols=self.symbols, kinks=self.kinks)
+        except ExpressionError as error:
+            raise ExpressionError(
+                f"with its definitions written out the expression is too large ({error.message})",
+                help=f"an expression may have {MAX_LENGTH} characters, definitions written out",
+                kind="limit",
+            ) from None
 
 
 MODERATE: Final = "choose units in which the numbers are moderate"
@@ -246,7 +276,7 @@ class Field:
             self._wrong_type("an expression", "put the expression in quotes")
             return None
         try:
-            parsed = parse(self.node.text, symbols=scope.symbols, kinks=scope.kinks, refused=scope.refused)
+            parsed = scope.parse(self.node.text)
         except ExpressionError as error:
             self._expression_error(error, codes.EXPRESSION)
             return None

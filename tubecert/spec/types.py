@@ -236,6 +236,9 @@ class Spec:
     inputs: tuple[str, ...]
     units: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, Fraction], ...]
+    definitions: tuple[str, ...] = field(
+        default=(), compare=False
+    )  # their names: expressions have them written out
     f: tuple[Term, ...]
     B: TermMatrix
     safe_set: tuple[tuple[Fraction, Fraction], ...]
