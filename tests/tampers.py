@@ -12,7 +12,6 @@ import json
 import random
 import re
 from collections import defaultdict
-from fractions import Fraction
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.run import recheck
@@ -30,17 +29,8 @@ def number(value):
 
 
 def same(old, new):
-    """The same number, or the same written as a text, or otherwise."""
-    if isinstance(old, str) and isinstance(new, str):
-        return _exact(old) is not None and _exact(old) == _exact(new)
+    """The same number, or the same written as a text."""
     return number(old) and ((number(new) and new == old) or (isinstance(new, str) and new == str(old)))
-
-
-def _exact(text):
-    try:
-        return Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        return None
 
 
 def lower(old, new):

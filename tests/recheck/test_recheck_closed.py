@@ -8,13 +8,18 @@ from __future__ import annotations
 import copy
 import json
 import time
+from fractions import Fraction
 
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from rechecked import certified, examine, failing, respecified, sealed, shipped
 from systems import SMALL
 
 from tubecert import certificate, pipeline, spec
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.expression.text import number_text
+from tubecert.recheck.document import Node
 from tubecert.recheck.run import recheck
 
 PLAN = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}"
@@ -23,6 +28,7 @@ MOVING = (
     'trajectory: {kind: expressions, x: ["0.1*sin(t)", "0.1*sin(t) + 0.1*cos(t)"], '
     'u: ["0.2*cos(t) - 0.3*sin(0.1*sin(t))"], horizon: 3}'
 )
+REALS = st.floats(allow_nan=False, allow_infinity=False)
 ROWS = "t,x,y,u\n0,0,0,0\n1,0,0,0\n2,0,0,0\n"
 
 
@@ -107,9 +113,9 @@ CLAIMS = {
     "horizon": "5",
     "for_all_time": "autonomous",
     "period": "pi",
-    "domain": {"x": ["-1", "1"], "y": ["-1", "11/10"]},
+    "domain": {"x": ["-1", "1"], "y": ["-1", "1.1"]},
     "start": {"at": ["0.05", "0.1"]},
-    "uncertainty": "expression or bounds",
+    "uncertainty": "expression_or_bounds",
 }
 
 
@@ -380,3 +386,44 @@ def test_a_number_is_the_one_that_is_hashed():
     assert recheck(text, "file.json", 10).claims[0].outcome.holds
     with pytest.raises(TubecertError):
         recheck(text.replace(f'"rho": {rho}', f'"rho": {rho}0000000000000001'), "file.json", 10)
+
+
+OTHERWISE = [
+    "-+0.5",
+    "-.5",
+    "-0.50",
+    "-00.5",
+    "-1/2",
+    "-5e-1",
+    " -0.5",
+    "(-0.5)",
+    "--(-0.5)",
+    "-0.5*1",
+    "-0.5 ",
+]
+
+
+@pytest.mark.parametrize("written", OTHERWISE)
+@pytest.mark.parametrize("place", [("claim", "domain"), ("spec", "effective", "safe_set")], ids=".".join)
+def test_a_number_has_one_spelling(place, written):
+    """What a reader sees as the claim needs no rule of arithmetic to be understood."""
+    document = copy.deepcopy(certified(SMALL))
+    holder = document["result"]
+    for key in place:
+        holder = holder[key]
+    name = next(iter(holder))
+    holder[name][0] = "-0.5"
+    if place[0] == "claim":
+        document["result"]["spec"]["effective"]["safe_set"][name][0] = "-0.5"
+    examine(sealed(document), 1, to_first_failure=True)
+    holder[name][0] = written
+    assert "the number -0.5" in refused(document)
+
+
+@given(
+    st.fractions() | st.decimals(allow_nan=False, allow_infinity=False).map(Fraction) | REALS.map(Fraction)
+)
+def test_the_spelling_is_the_one_that_is_written(value):
+    """Whatever the producer writes is read, as the same number."""
+    assume(value == 0 or Fraction(1, 10**300) <= abs(value) <= 10**300)
+    assert Node(number_text(value), "place").exact() == value

@@ -55,7 +55,7 @@ class Claimed:
     period: str | None
     domain: Mapping[str, tuple[str, str]]
     start: Start
-    uncertainty: Literal["bounds", "expression", "expression or bounds"]
+    uncertainty: Literal["bounds", "expression", "expression_or_bounds"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -91,7 +91,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
         if spec.uncertainty.h is None
         else "expression"
         if bounds is None or bounds.h is None
-        else "expression or bounds",
+        else "expression_or_bounds",
     )
 
 

@@ -17,12 +17,12 @@ from typing import Any, TypeVar
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding, Location
 from tubecert.recheck.grammar import GrammarError, read_number
+from tubecert.recheck.spelling import LONGEST, spelled
 
 FORMAT = "tubecert-certificate/2"
 MOST_BYTES = 64_000_000
 _VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
 _DEEPEST = 60
-_LONGEST = 40  # characters of a number
 _LEAST, _MOST = Fraction(1, 10**300), Fraction(10**300)
 _PLAIN = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?")  # most numbers: read without a grammar
 _DECIMAL = re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][-+]?[0-9]+)?)")
@@ -132,13 +132,15 @@ class Node:
         return self.number()
 
     def exact(self) -> Fraction:
-        """A text that stands for a rational number."""
-        if isinstance(self.value, str) and _PLAIN.fullmatch(self.value):
-            return self._sized(Fraction(self.value))
+        """A text that stands for a rational number, in the one spelling that it has (unless it is very long)."""
+        text = self.text()
         try:
-            return self._sized(read_number(self.text()))
+            q = self._sized(Fraction(text) if _PLAIN.fullmatch(text) else read_number(text))
         except GrammarError as error:
             raise self._expected(f"a number: {error}") from None
+        if len(text) <= LONGEST and text != spelled(q):
+            raise self._expected(f"the number {spelled(q)} as it is written here")
+        return q
 
     def _sized(self, q: Fraction) -> Fraction:
         """Neither so large nor so small that a float could not be near it."""
@@ -241,14 +243,14 @@ def read(text: str, file: str) -> Node:
 def _float(text: str) -> float:
     """A number whose shortest decimal is what is written: the hash, which is of that decimal, binds it exactly."""
     value = float(text)
-    if len(text) > _LONGEST or not math.isfinite(value) or Decimal(repr(value)) != Decimal(text):
+    if len(text) > LONGEST or not math.isfinite(value) or Decimal(repr(value)) != Decimal(text):
         raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
     return value
 
 
 def _whole(text: str) -> int:
     """A whole number of a length that can be a bandwidth, a rate or a budget."""
-    if len(text) > _LONGEST:
+    if len(text) > LONGEST:
         raise ValueError(f"the number {text[:40]} is too long")
     return int(text)
 

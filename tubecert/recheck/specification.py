@@ -52,7 +52,7 @@ class Uncertainty:
         """
         if self.h is None:
             return "bounds"
-        return "expression or bounds" if "h" in self.declared else "expression"
+        return "expression_or_bounds" if "h" in self.declared else "expression"
 
 
 @dataclass(frozen=True, slots=True)
