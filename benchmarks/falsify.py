@@ -43,7 +43,7 @@ def main() -> None:
 
 def _setting(name: str) -> Setting:
     spec = load(str(CONFIGS / f"{name}.yaml"))
-    return setting_of(spec, pipeline.certify(spec, pipeline.Options()).to_json())
+    return setting_of(spec, pipeline.certify(spec, pipeline.Options()))
 
 
 def _far_below(setting: Setting) -> Loop:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tubecert import pipeline
+from tubecert.certificate.result import Result
 from tubecert.simulate.certified import adopted
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 from tubecert.simulate.setting import Setting, setting_of
@@ -31,11 +32,11 @@ tube: {epsilon: 0.2, rho_a: 0.2}
 
 
 @lru_cache
-def certified(name: str, epsilon: str | None = None) -> tuple[Spec, dict[str, Any]]:
+def certified(name: str, epsilon: str | None = None) -> tuple[Spec, Result]:
     """A specification and its result."""
     spec = load_text(FLAT) if name == "flat" else load(str(CONFIGS / f"{name}.yaml"))
     options = pipeline.Options(epsilon=None if epsilon is None else Fraction(epsilon))
-    result = pipeline.certify(spec, options).to_json()
+    result = pipeline.certify(spec, options)
     return adopted(spec, result), result
 
 

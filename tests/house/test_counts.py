@@ -9,11 +9,11 @@ import tubecert
 
 # what is there now, outside the serialiser and recheck; lower a number when it falls (python tests/house/counts.py)
 MOST = {
-    "mappings of Any": 80,
-    "string-key reads": 310,
-    "Any": 320,
-    "asserts that something is not None": 20,
-    "verdict literals": 84,
+    "mappings of Any": 73,
+    "string-key reads": 265,
+    "Any": 310,
+    "asserts that something is not None": 19,
+    "verdict literals": 81,
     "comparisons with sentences": 2,
 }
 

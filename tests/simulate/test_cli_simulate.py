@@ -34,7 +34,7 @@ def files(tmp_path, monkeypatch, request):
     if "drawn" not in request.fixturenames:
         monkeypatch.setattr(drawing, "figures", lambda campaign: iter(()))
     (tmp_path / "flat.yaml").write_text(FLAT)
-    (tmp_path / "flat.json").write_text(dump(seal(certified("flat")[1], {})))
+    (tmp_path / "flat.json").write_text(dump(seal(certified("flat")[1].to_json(), {})))
     return tmp_path
 
 
@@ -116,7 +116,7 @@ def test_gains_that_are_far_too_small_leave_the_tube(files):
 def test_a_broken_promise_is_loud_and_can_be_replayed(files):
     """A certificate that promises too much: the tube is made ten times thinner than it was certified."""
     _, result = certified("flat")
-    forged = json.loads(json.dumps(result))
+    forged = result.to_json()
     forged["metric"]["lower"] = [value / 400 for value in forged["metric"]["lower"]]
     (files / "forged.json").write_text(dump(seal(forged, {})))
     result = run(
@@ -205,10 +205,9 @@ def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
 
 @pytest.mark.slow
 def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
-    from fractions import Fraction
 
     where = setting("two_state", "0.4")
-    Ts = Fraction(repr(certified("two_state", "0.4")[1]["sampled"]["sample_time"]))
+    Ts = certified("two_state", "0.4")[1].sections["sampled"].sample_time
     use = {}
     for factor in (1, 20):
         loop = loop_of(where, "sampled", Choice(sample_time=factor * Ts))

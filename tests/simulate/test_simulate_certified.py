@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -11,18 +10,22 @@ import numpy as np
 import pytest
 from simulated import CONFIGS, FLAT, certified, setting
 
-from tubecert import certificate
+from tubecert import certificate, pipeline
 from tubecert.certificate import digest, dump, seal
 from tubecert.certificate.belonging import compared
+from tubecert.claims import MetricDefinite, Reason
+from tubecert.cli.report import open_certificate
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import build
+from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted, certified_plan, require_tube
 from tubecert.simulate.grid import computer
 from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.spec.simulation import GAINS
+from tubecert.verdict import Verdict
 
 
 def refused(call, *arguments):
@@ -34,7 +37,7 @@ def refused(call, *arguments):
 
 def written(tmp_path, result, **changes):
     path = tmp_path / "c.json"
-    path.write_text(dump(seal(result, {}) | changes))
+    path.write_text(dump(seal(result if isinstance(result, dict) else result.to_json(), {}) | changes))
     return str(path)
 
 
@@ -65,9 +68,9 @@ def test_other_files_are_no_certificates(tmp_path, text, code):
 
 def test_a_changed_certificate_is_refused(tmp_path):
     _, result = certified("flat")
-    changed = json.loads(json.dumps(result))
+    changed = result.to_json()
     changed["distance"]["least_adaptation"]["adaptation_rate"] *= 0.9
-    _, finding = refused(certificate.load, written(tmp_path, changed, hash=digest(result)))
+    _, finding = refused(certificate.load, written(tmp_path, changed, hash=digest(result.to_json())))
     assert "was changed" in finding.message
 
 
@@ -113,11 +116,10 @@ def test_obstacles_and_simulation_are_no_part_of_the_system():
 
 @pytest.mark.parametrize(("verdict", "code"), [("refuted", 1), ("undecided", 4)])
 def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
-    result = {
-        "verdict": verdict,
-        "reasons": [{"claim": "metric_definite", "verdict": verdict}],
-    }
-    error, finding = refused(require_tube, result)
+    _, result = certified("flat")
+    reason = Reason(claim=MetricDefinite(), verdict=Verdict(verdict))
+    stopped = replace(result, verdict=Verdict(verdict), reasons=(reason,), tube=None)
+    error, finding = refused(require_tube, stopped)
     assert error.exit_code == code
     assert "metric, C1: W " in finding.message
 
@@ -134,7 +136,7 @@ def test_the_plan_is_that_of_the_certificate():
 def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     where = setting("two_state", "0.4")
     _, result = certified("two_state", "0.4")
-    pair = result["distance"]["least_adaptation"]
+    pair = result.to_json()["distance"]["least_adaptation"]
     loop = loop_of(where, "l1", Choice())
     assert (loop.problem.gains.bandwidth, loop.problem.gains.adaptation_rate) == (
         pair["bandwidth"],
@@ -143,7 +145,7 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     assert loop.promise is not None
     assert "B distance" in loop.origin
     paper = loop_of(where, "l1", Choice(source="26"))
-    assert paper.problem.gains.adaptation_rate == result["conditions_26"]["adaptation_rate"]
+    assert paper.problem.gains.adaptation_rate == result.to_json()["conditions_26"]["adaptation_rate"]
     for chosen in (
         loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000))),
         loop_of(where, "sampled", Choice(sample_time=Fraction(1, 10))),
@@ -196,7 +198,7 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
 def test_a_certified_sample_time_is_cut_to_whole_control_periods():
     """`--controllers ccm,l1,sampled --control-rate 500`, the example of its own help, ended in a ValueError."""
     where = setting("flat")
-    Ts = certified("flat")[1]["sampled"]["sample_time"]
+    Ts = certified("flat")[1].to_json()["sampled"]["sample_time"]
     for rate in (Fraction(500), Fraction(70), 1 / Fraction(repr(Ts))):
         loop = loop_of(where, "sampled", Choice(), rate)
         cut = loop.problem.gains.sample_time
@@ -241,7 +243,7 @@ def test_kinds_are_named_alike_everywhere():
     assert set(KINDS) == {item.value for item in Source} == set(GAINS) == set(PREFERRED)
     assert all(kind.name.option == key for key, kind in KINDS.items())
     _, result = certified("two_state", "0.4")
-    assert {kind.name.key for kind in KINDS.values()} == set(result["proof"])
+    assert {kind.name.key for kind in KINDS.values()} == set(result.proof.of)
 
 
 @pytest.mark.parametrize(
@@ -267,35 +269,50 @@ def test_a_loop_takes_the_gains_of_a_kind_that_is_about_it(controller, wanted, t
 
 
 @pytest.mark.parametrize(
-    ("part", "key"), [("tube", "rho"), ("metric", "lower"), ("constants", "h"), ("distance", "verdict")]
-)
-def test_an_incomplete_certificate_is_told(part, key):
-    spec, result = certified("flat")
-    broken = json.loads(json.dumps(result))
-    del broken[part][key]
-    if part == "distance":
-        assert setting_of(spec, broken).certified.proven("distance") is None
-        return
-    error, finding = refused(setting_of, spec, broken)
-    assert error.exit_code is ExitCode.INVALID
-    assert "is incomplete" in finding.message
-    assert key in finding.message
-
-
-@pytest.mark.parametrize(
     "change",
     [
-        lambda result: result["constants"]["h"].update(above=None),
+        lambda result: result["tube"].pop("rho"),
         lambda result: result["constants"].update(h=[1, 2]),
         lambda result: result["tube"].update(rho="1/0"),
         lambda result: result["metric"].update(lower=[]),
         lambda result: result.update(proof=None),
+        lambda result: result["distance"].pop("verdict"),
+        lambda result: result.update(surprise=1),
     ],
 )
-def test_a_certificate_of_other_types_is_told(change):
-    spec, result = certified("flat")
-    broken = json.loads(json.dumps(result))
+def test_what_recheck_refuses_simulate_refuses_with_the_same_code(tmp_path, change):
+    broken = certified("flat")[1].to_json()
     change(broken)
-    error, finding = refused(setting_of, spec, broken)
-    assert error.exit_code is ExitCode.INVALID
-    assert finding.code == "TC601"
+    path = written(tmp_path, broken)
+    error, finding = refused(open_certificate, path)
+    assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
+    error, finding = refused(recheck, (tmp_path / "c.json").read_text(), path, 10)
+    assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
+
+
+@pytest.mark.parametrize("part", ["tube", "metric", "h"])
+def test_what_simulation_needs_is_there_or_told(part):
+    spec, result = certified("flat")
+    without_h = {name: item for name, item in result.constants.items() if name != "h"}
+    change = {"constants": without_h} if part == "h" else {part: None}
+    error, finding = refused(setting_of, spec, replace(result, **change))
+    assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
+
+
+def test_half_widths_keep_their_states_through_a_file(tmp_path):
+    """A file has its keys in alphabetical order, whatever the order of the states."""
+    text = FLAT.replace("[p, v]", "[v, p]").replace(
+        '[v, "-p - v"], B: [[0], [1]]', '["-p - v", v], B: [[1], [0]]'
+    )
+    spec = load_text(
+        text.replace("at: [0.05, 0]", "at: [0, 0.05]").replace(
+            "[[1, -0.5], [-0.5, 1]]", "[[1.1, -0.5], [-0.5, 1]]"
+        )
+    )
+    result = pipeline.certify(spec, pipeline.Options())
+    read = open_certificate(written(tmp_path, result)).result
+    assert list(read.tube.half_widths) == ["p", "v"]
+    for found in (result, read):
+        widths = setting_of(spec, found).certified.half_widths
+        assert widths == tuple(result.tube.half_widths[name] for name in ("v", "p"))
+        assert widths[0] > 1.02 * widths[1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +9,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from simulated import Failure, Peak, certified, runs, setting
 
+from tubecert.certificate.result import Recipes
 from tubecert.errors import TubecertError
 from tubecert.simulate.certified import read_numbers
 from tubecert.simulate.compare import check_class, compare
 from tubecert.simulate.promise import KINDS, Decay, promise
 from tubecert.spec import load_text
+from tubecert.verdict import Verdict
 
 T = np.linspace(0, 4, 81)
 
@@ -62,7 +63,7 @@ def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
     found = promise(read_numbers(result), KINDS[which])
     assert found is not None
     assert found.decay is not None
-    section = result[which]
+    section = result.to_json()[which]
     margin = (section["least_adaptation"] if which == "distance" else section)["margin"]
     left = 1 - found.decay(np.linspace(0, 5, 5001)).max() / found.reach
     assert margin[0] - 1e-6 <= left <= margin[1] + 1e-6
@@ -71,11 +72,15 @@ def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
 def test_only_certified_sections_promise():
     _, result = certified("flat")
     assert promise(read_numbers(result), KINDS["distance"]) is not None
-    for change in ({"formulas": "as-printed"}, {"distance": None}, {"proof": {}}):
-        assert promise(read_numbers({**result, **change}), KINDS["distance"]) is None
-    refuted = copy.deepcopy(result)
-    refuted["distance"]["verdict"] = "refuted"
-    assert promise(read_numbers(refuted), KINDS["distance"]) is None
+    refuted = {"distance": replace(result.sections["distance"], verdict=Verdict.REFUTED)}
+    changes = (
+        {"formulas": "as-printed"},
+        {"sections": {}, "decided_by": ()},
+        {"proof": Recipes()},
+        {"sections": result.sections | refuted},
+    )
+    for change in changes:
+        assert promise(read_numbers(replace(result, **change)), KINDS["distance"]) is None
 
 
 def test_what_keeps_every_promise_breaks_none():

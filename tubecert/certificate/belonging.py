@@ -8,16 +8,18 @@ must say that it was synthesised, and for what. What differs beside that is said
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tubecert.certificate.result import KnotTexts, Overrides, Result
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.records import from_json
 from tubecert.spec import Spec, canonical
+from tubecert.spec.types import Table
 
 _IDLE = ("name", "expect", "simulation", "obstacles", "system.units", "trajectory.file")
 
@@ -61,34 +63,34 @@ class Belonging:
         return f"belongs to {visible(path)}" + (f" ({'; '.join(notes)})" if notes else "")
 
 
-def compared(spec: Spec, result: Mapping[str, Any]) -> Belonging:
+def compared(spec: Spec, result: Result) -> Belonging:
     """The `result` of a certificate against a specification."""
-    own, effective = canonical(spec), result["spec"]["effective"]
-    overridden = _overridden(own, effective, result["overrides"])
+    own, effective = canonical(spec), result.spec.effective.data
+    overridden = _overridden(own, effective, result.overrides)
     asked = own["metric"].get("synthesise") if "metric" in own else None
-    if asked is not None and result.get("synthesis", {}).get("asked") == asked:
+    if asked is not None and result.synthesis is not None and result.synthesis.asked.data == asked:
         own["metric"] = effective["metric"]
     differing = _differing(own, effective)
     if spec.trajectory.table is not None and "trajectory" not in differing:
-        differing += _other_table(result["plan"].get("knots"), spec.trajectory.table)
+        differing += _other_table(result.plan.knots, spec.trajectory.table)
     digest = "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest()
     return Belonging(
         serious=tuple(key for key in differing if key not in _IDLE),
         idle=tuple(key for key in differing if key in _IDLE),
         overridden=tuple(overridden),
         synthesised=asked is not None,
-        same_text=digest == result["spec"]["file_hash"],
+        same_text=digest == result.spec.file_hash,
     )
 
 
-def _overridden(own: dict[str, Any], effective: Mapping[str, Any], overrides: Mapping[str, Any]) -> list[str]:
+def _overridden(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> list[str]:
     """What the command line replaced in the file; there the certificate's value is taken over into `own`."""
     found = []
     for key in ("epsilon", "rho_a"):
-        if key in overrides:
+        if getattr(overrides, key) is not None:
             found.append(key)
             own["tube"] = {**own["tube"], key: effective["tube"].get(key)}
-    if "metric" in overrides:
+    if overrides.metric is not None:
         found.append("the metric")
         own["metric"] = effective["metric"]
     return found
@@ -112,16 +114,17 @@ def _spread(data: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _other_table(knots: Any, table: Any) -> list[str]:
+def _other_table(knots: KnotTexts | None, table: Table) -> list[str]:
     """What of a plan file differs: bytes that say the same knots are the same plan."""
-    same = isinstance(knots, dict) and all(
-        _exactly(knots.get(key)) == _exactly(getattr(table.knots, key)) for key in ("t", "x", "u")
-    )
-    return [] if same else [f"the knots of {table.file}"]
+    own = table.knots
+    if knots is not None and (own.t, own.x, own.u) == (_exact(knots.t), _rows(knots.x), _rows(knots.u)):
+        return []
+    return [f"the knots of {table.file}"]
 
 
-def _exactly(values: Any) -> Any:
-    """Numbers in nested lists, exact."""
-    if isinstance(values, (list, tuple)):
-        return tuple(map(_exactly, values))
-    return values if isinstance(values, Fraction) else from_json(Fraction, values, "knots")
+def _rows(rows: Sequence[Sequence[str]]) -> tuple[tuple[Fraction, ...], ...]:
+    return tuple(map(_exact, rows))
+
+
+def _exact(texts: Sequence[str]) -> tuple[Fraction, ...]:
+    return tuple(from_json(Fraction, text, "knots") for text in texts)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from tubecert.certificate.belonging import ForeignError, compared
+from tubecert.certificate.file import incomplete
+from tubecert.certificate.result import Result
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import Node
+from tubecert.records import FormError
 
 __all__ = ["ForeignError", "belongs"]
 
@@ -15,6 +18,10 @@ def belongs(document: Node, name: str, path: str) -> str:
 
     read_certificate(document)  # its form: what is compared below is there, and what is examined is the same
     loaded = spec.load(path)
-    found = compared(loaded, document.mapping()["result"])
+    try:
+        result = Result.from_json(document.mapping()["result"])
+    except FormError as error:
+        raise incomplete(name, str(error)) from error
+    found = compared(loaded, result)
     found.require(loaded, name)
     return found.words(path)

@@ -29,11 +29,7 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
         raise refused("a certificate on stdin has no name that the page could have", "give -o FILE.html")
     pages = list(targets) if targets else [_beside(source)]
     check_pages(pages, {"certificate": source})
-    sealed = certificate.load(source)
-    try:
-        told = read_certificate(sealed)
-    except FormError as error:  # with a hash that is right: somebody sealed what is no result
-        raise certificate.incomplete(source, str(error)) from error
+    told = open_certificate(source)
     texts = {page: _render(page, told) for page in pages}
     for page, text in texts.items():
         certificate.write_text(page, text, _REMEDY)
@@ -41,6 +37,15 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
         write_stdout("".join(f"page {visible(page)}\n" for page in pages))
+
+
+def open_certificate(source: str) -> Certificate:
+    """The values of the certificate in a file (`-`: on stdin). Raises `TargetError`."""
+    sealed = certificate.load(source)
+    try:
+        return read_certificate(sealed)
+    except FormError as error:  # with a hash that is right: somebody sealed what is no result
+        raise certificate.incomplete(source, str(error)) from error
 
 
 def read_certificate(sealed: Mapping[str, Any]) -> Certificate:

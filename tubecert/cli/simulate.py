@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
+from tubecert.cli.report import open_certificate, read_certificate
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding
@@ -22,6 +23,7 @@ from tubecert.libraries import versions
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
+    from tubecert.certificate.result import Certificate, Result
     from tubecert.simulate.campaign import Campaign
     from tubecert.simulate.loops import Controller
     from tubecert.spec import Spec
@@ -69,12 +71,12 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     terminal = Terminal.stderr(color=output.color)
     wanted = not (output.no_progress or output.quiet)
     with prepared(folder), _progress(terminal, wanted=wanted) as report:
-        system, sealed = _certificate(given, system, wishes, folder, report)
-        campaign = _campaign(system, sealed, wishes, report)
+        system, certified = _certificate(given, system, wishes, folder, report)
+        campaign = _campaign(system, certified.result, wishes, report)
         if report is not None:
             report("figures and data", 0, 1)
-        files = write(folder, campaign, certificate=sealed["hash"])
-    _report(summary(campaign, sealed["hash"]), folder, len(files), output)
+        files = write(folder, campaign, certificate=certified.hash)
+    _report(summary(campaign, certified.hash), folder, len(files), output)
     return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
 
 
@@ -153,15 +155,15 @@ def _progress(terminal: Terminal, *, wanted: bool) -> Iterator[Step | None]:
 
 def _certificate(
     given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Step | None
-) -> tuple[Spec, dict[str, Any]]:
+) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
     from tubecert.simulate.certified import adopted, require_tube
 
     if given["certificate"] is not None:
-        sealed = certificate.load(str(given["certificate"]))
-        system = adopted(system, sealed["result"])
-        require_tube(sealed["result"])
-        return system, sealed
+        certified = open_certificate(str(given["certificate"]))
+        system = adopted(system, certified.result)
+        require_tube(certified.result)
+        return system, certified
     from tubecert import pipeline
 
     options = pipeline.Options(epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"])
@@ -171,20 +173,20 @@ def _certificate(
         if report is not None:
             report(f"certifying: {step.name}", step.boxes, step.boxes)
 
-    result = pipeline.certify(system, options, show).to_json()
-    sealed = certificate.seal(result, {"command": "simulate", "versions": versions()})
+    result = pipeline.certify(system, options, show)
+    sealed = certificate.seal(result.to_json(), {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)
-    return adopted(system, result), sealed
+    return adopted(system, result), read_certificate(sealed)
 
 
-def _campaign(system: Spec, sealed: Mapping[str, Any], wishes: Wishes, report: Step | None) -> Campaign:
+def _campaign(system: Spec, result: Result, wishes: Wishes, report: Step | None) -> Campaign:
     from tubecert.simulate.campaign import simulate
     from tubecert.simulate.compiled import told
     from tubecert.simulate.setting import Choice, loop_of, setting_of
 
     numbers = wishes.numbers
-    setting = setting_of(system, sealed["result"], numbers["duration"])
+    setting = setting_of(system, result, numbers["duration"])
     gains = {name: numbers[name] for name in _GAINS}
     choice = Choice(source=wishes.gains, **gains)
     rate = numbers["control_rate"]

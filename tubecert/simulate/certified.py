@@ -8,23 +8,23 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from fractions import Fraction
-from typing import Any, Final, cast
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final
 
 from tubecert.certificate.belonging import compared
-from tubecert.claims import Reason
-from tubecert.errors import ExitCode, TubecertError
+from tubecert.certificate.file import incomplete
+from tubecert.certificate.result import Result
+from tubecert.conditions.theorem import Recipe
+from tubecert.errors import TubecertError
 from tubecert.findings import Finding
+from tubecert.kinds.data import SectionData
 from tubecert.model import ControlAffineModel
-from tubecert.records import from_json
-from tubecert.spec import Interpolation, Knots, Spec, Tube, load_text
+from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import sentence
-
-Result = Mapping[str, Any]
 
 _UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 
@@ -33,7 +33,7 @@ class Values(dict[str, float]):
     """Numbers by their names in the certificate; one that is missing is told as `TubecertError`."""
 
     def __missing__(self, name: str) -> float:
-        raise _incomplete(f"{name} is missing")
+        raise incomplete("that is simulated", f"{name} is missing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,15 +80,11 @@ def adopted(spec: Spec, result: Result) -> Spec:
     Raises `ForeignError` if the certificate is about another system.
     """
     compared(spec, result).require(spec, "the certificate")
-    effective = result["spec"]["effective"]
-    changed = result["overrides"]
-    if "epsilon" in changed or "rho_a" in changed:
-        radii = {name: Fraction(value) for name, value in effective["tube"].items()}
-        spec = replace(spec, tube=Tube(**radii))
-    if "metric" in changed or spec.metric is None:
-        other = _without_plan(effective)
-        spec = replace(spec, metric=other.metric, synthesis=other.synthesis)
-    return spec
+    other = _without_plan(result.spec.effective.data)
+    spec = replace(spec, tube=other.tube)
+    if result.overrides.metric is None and spec.metric is not None:
+        return spec
+    return replace(spec, metric=other.metric, synthesis=other.synthesis)
 
 
 def _without_plan(effective: Mapping[str, Any]) -> Spec:
@@ -100,71 +96,59 @@ def _without_plan(effective: Mapping[str, Any]) -> Spec:
 
 def require_tube(result: Result) -> None:
     """Raises the reason why there is no tube to be compared with, if there is none."""
-    if "rho_r" in result.get("tube", {}) and result.get("constants"):
+    if result.tube is not None and result.tube.rho_r is not None and result.constants:
         return
-    reasons = [from_json(Reason, item, f"reasons[{i}]") for i, item in enumerate(result["reasons"])]
-    reason = next((item for item in reasons if item.verdict == result["verdict"]), None)
+    reason = next((item for item in result.reasons if item.verdict is result.verdict), None)
     why = "certification stopped" if reason is None else sentence(reason)
     error = TubecertError(
         [
             Finding(
                 code="TC703",
-                message=f"there is no tube that a simulation could leave ({result['verdict']}: {why})",
+                message=f"there is no tube that a simulation could leave ({result.verdict}: {why})",
                 help=advice(reason.relax if reason else ()) or "tubecert certify tells more",
             )
         ]
     )
-    error.exit_code = ExitCode.NOT_CERTIFIED if result["verdict"] == "refuted" else ExitCode.UNDECIDED
+    error.exit_code = (result.verdict if result.verdict is Verdict.REFUTED else Verdict.UNDECIDED).exit_code
     raise error
 
 
 def certified_plan(spec: Spec, model: ControlAffineModel, result: Result) -> Plan:
     """The plan that was certified: the specification's expressions, or the certificate's knots."""
-    knots = result["plan"].get("knots")
-    trajectory = spec.trajectory
+    knots, trajectory = result.plan.exact_knots(), spec.trajectory
     if knots is None:
         x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
         return Plan(x, u, trajectory.horizon)
-    rows = {name: tuple(tuple(map(Fraction, row)) for row in knots[name]) for name in ("x", "u")}
-    interpolation = cast(Interpolation, result["plan"]["interpolation"])
-    exact = Knots(t=tuple(map(Fraction, knots["t"])), interpolation=interpolation, **rows)
-    return piecewise_plan(model, exact, trajectory.horizon)
+    return piecewise_plan(model, knots, trajectory.horizon)
 
 
 def read_numbers(result: Result) -> Certified:
     """What simulation reads of a certificate that has a tube; raises `TubecertError` if any of it is missing."""
-    try:
-        rho = _number(result["tube"]["rho"])
-        metric = result["metric"]
-        return Certified(
-            rho=rho,
-            reach=math.sqrt(metric["lower"][0]) * rho,
-            rate=_number(metric["rate"]),
-            upper=float(metric["upper"][1]) if "upper" in metric else None,
-            half_widths=tuple(float(width) for width in result["tube"]["half_widths"].values()),
-            constants=Values({name: float(item["above"]) for name, item in result["constants"].items()}),
-            sections={name: _section(result, name, recipe) for name, recipe in result["proof"].items()},
-        )
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
-        raise _incomplete(f"{type(error).__name__} {error}") from None
-
-
-def _incomplete(why: str) -> TubecertError:
-    message = f"the certificate is incomplete: {why}"
-    help = "give the JSON file that certify has written"
-    return TubecertError([Finding(code="TC601", message=message, help=help)])
-
-
-def _section(result: Result, name: str, recipe: Mapping[str, Any]) -> Section:
-    found = result.get(name) or {}
-    ultimate = found.get("ultimate_radius")
-    return Section(
-        certified=result["formulas"] == "corrected" and found.get("verdict") == "certified" and bool(recipe),
-        recipe=Values({name: _number(value) for name, value in (recipe or {}).items() if value is not None}),
-        ultimate=None if ultimate is None else float(ultimate),
+    tube, metric = result.tube, result.metric
+    if tube is None or tube.half_widths is None or metric is None or metric.lower is None:
+        raise incomplete("that is simulated", "it has no tube")
+    rho, upper = float(tube.rho), None if metric.upper is None else metric.upper.above
+    return Certified(
+        rho=rho,
+        reach=math.sqrt(metric.lower.below) * rho,
+        rate=float(metric.rate),
+        upper=upper if upper is None or math.isfinite(upper) else None,
+        half_widths=tuple(tube.half_widths[name] for name in result.spec.effective.system.states),
+        constants=Values(
+            {name: item.above for name, item in result.constants.items() if item.above is not None}
+        ),
+        sections={
+            name: _section(result, recipe, result.sections.get(name))
+            for name, recipe in result.proof.of.items()
+        },
     )
 
 
-def _number(value: float | str) -> float:
-    """A number of a certificate: a decimal, or a text p/q."""
-    return float(Fraction(value)) if isinstance(value, str) else float(value)
+def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Section:
+    numbers = {item.name: getattr(recipe, item.name) for item in fields(recipe)}  # type: ignore[arg-type]
+    certified = found is not None and found.verdict is Verdict.CERTIFIED
+    return Section(
+        certified=certified and result.formulas == "corrected",
+        recipe=Values({name: float(value) for name, value in numbers.items() if value is not None}),
+        ultimate=None if found is None else found.ultimate_radius,
+    )

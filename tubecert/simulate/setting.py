@@ -13,13 +13,14 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.expression import Expression
 from tubecert.findings import Finding, Location
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulate.certified import Certified, Result, certified_plan, read_numbers
+from tubecert.simulate.certified import Certified, certified_plan, read_numbers
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.loops import DESIGNS, Controller
 from tubecert.simulate.problem import LoopGains, LoopProblem
