@@ -8,6 +8,7 @@ yes.
 | `graph` | the hash-consed graph, exact folding, derivatives |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
+| `number` | text -> rational number, pi and degrees rounded |
 | `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |
 """
@@ -35,8 +36,9 @@ from tubecert.expression.graph import (
     tan,
     topological,
 )
+from tubecert.expression.number import Side, parse_constant, parse_number
 from tubecert.expression.owed import full_text
-from tubecert.expression.parse import Obligation, Parsed, parse, parse_number
+from tubecert.expression.parse import Obligation, Parsed, parse
 from tubecert.expression.scan import (
     FUNCTIONS,
     MAX_LENGTH,
@@ -64,6 +66,7 @@ __all__ = [
     "ExpressionError",
     "Obligation",
     "Parsed",
+    "Side",
     "as_expression",
     "coefficient",
     "constant",
@@ -80,6 +83,7 @@ __all__ = [
     "norm",
     "number_text",
     "parse",
+    "parse_constant",
     "parse_number",
     "power",
     "rebuild",

@@ -8,7 +8,6 @@ poles.
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -39,9 +38,6 @@ _POSITIVE: Final[Mapping[str, Callable[[Expression], Expression]]] = {
     "acos": lambda u: 1 - u**2,
 }
 """What must be positive for the function to be defined and C1."""
-_NOT_FINITE = frozenset({"nan", "inf", "infinity"})
-_FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
-_NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,52 +85,6 @@ def parse(
     line = normalise_spaces(text)
     scan(line, Vocabulary(symbols=symbols.keys(), kinks=kinks, refused=refused or {}))
     return _Lowering(line, symbols, owed or {}).run(_tree(line))
-
-
-def parse_number(text: str, symbols: Mapping[str, Fraction] | None = None) -> Fraction:
-    """The rational that `text` stands for: a number or an expression of numbers and parameters."""
-    word = text.strip()
-    bare = word.lower().lstrip("+-.")
-    width = max(1, len(word))
-    start = len(text) - len(text.lstrip()) if word else 0
-    if bare in _NOT_FINITE:
-        raise ExpressionError(
-            f"{word} is not a finite number", offset=start, width=width, kind="value", help="write a number"
-        )
-    if bare in _NOT_NUMBERS or not word:
-        what = f"{word} is not a number" if word else "a number is missing"
-        raise ExpressionError(
-            what, offset=start, width=width, kind="value", help="write a number such as 0.1 or 1e-3"
-        )
-    if _FOREIGN_NUMBER.fullmatch(word):
-        advice = (
-            "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
-        )
-        raise ExpressionError(
-            f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
-        )
-    found = _constant(text, symbols or {})
-    value = found.expression
-    if not value.is_constant or found.obligations:
-        raise ExpressionError(
-            f"{word[:60]} is not a rational number",
-            offset=start,
-            width=width,
-            kind="value",
-            help="write it as a decimal or a fraction; numbers here are exact",
-        )
-    return value.fraction
-
-
-def _constant(text: str, symbols: Mapping[str, Fraction]) -> Parsed:
-    known = {name: graph.constant(value) for name, value in symbols.items()}
-    try:
-        return parse(text, symbols=known)
-    except ExpressionError as error:
-        if error.kind == "symbol":
-            names = f"known: {', '.join(sorted(known)[:20])}" if known else "there are none"
-            error.help = f"a number has no unit and may use parameters only ({names})"
-        raise
 
 
 def _tree(line: str) -> ast.expr:

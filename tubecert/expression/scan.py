@@ -308,6 +308,8 @@ class _Walk:
             return
         if name in words.refused:
             raise token.error(words.refused[name], kind="symbol")
+        if name in _ANGLES:
+            raise token.error(f"{name} is no name", _ANGLES[name])
         known = [*words.symbols, "pi", *(f for f in FUNCTIONS if words.kinks or f not in KINKED)]
         raise token.error(f"unknown symbol {name[:40]}", suggestion(name, known), "symbol")
 
@@ -327,6 +329,11 @@ class _Walk:
         return token.error(message, f"write {left}*{right}")
 
 
+_ANGLES = {
+    "deg": "values and sets may be written as 30 deg; in an expression write 30*pi/180",
+    **dict.fromkeys(("degree", "degrees"), "write 30 deg in values and sets, 30*pi/180 in expressions"),
+    **dict.fromkeys(("rad", "radian", "radians"), "angles are in radians: leave the unit out"),
+}
 _QUOTE = "text with commas inside [ ] or { } must stand in quotes in YAML"
 
 

@@ -12,6 +12,7 @@ from tubecert.expression import (
     ONE,
     RESERVED,
     Expression,
+    Obligation,
     Parsed,
     constant,
     free_symbols,
@@ -41,12 +42,13 @@ class Names:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     parameters: tuple[tuple[str, Fraction], ...]
+    irrational: tuple[tuple[str, Expression], ...] = ()  # parameters that contain pi
     definitions: tuple[tuple[str, Parsed], ...] = ()
 
     @property
-    def values(self) -> dict[str, Fraction]:
+    def values(self) -> dict[str, Expression]:
         """The parameters by name."""
-        return dict(self.parameters)
+        return {name: constant(value) for name, value in self.parameters} | dict(self.irrational)
 
     def of_state(self) -> Scope:
         """For f, B and the dual metric: states and parameters."""
@@ -68,8 +70,8 @@ class Names:
 
     def _scope(self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False) -> Scope:
         """Parameters, variables, and the definitions that stand for expressions of these."""
-        symbols = self._constants() | _symbols(variables)
-        owed = {}
+        symbols = self.values | _symbols(variables)
+        owed: dict[str, tuple[Obligation, ...]] = {name: () for name, _ in self.irrational}
         for name, parsed in self.definitions:
             why = _foreign(name, parsed, variables, refused, kinks=kinks)
             if why is None:
@@ -77,9 +79,6 @@ class Names:
             else:
                 refused = {**refused, name: why}
         return Scope(symbols=symbols, refused=refused, kinks=kinks, owed=owed)
-
-    def _constants(self) -> dict[str, Expression]:
-        return {name: constant(value) for name, value in self.parameters}
 
     def _inputs_refused(self) -> dict[str, str]:
         return {
@@ -109,7 +108,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
     taken: dict[str, str] = {}
     states = _name_list(system.get("states"), "state", taken)
     inputs = _name_list(system.get("inputs"), "input", taken)
-    parameters = _read_parameters(system.get("parameters"), taken)
+    values = _read_parameters(system.get("parameters"), taken)
     if states is None or inputs is None:
         return None
     if len(inputs) > len(states):
@@ -119,7 +118,12 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
             f"{len(inputs)} inputs for {len(states)} states: B cannot have independent columns",
         )
         return None
-    names = Names(states=states, inputs=inputs, parameters=parameters)
+    names = Names(
+        states=states,
+        inputs=inputs,
+        parameters=tuple((name, value.fraction) for name, value in values.items() if value.is_constant),
+        irrational=tuple((name, value) for name, value in values.items() if not value.is_constant),
+    )
     return _with_definitions(names, system.get("definitions"), taken)
 
 
@@ -171,20 +175,20 @@ def _with_article(what: str) -> str:
     return f"an {what}" if what[0] in "aeiou" else f"a {what}"
 
 
-def _read_parameters(field: Field | None, taken: dict[str, str]) -> tuple[tuple[str, Fraction], ...]:
+def _read_parameters(field: Field | None, taken: dict[str, str]) -> dict[str, Expression]:
     """Parameters in the order of the file; each may use those before it. An unreadable value stands as 1."""
-    values: dict[str, Fraction] = {}
+    values: dict[str, Expression] = {}
     if field is None:
-        return ()
+        return values
     for key, node in field.pairs("of names to numbers") or []:
         entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "parameter", taken)
-        value = entry.number(values)
+        value = entry.constant(values)
         if name is not None:
             values[name] = (
-                Fraction(1) if value is None else value
+                ONE if value is None else value
             )  # the finding stands; users of it are not wrong too
-    return tuple(values.items())
+    return values
 
 
 def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
@@ -241,10 +245,15 @@ def read_box(field: Field, names: Names) -> tuple[tuple[Fraction, Fraction], ...
 
 
 def _side(field: Field | None, names: Names) -> tuple[Fraction, Fraction] | None:
-    side = field.numbers(2, names.values) if field else None
-    if field is None or side is None:
+    ends = field.items(2, "numbers") if field else None
+    if field is None or ends is None:
         return None
-    lower, upper = side
+    lower = ends[0].number(
+        names.values, side="above"
+    )  # inward: the set that is asked for contains the one that counts
+    upper = ends[1].number(names.values, side="below")
+    if lower is None or upper is None:
+        return None
     if lower >= upper:
         field.fail(
             codes.RANGE, f"{field.path}: the lower end must be below the upper end", "write [lower, upper]"

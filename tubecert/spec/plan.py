@@ -169,7 +169,7 @@ def _horizon(field: Field | None, names: Names) -> tuple[Fraction | None, bool]:
     """The horizon in s, and whether what is written is sound."""
     if field is None:
         return None, True
-    horizon = field.number(names.values, above=0)
+    horizon = field.number(names.values, above=0, side="above")
     return horizon, horizon is not None
 
 
@@ -200,7 +200,7 @@ def read_initial_state(
         return None, None
     if "at" in entries:
         return entries["at"].numbers(len(names.states), names.values), None
-    radius = entries["within"].number(names.values, above=0)
+    radius = entries["within"].number(names.values, above=0, side="above")
     return _start(trajectory, plan) if trajectory and plan else None, radius
 
 

@@ -18,10 +18,12 @@ from tubecert.expression import (
     ExpressionError,
     Obligation,
     Parsed,
+    Side,
     full_text,
     longest_text,
     near,
     parse,
+    parse_constant,
     parse_number,
     suggestion,
     topological,
@@ -32,7 +34,7 @@ from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scal
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
 
-Parameters = Mapping[str, Fraction]
+Parameters = Mapping[str, Expression]
 T = TypeVar("T")
 
 _GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
@@ -229,13 +231,14 @@ class Field:
         above: int | None = None,
         least: int | None = None,
         most: int | None = None,
+        side: Side = "nearest",
     ) -> Fraction | None:
-        """A rational number, in its range."""
+        """A rational number, in its range; what contains pi is rounded to a side."""
         if not isinstance(self.node, Scalar):
             self._wrong_type("a number")
             return None
         try:
-            value = parse_number(self.node.text, parameters)
+            value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
             self._expression_error(error, codes.NUMBER)
             return None
@@ -255,6 +258,17 @@ class Field:
             self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {' and '.join(bounds)}")
             return None
         return value
+
+    def constant(self, parameters: Parameters) -> Expression | None:
+        """A number as it is, with pi if it contains that."""
+        value = self.number(parameters)
+        if value is None or not isinstance(self.node, Scalar):
+            return None
+        exact = parse_constant(self.node.text, parameters)
+        if longest_text(exact) > MAX_LENGTH:
+            self.fail(codes.LIMIT, f"{self.path} is too long with its parameters written out", "split it")
+            return None
+        return exact
 
     def numbers(self, count: int, parameters: Parameters) -> tuple[Fraction, ...] | None:
         """A list of numbers."""

@@ -36,7 +36,7 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
     entries = field.mapping(optional=("epsilon", "rho_a"), reserved=("weights",)) if field else {}
     if entries is None:
         return None
-    values = {key: entry.number(names.values, above=0) for key, entry in entries.items()}
+    values = {key: entry.number(names.values, above=0, side="below") for key, entry in entries.items()}
     if None in values.values():
         return None
     return Tube(epsilon=values.get("epsilon"), rho_a=values.get("rho_a"))

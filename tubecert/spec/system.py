@@ -67,7 +67,7 @@ def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None
     entries = field.mapping(required=keys if complete else (), optional=() if complete else keys)
     if entries is None:
         return None
-    values = {key: entry.number(names.values, least=0) for key, entry in entries.items()}
+    values = {key: entry.number(names.values, least=0, side="above") for key, entry in entries.items()}
     if None in values.values():
         return None
     return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))

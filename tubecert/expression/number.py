@@ -1,0 +1,171 @@
+"""Text -> exact number: rationals as they are, multiples of pi and degrees rounded to 30 digits.
+
+A number in a specification is a rational. What contains pi is none: it is rounded, to nearest or to the side that its
+place asks for (the ends of a set inward, a bound upward), and from then on the rounded number is the one that counts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final, Literal
+
+from tubecert.expression import graph
+from tubecert.expression.graph import Expression, topological
+from tubecert.expression.parse import Parsed, parse
+from tubecert.expression.scan import ExpressionError
+
+Side = Literal["nearest", "below", "above"]
+
+DIGITS: Final = 30
+_NOT_FINITE = frozenset({"nan", "inf", "infinity"})
+_FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
+_NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
+_ONE_FACTOR = re.compile(
+    r"\s*[-+]?\s*(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[A-Za-z]\w*|\([^()]*\))"
+    r"(?:\s*[*/]\s*(?:[0-9.]+|[A-Za-z]\w*))*\s*"
+)
+_PI: Final = Fraction(3141592653589793238462643383279502884197169399375105820974944592307816406286, 10**75)
+_ULP: Final = Fraction(1, 10**75)  # pi lies between _PI and _PI + _ULP
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """Rational bounds."""
+
+    lo: Fraction
+    hi: Fraction
+
+
+def parse_number(
+    text: str, symbols: Mapping[str, Fraction | Expression] | None = None, side: Side = "nearest"
+) -> Fraction:
+    """The rational that `text` stands for: a number or an expression of numbers, parameters and pi, perhaps in `deg`.
+
+    With pi it is rounded to `DIGITS` digits, to that side. Raises `ExpressionError`.
+    """
+    value = parse_constant(text, symbols)
+    return value.fraction if value.is_constant else _rounded(_range(value), side)
+
+
+def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | None = None) -> Expression:
+    """The same, exact: an expression of numbers and pi."""
+    word = text.strip()
+    _check_foreign(text, word)
+    known = {name: graph.as_expression(value) for name, value in (symbols or {}).items()}
+    parsed, factor = _in_degrees(text, known)
+    found = parsed.expression * factor
+    try:
+        for owed in parsed.obligations:
+            if (known_range := _range(owed.argument)).lo <= 0 and (
+                owed.kind == "positive" or known_range.hi >= 0
+            ):
+                raise ZeroDivisionError
+        _range(found)
+    except (ValueError, ZeroDivisionError):
+        raise ExpressionError(
+            f"{word[:60]} is not a rational number",
+            offset=len(text) - len(text.lstrip()),
+            width=max(1, len(word)),
+            kind="value",
+            help="write it as a decimal or a fraction, or with pi or deg; numbers here are exact",
+        ) from None
+    return found
+
+
+def _check_foreign(text: str, word: str) -> None:
+    """Words that are no numbers, and numbers as they are written elsewhere."""
+    start = len(text) - len(text.lstrip()) if word else 0
+    width = max(1, len(word))
+    if word.lower().lstrip("+-.") in _NOT_FINITE:
+        raise ExpressionError(
+            f"{word} is not a finite number", offset=start, width=width, kind="value", help="write a number"
+        )
+    if word.lower().lstrip("+-.") in _NOT_NUMBERS or not word:
+        what = f"{word} is not a number" if word else "a number is missing"
+        raise ExpressionError(
+            what, offset=start, width=width, kind="value", help="write a number such as 0.1 or 1e-3"
+        )
+    if _FOREIGN_NUMBER.fullmatch(word):
+        advice = (
+            "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
+        )
+        raise ExpressionError(
+            f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
+        )
+
+
+def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, Expression]:
+    """A text of known names, without its `deg`, and the unit."""
+    bare = text.rstrip()
+    factor: Expression = graph.ONE
+    if angle := re.fullmatch(r"(.*[0-9.)\s])deg", bare, re.DOTALL):
+        if not _ONE_FACTOR.fullmatch(angle[1]):
+            raise ExpressionError(
+                "deg follows one number",
+                offset=len(bare) - 3,
+                width=3,
+                help="put what comes before it in parentheses: (10 + 20) deg",
+            )
+        text, factor = angle[1], graph.PI / 180
+    try:
+        return parse(text, symbols=symbols), factor
+    except ExpressionError as error:
+        if error.kind == "symbol":
+            names = f"known: {', '.join(sorted(symbols)[:20])}" if symbols else "there are none"
+            error.help = f"a number has no unit but deg, and may use parameters only ({names})"
+        raise
+
+
+def _range(e: Expression) -> _Range:
+    """An enclosure of a number made of rationals and pi; raises `ValueError` for another one."""
+    value: dict[Expression, _Range] = {}
+    for node in topological([e]):
+        args = [value[arg] for arg in node.args]
+        match node.op:
+            case "const":
+                value[node] = _Range(node.fraction, node.fraction)
+            case "pi":
+                value[node] = _Range(_PI, _PI + _ULP)
+            case "add":
+                value[node] = _Range(args[0].lo + args[1].lo, args[0].hi + args[1].hi)
+            case "mul":
+                value[node] = _times(args[0], args[1])
+            case "div":
+                value[node] = _times(args[0], _inverse(args[1]))
+            case "pow":
+                value[node] = _power(args[0], int(str(node.value)))
+            case _:
+                raise ValueError(node.op)
+    return value[e]
+
+
+def _times(a: _Range, b: _Range) -> _Range:
+    corners = [p * q for p in (a.lo, a.hi) for q in (b.lo, b.hi)]
+    return _Range(min(corners), max(corners))
+
+
+def _inverse(a: _Range) -> _Range:
+    if a.lo <= 0 <= a.hi:
+        raise ZeroDivisionError
+    return _Range(1 / a.hi, 1 / a.lo)
+
+
+def _power(a: _Range, n: int) -> _Range:
+    base, result = _inverse(a) if n < 0 else a, _Range(Fraction(1), Fraction(1))
+    for _ in range(abs(n)):
+        result = _times(result, base)
+    return result
+
+
+def _rounded(value: _Range, side: Side) -> Fraction:
+    """A decimal of `DIGITS` digits at or next to every number of the range."""
+    size = max(abs(value.lo), abs(value.hi))
+    bits = size.numerator.bit_length() - size.denominator.bit_length()
+    places = DIGITS - bits * 30103 // 100000  # log10(2)
+    grid = Fraction(10) ** -places
+    if side == "nearest":
+        return round((value.lo + value.hi) / 2 / grid) * grid
+    return value.lo // grid * grid if side == "below" else -(-value.hi // grid) * grid
