@@ -51,6 +51,7 @@ from tubecert.expression.matrix import (
     transpose,
 )
 from tubecert.findings import Finding
+from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
     from tubecert.spec import Spec, Term
@@ -278,11 +279,11 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
             decision = decide(scalar(-duty.argument), BoxDomain(used), 0.0, effort)
         else:
             decision = _nonzero(duty.argument, used, effort)
-        if decision.verdict == "proven":
+        if decision.verdict is Verdict.CERTIFIED:
             continue
         code, message = "TC202", f"'{duty.text}' could not be proven to be defined and smooth on {where}"
         remedy = "keep the safe set further away from the singularity"
-        if decision.verdict == "refuted":
+        if decision.verdict is Verdict.REFUTED:
             code = "TC201"
             message = (
                 f"'{duty.text}' is undefined or not smooth on {where}: "
@@ -309,16 +310,16 @@ def _nonzero(e: Expression, ranges: dict[str, Range], effort: Effort) -> Decisio
     """Whether e has no zero on a box: proven if it is of one sign, refuted by a point of either sign."""
     domain = BoxDomain(ranges)
     positive = decide(scalar(-e), domain, 0.0, effort)
-    if positive.verdict == "proven":
+    if positive.verdict is Verdict.CERTIFIED:
         return positive
     negative = decide(scalar(e), domain, 0.0, effort)
-    if negative.verdict == "proven":
+    if negative.verdict is Verdict.CERTIFIED:
         return negative
-    if positive.verdict == negative.verdict == "refuted":
+    if positive.verdict == negative.verdict is Verdict.REFUTED:
         # e <= 0 at one point and e >= 0 at the other, and a box is connected
         at = _between(e, positive.at, negative.at)
         return replace(negative, at=_round_zero(e, at, ranges) or at)
-    return replace(negative, verdict="undecided")
+    return replace(negative, verdict=Verdict.UNDECIDED)
 
 
 def _between(e: Expression, low: dict[str, float], high: dict[str, float]) -> dict[str, float]:
@@ -366,34 +367,36 @@ def rank_decision(model: ControlAffineModel, safe_set: Sequence[Range], effort: 
     minors, complete = _minors(model)
     for d in minors:
         if d.is_constant:
-            return Decision(verdict="proven", at={}, value=fraction_bounds(-abs(d.fraction))[1], boxes=0)
+            return Decision(
+                verdict=Verdict.CERTIFIED, at={}, value=fraction_bounds(-abs(d.fraction))[1], boxes=0
+            )
     entries = [e for row in model.B for e in row]
     own = BoxDomain({v: box[v] for v in sorted(free_symbols(entries))})
     work = len(entries) * len(model.inputs) * 2 ** min(len(free_symbols(entries)), MOST_VERTICES)
     quick = replace(effort, budget=min(effort.budget, _RANK_WORK // work + 1))
     decision = decide(Dependence(model.B), own, 1.0, quick)
-    if decision.verdict == "proven":
+    if decision.verdict is Verdict.CERTIFIED:
         return decision
     short = replace(effort, budget=min(effort.budget, _RANK_BUDGET))
     for d in minors:
         decision = _nonzero(d, {v: box[v] for v in sorted(free_symbols([d]))}, short)
         only = complete and len(minors) == 1
-        if decision.verdict == "proven" or (decision.verdict == "refuted" and only):
+        if decision.verdict is Verdict.CERTIFIED or (decision.verdict is Verdict.REFUTED and only):
             return decision
     if len(model.inputs) <= _SHORT_DETERMINANT:
         return _gram_decision(model, box, short)
     at = _dependent(model.B, box)
-    return replace(decision, verdict="undecided" if at is None else "refuted", at=at or {})
+    return replace(decision, verdict=Verdict.UNDECIDED if at is None else Verdict.REFUTED, at=at or {})
 
 
 def _gram_decision(model: ControlAffineModel, box: dict[str, Range], effort: Effort) -> Decision:
     """Whether det(B'B) > 0 on a box."""
     gram = determinant(model.gram)
     decision = decide(scalar(-gram), BoxDomain(box), 0.0, effort)
-    if decision.verdict != "undecided":
+    if decision.verdict is not Verdict.UNDECIDED:
         return decision
     at = _round_zero(gram, decision.at, box)
-    return decision if at is None else replace(decision, verdict="refuted", at=at)
+    return decision if at is None else replace(decision, verdict=Verdict.REFUTED, at=at)
 
 
 def _dependent(B: Matrix, ranges: Mapping[str, Range]) -> dict[str, float] | None:

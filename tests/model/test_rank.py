@@ -60,7 +60,7 @@ DEFICIENT = {
 
 @pytest.mark.parametrize("name", FULL)
 def test_full_rank_is_proven(name: str) -> None:
-    assert verdict(FULL[name]) == "proven"
+    assert verdict(FULL[name]) == "certified"
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_full_rank_is_proven(name: str) -> None:
 @pytest.mark.parametrize("side", [("-1", "1"), ("-1", "1/3"), ("-1", "0.5")])
 def test_a_rank_that_is_lost_somewhere_is_never_proven(name: str, side: tuple[str, str]) -> None:
     """Where det(B'B) reaches 0, however gently; being >= 0 it always is."""
-    assert verdict(DEFICIENT[name], side) != "proven"
+    assert verdict(DEFICIENT[name], side) != "certified"
 
 
 @pytest.mark.slow
@@ -83,8 +83,8 @@ def test_a_lost_rank_is_shown_with_its_point() -> None:
 
 def test_one_minor_among_several_refutes_nothing() -> None:
     """x changes its sign, and so does 1 - 3 x, but not where x does."""
-    assert verdict([["x"], ["1 - 3*x"]]) == "proven"
-    assert verdict([["x", "0"], ["1 - 3*x", "0"], ["0", "1"]]) == "proven"
+    assert verdict([["x"], ["1 - 3*x"]]) == "certified"
+    assert verdict([["x", "0"], ["1 - 3*x", "0"], ["0", "1"]]) == "certified"
 
 
 def affine(n: int, m: int) -> ControlAffineModel:
@@ -110,7 +110,7 @@ def test_the_rank_of_a_large_B_has_a_budget(n: int, m: int, half: str) -> None:
     found = rank_decision(affine(n, m), [(-Fraction(half), Fraction(half))] * n, Effort())
     assert next(graph._serial) - before < 60_000
     assert found.boxes < 25_000
-    assert found.verdict == ("proven" if half != "1" else "undecided")
+    assert found.verdict == ("certified" if half != "1" else "undecided")
 
 
 def test_a_dependence_of_many_columns_is_shown_with_its_point() -> None:
@@ -126,8 +126,8 @@ def test_a_dependence_of_many_columns_is_shown_with_its_point() -> None:
 
 def test_a_constant_minor_is_exact() -> None:
     """Of a size that floats do not hold: its square is 1e-600."""
-    assert verdict([["1e-300"], ["x"]]) == "proven"
-    assert verdict([["1e-300*x + 1e-300"], ["0"]]) != "proven"
+    assert verdict([["1e-300"], ["x"]]) == "certified"
+    assert verdict([["1e-300*x + 1e-300"], ["0"]]) != "certified"
 
 
 def test_the_gram_matrix_is_that_of_the_columns() -> None:

@@ -24,6 +24,7 @@ from tubecert.synthesis.pivot_frame import pivot_frame, pivot_frames
 from tubecert.synthesis.problem import SynthesisProblem
 from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
 from tubecert.synthesis.sampling import Region, worst
+from tubecert.verdict import Verdict
 
 QUICK = Effort(gap=0.5, budget=200_000)
 
@@ -183,7 +184,7 @@ def test_symmetries_are_found_and_halve_the_unknowns():
 @pytest.mark.slow
 def test_symmetries_do_not_change_the_least_kappa(monkeypatch):
     monkeypatch.setattr(
-        cegis, "counterexample", lambda *_: Judgement(verdict="proven")
+        cegis, "counterexample", lambda *_: Judgement(verdict=Verdict.CERTIFIED)
     )  # the bound is wanted
     asked = problem(QUADROTOR, quadrotor_box("0.4"), 0.5)
     with_them = cegis.propose(asked)
@@ -239,8 +240,8 @@ def test_counterexamples_are_found_and_good_metrics_pass():
     asked = problem(TWO, TWO_BOX, 1.7)
     good = np.array([[[4.25828, -0.93423], [-0.93423, 3.76692]]])
     none = np.zeros((0, 2))
-    assert counterexample(asked, good, none, (0, 1)).verdict == "proven"
-    assert counterexample(asked, good, np.array([[-1.0, -1.0]]), (1, 0)).verdict == "proven"
+    assert counterexample(asked, good, none, (0, 1)).verdict == "certified"
+    assert counterexample(asked, good, np.array([[-1.0, -1.0]]), (1, 0)).verdict == "certified"
     faster = replace(asked, rate=1.8)
     found = counterexample(faster, good, none, (0, 1))
     assert (found.verdict, found.condition) == ("refuted", "C2")

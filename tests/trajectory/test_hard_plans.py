@@ -159,7 +159,7 @@ def test_many_inputs_are_no_hang(entry):
     B = tuple(tuple(value if i == 16 + j else ZERO for j in range(16)) for i in range(32))
     model = replace(LINEAR, states=names, inputs=tuple(f"u{j}" for j in range(16)), f=(ZERO,) * 32, B=B)
     decision = rank_decision(model, [(Fraction(-1), Fraction(1))] * 32, Effort())
-    assert decision.verdict == "proven"
+    assert decision.verdict == "certified"
     assert len(model.pivots[0]) == 1
 
 
@@ -168,7 +168,7 @@ def test_a_minor_that_is_not_the_only_one_refutes_nothing():
     """Each of x and y vanishes somewhere, both together never: B = (x, y) on a set without the origin."""
     model = replace(LINEAR, B=((x,), (y,)))
     box = [(Fraction(-1), Fraction(1)), (Fraction(1, 2), Fraction(1))]
-    assert rank_decision(model, box, Effort()).verdict == "proven"
+    assert rank_decision(model, box, Effort()).verdict == "certified"
     both = replace(LINEAR, B=((x,), (y - x**2,)))
     assert (
         rank_decision(both, [box[0], (Fraction(-1, 8), Fraction(1))], Effort(budget=2_000)).verdict

@@ -17,6 +17,7 @@ from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.model import TIME
 from tubecert.tube import Containment, containment
+from tubecert.verdict import Verdict
 
 Box = tuple[tuple[Fraction, Fraction], ...]
 Obstacle = Literal["out_of_range", "metric_unbounded", "not_settled"]
@@ -67,7 +68,7 @@ def least_radius(
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
     beyond: Obstacle = "out_of_range"
-    nowhere = Containment(verdict="undecided")
+    nowhere = Containment(verdict=Verdict.UNDECIDED)
     if declared is not None:
         given = needed(*declared)
         if given is None:
@@ -79,7 +80,7 @@ def least_radius(
     contained = check(rho)
     for _ in range(_ROUNDS):
         contained = check(rho)
-        if contained.verdict != "certified":
+        if contained.verdict is not Verdict.CERTIFIED:
             return Radius(rho=rho, lower=None, upper=None, contained=contained)
         a, A = suprema.with_radius(rho).metric_bounds()
         if not (a.below > 0 and math.isfinite(A.above)):

@@ -34,7 +34,6 @@ from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
 from tubecert.trajectory import Plan
-from tubecert.verdict import Verdict
 
 _SAMPLES = 201
 
@@ -108,7 +107,7 @@ def metric_data(spec: Spec, proof: MetricProof) -> MetricData:
     return MetricData(
         rate=metric.rate,
         dual_metric=tuple(map(tuple, canonical(spec)["metric"]["dual_metric"])),
-        verdict=Verdict(proof.verdict),
+        verdict=proof.verdict,
         margin=_printable(proof.margin),
         largest_rate=_printable(proof.largest_rate),
         lower_on_set=_printable(proof.lower_on_set),

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.verdict import Verdict
 
 _BATCH: Final = 1024
 _UNKNOWN: Final = 1e300  # an overestimate of this size tells nothing about its cause
@@ -75,9 +76,9 @@ class Effort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """Whether an objective stays below a threshold everywhere: proven, refuted at a point, or undecided."""
+    """Whether an objective stays below a threshold everywhere: certified, refuted at a point, or undecided."""
 
-    verdict: Literal["proven", "refuted", "undecided"]
+    verdict: Verdict
     at: dict[str, float]
     value: float  # proven below at the witness when refuted, a proven bound from above otherwise
     boxes: int
@@ -89,8 +90,8 @@ def decide(objective: Objective, domain: Domain, threshold: float, effort: Effor
         search = _Search(objective, domain, effort, threshold)
         found = search.run()
     if found.below >= threshold:
-        return Decision(verdict="refuted", at=found.at, value=found.below, boxes=found.boxes)
-    verdict: Literal["proven", "undecided"] = "proven" if found.above < threshold else "undecided"
+        return Decision(verdict=Verdict.REFUTED, at=found.at, value=found.below, boxes=found.boxes)
+    verdict = Verdict.CERTIFIED if found.above < threshold else Verdict.UNDECIDED
     return Decision(verdict=verdict, at=found.at, value=found.above, boxes=found.boxes)
 
 

@@ -27,6 +27,7 @@ from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO, Expression, is_zero
 from tubecert.expression.matrix import Matrix, adjugate, determinant, identity, multiply, transpose
 from tubecert.model import ControlAffineModel, divide
+from tubecert.verdict import Verdict
 
 Box = Sequence[tuple[Fraction, Fraction]]
 _FINEST = 1e-10  # relative to the rate
@@ -44,7 +45,7 @@ class MetricProof:
 
     model: ControlAffineModel
     safe_set: Box
-    verdict: str
+    verdict: Verdict
     failed: MetricDefinite | MetricContraction | MetricKilling | None = None
     at: Witness | None = None
     lower_on_set: Constant | None = None
@@ -68,7 +69,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         return Witness(x=tuple(at.get(name, m) for name, m in zip(model.states, middle, strict=True)))
 
     positive = decide(Definite(model.W), domain, 0.0, effort)
-    if positive.verdict != "proven":
+    if positive.verdict is not Verdict.CERTIFIED:
         return MetricProof(
             model=model,
             safe_set=safe_set,
@@ -83,7 +84,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     proof = MetricProof(
         model=model,
         safe_set=safe_set,
-        verdict="certified",
+        verdict=Verdict.CERTIFIED,
         lower_on_set=Constant(below=float(inverse.lo), above=float(inverse.hi), at=place(largest.at)),
         upper_on_set=Constant(below=upper.below, above=upper.above, at=place(upper.at)),
     )
@@ -104,8 +105,8 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         return proof
     slow = MetricContraction(rate=model.rate, largest_rate=Constant(below=below, above=above))
     if isfinite(above) and Fraction(above) < model.rate:
-        return replace(proof, verdict="refuted", failed=slow, at=place(found.at))
-    return replace(proof, verdict="undecided", failed=slow)
+        return replace(proof, verdict=Verdict.REFUTED, failed=slow, at=place(found.at))
+    return replace(proof, verdict=Verdict.UNDECIDED, failed=slow)
 
 
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
@@ -153,7 +154,8 @@ def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Ef
     for rows in model.pivots[0]:
         pivot = determinant([model.B[i] for i in rows])
         if not any(
-            decide(scalar(sign * pivot), domain, 0.0, replace(effort, budget=2_000)).verdict == "proven"
+            decide(scalar(sign * pivot), domain, 0.0, replace(effort, budget=2_000)).verdict
+            is Verdict.CERTIFIED
             for sign in (1, -1)
         ):
             continue
@@ -177,7 +179,7 @@ def _restrict(a: Matrix, basis: Matrix) -> Matrix:
 
 def _killing(
     model: ControlAffineModel, domain: BoxDomain
-) -> tuple[str, MetricKilling, dict[str, float]] | None:
+) -> tuple[Verdict, MetricKilling, dict[str, float]] | None:
     """None if C3 is proven exactly, else (verdict, what fails, point)."""
     for j, name in enumerate(model.inputs):
         defect = model.killing_defect(j)
@@ -195,6 +197,6 @@ def _killing(
             wrong = np.flatnonzero((value.lo > 0) | (value.hi < 0))
             if len(wrong):
                 at = dict(zip(function.variables, points[wrong[0]].tolist(), strict=True))
-                return "refuted", MetricKilling(input=name, residual=float(value.mid[wrong[0]])), at
-        return "undecided", MetricKilling(input=name), {}
+                return Verdict.REFUTED, MetricKilling(input=name, residual=float(value.mid[wrong[0]])), at
+        return Verdict.UNDECIDED, MetricKilling(input=name), {}
     return None

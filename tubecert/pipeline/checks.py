@@ -8,6 +8,7 @@ from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec
 from tubecert.stages.time import time_of
+from tubecert.verdict import Verdict
 
 
 def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
@@ -24,9 +25,9 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
 def _rank_findings(spec: Spec, effort: Effort) -> list[Finding]:
     """An error where B loses rank, a warning where that is not known."""
     decision = rank_decision(build(spec), spec.safe_set, effort)
-    if decision.verdict == "proven":
+    if decision.verdict is Verdict.CERTIFIED:
         return []
-    refuted = decision.verdict == "refuted"
+    refuted = decision.verdict is Verdict.REFUTED
     place_of = f"B loses rank in the safe set, at {place(decision.at)}"
     return [
         Finding(

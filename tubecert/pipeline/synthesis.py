@@ -101,8 +101,8 @@ class SynthesisRun:
     def run(self, *, sweep: bool) -> Synthesised:
         """The metric that was asked for, or why there is none."""
         rank = rank_decision(self.model, self.spec.safe_set, self.effort)
-        if rank.verdict != "proven":
-            verdict = Verdict.REFUTED if rank.verdict == "refuted" else Verdict.UNDECIDED
+        if rank.verdict is not Verdict.CERTIFIED:
+            verdict = Verdict.REFUTED if rank.verdict is Verdict.REFUTED else Verdict.UNDECIDED
             at = Witness(x=tuple(rank.at.get(name, 0.0) for name in self.model.states)) if rank.at else None
             return self._failed(RankUnproven(), ShrinkSafeSet(), verdict=verdict, at=at)
         rate = self.wanted.rate
@@ -143,7 +143,7 @@ class SynthesisRun:
     def _at_rate(self, metric: VerifiedMetric, rate: Fraction) -> VerifiedMetric | None:
         """The same metric with the rate that was asked for: what it supports beyond is its margin."""
         proof = self._verified(metric, rate)
-        return replace(metric, rate=rate, proof=proof) if proof.verdict == "certified" else None
+        return replace(metric, rate=rate, proof=proof) if proof.verdict is Verdict.CERTIFIED else None
 
     def _verified(self, metric: VerifiedMetric, rate: Fraction) -> MetricProof:
         model = replace(self.model, W=metric.dual_metric, rate=rate)
@@ -239,7 +239,7 @@ class SynthesisRun:
         if proof.failed is not None:
             return self._failed(NotProvenAsWritten(condition=proof.failed), RaiseBudget())
         return Synthesised(
-            verdict=Verdict(proof.verdict),
+            verdict=proof.verdict,
             wanted=self.wanted,
             spec=spec,
             file=metric_file(

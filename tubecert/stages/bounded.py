@@ -27,6 +27,7 @@ from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.stages.tube import TubeFound, radii
 from tubecert.tube import Tube
+from tubecert.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +136,7 @@ def _unbounded(enclosed: Enclosed) -> Stopped | None:
         return None
     at = getattr(enclosed.constants, name).at
     relax = (RaiseBudget(), ShrinkTube())
-    return stopped(enclosed, ConstantBounded(constant=name), "undecided", where=at, relax=relax)
+    return stopped(enclosed, ConstantBounded(constant=name), Verdict.UNDECIDED, where=at, relax=relax)
 
 
 def _undeclared(enclosed: Enclosed) -> Stopped | None:
@@ -150,7 +151,7 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
                 constant=name, declared=declared[name].above, reaches=finite(derived.below)
             )
             relax = (DeclareUncertaintyBound(constant=name, value=finite(derived.above)),)
-            verdict = "refuted" if broken else "undecided"
+            verdict = Verdict.REFUTED if broken else Verdict.UNDECIDED
             return stopped(enclosed, claim, verdict, where=derived.at, relax=relax)
     return None
 

@@ -24,6 +24,7 @@ from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import rank_decision
 from tubecert.spec import canonical
 from tubecert.stages.question import Question, Stopped, stopped
+from tubecert.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +48,13 @@ def prove_metric(question: Question) -> ProvenMetric | Stopped:
     rank = question.memory.recall(
         "rank", _on(question), lambda: rank_decision(model, spec.safe_set, question.effort)
     )
-    if rank.verdict != "proven":
+    if rank.verdict is not Verdict.CERTIFIED:
         return _rank_lost(question, rank)
     proof = question.memory.recall(
         "metric", _on(question), lambda: verify_metric(model, spec.safe_set, question.effort_of("metric"))
     )
     if proof.failed is not None:
-        at = proof.at if proof.verdict == "refuted" else None
+        at = proof.at if proof.verdict is Verdict.REFUTED else None
         return stopped(question, proof.failed, proof.verdict, where=at, relax=_relax(proof), partial=proof)
     if proof.lower_on_set is None or proof.upper_on_set is None:
         raise ValueError("a proven metric has bounds")
@@ -74,7 +75,7 @@ def _rank_lost(question: Question, rank: Decision) -> Stopped:
 
 
 def _relax(proof: MetricProof) -> tuple[Relax, ...]:
-    if proof.verdict == "undecided" and not isinstance(proof.failed, MetricKilling):
+    if proof.verdict is Verdict.UNDECIDED and not isinstance(proof.failed, MetricKilling):
         return (RaiseBudget(), LowerRate())
     if proof.largest_rate is None or not isinstance(proof.failed, MetricContraction):
         return (OtherMetric(),)
@@ -90,7 +91,7 @@ def _declared(question: Question, proof: MetricProof, least: Constant, most: Con
         return stopped(
             question,
             MetricBound(side="lower", declared=metric.lower, reaches=finite(least.above)),
-            "refuted" if Fraction(least.above) < metric.lower else "undecided",
+            Verdict.REFUTED if Fraction(least.above) < metric.lower else Verdict.UNDECIDED,
             where=least.at,
             relax=(DeclareMetricBound(side="lower", value=finite(least.below)),),
             partial=proof,
@@ -99,7 +100,7 @@ def _declared(question: Question, proof: MetricProof, least: Constant, most: Con
         return stopped(
             question,
             MetricBound(side="upper", declared=metric.upper, reaches=finite(most.below)),
-            "refuted" if Fraction(most.below) > metric.upper else "undecided",
+            Verdict.REFUTED if Fraction(most.below) > metric.upper else Verdict.UNDECIDED,
             where=most.at,
             relax=(DeclareMetricBound(side="upper", value=finite(most.above)),),
             partial=proof,

@@ -109,13 +109,11 @@ class Stopped:
 def stopped(
     at: Any,
     claim: Claim,
-    verdict: str,
+    verdict: Verdict,
     *,
     where: Witness | None = None,
     relax: tuple[Relax, ...] = (),
     partial: object = None,
 ) -> Stopped:
     """The end of a certification at a claim that is refuted or undecided."""
-    return Stopped(
-        at=at, reason=Reason(claim=claim, verdict=Verdict(verdict), at=where, relax=relax), partial=partial
-    )
+    return Stopped(at=at, reason=Reason(claim=claim, verdict=verdict, at=where, relax=relax), partial=partial)

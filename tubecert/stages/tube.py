@@ -26,6 +26,7 @@ from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import Room, plan_of
 from tubecert.tube import Containment
+from tubecert.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +53,7 @@ class TubeFound:
     contained: Containment
 
     def __post_init__(self) -> None:
-        if self.contained.verdict != "certified":
+        if self.contained.verdict is not Verdict.CERTIFIED:
             raise ValueError("the tube is not proven to lie in the safe set")
 
     @property
@@ -97,11 +98,11 @@ def find_tube(planned: Planned) -> TubeFound | Stopped:
         return stopped(
             planned,
             TubeRadius(obstacle=radius.obstacle, radius=radius.rho),
-            "undecided",
+            Verdict.UNDECIDED,
             relax=(ReduceInitialError(), DeclareMetricBound(), RaiseBudget()),
         )
     contained = radius.contained
-    if contained.verdict != "certified" or radius.lower is None or radius.upper is None:
+    if contained.verdict is not Verdict.CERTIFIED or radius.lower is None or radius.upper is None:
         return stopped(
             planned,
             _claim(radius),

@@ -28,6 +28,7 @@ from tubecert.synthesis.program import (
     metric_points,
 )
 from tubecert.synthesis.sampling import floats
+from tubecert.verdict import Verdict
 
 ROUTE = "cegis"
 _ROUNDS = 60
@@ -92,7 +93,7 @@ class _Synthesis:
                 if attack.kappa <= self.bound * (1 + 1.1 * self.gap):
                     order = self.attacker.contracting.order
                     judged = counterexample(self.problem, found[1], self.symmetries, order)
-                    if judged.verdict != "refuted":
+                    if judged.verdict is not Verdict.REFUTED:
                         self.best = found
                         return self.answer(True, _words(judged))
                     attack, self.best = self._with_witness(attack, judged), None
@@ -234,6 +235,6 @@ def _new(points: Points, old: Points) -> Points:
 
 
 def _words(judged: Judgement) -> str:
-    if judged.verdict == "proven":
+    if judged.verdict is Verdict.CERTIFIED:
         return "no counterexample, by branch and bound"
     return "no counterexample found within the budget"

@@ -23,6 +23,7 @@ from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.expression.matrix import multiply, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.problem import SynthesisProblem
+from tubecert.verdict import Verdict
 
 _DIGITS = 12
 _EFFORT = Effort(budget=3_000)
@@ -34,7 +35,7 @@ _ALLOWED = 2.5e-4  # of the rate: less than any back-off, and much easier to dec
 class Judgement:
     """Whether C1 and C2 hold; if not, which of them failed and the point (n,) at which it was seen to."""
 
-    verdict: Literal["proven", "refuted", "undecided"]
+    verdict: Verdict
     condition: Literal["", "C1", "C2"] = ""
     at: Array | None = None
 
@@ -51,12 +52,16 @@ def counterexample(
     model = replace(problem.model, W=W, rate=Fraction(problem.rate))
     domain = BoxDomain(dict(zip(model.states, _one_image(problem.safe_set, symmetries, order), strict=True)))
     found = decide(Definite(W), domain, 0.0, _EFFORT)
-    if found.verdict != "proven":
+    if found.verdict is not Verdict.CERTIFIED:
         return _failed("C1", found, problem)
     if len(model.inputs) == len(model.states):
-        return Judgement(verdict="proven")
+        return Judgement(verdict=found.verdict)
     found = decide(_contraction(model), domain, -2 * problem.rate * (1 - _ALLOWED), _EFFORT)
-    return Judgement(verdict="proven") if found.verdict == "proven" else _failed("C2", found, problem)
+    return (
+        Judgement(verdict=found.verdict)
+        if found.verdict is Verdict.CERTIFIED
+        else _failed("C2", found, problem)
+    )
 
 
 def _contraction(model: ControlAffineModel) -> Objective:
