@@ -5,7 +5,7 @@ holds, and held: `check` is its only maker. Who proposed the recipe does not mat
 proofs, here; nothing else may say "certified" (tests/house/test_trust.py).
 
 In: a `TubeProblem` and recipes from anywhere. Out: proofs, or what is missing. Trusted: yes, and it imports nothing
-that is not. Implements: theorems A (26a)-(26c), B and C by what `THEOREMS` lists.
+that is not. Implements: theorems 0, A (26a)-(26c), B and C by what `THEOREMS` lists.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from typing import Any, Final, Generic, NoReturn
 
 import numpy as np
 
-from tubecert.conditions import distance, rates, sampled
+from tubecert.conditions import alone, distance, rates, sampled
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
-from tubecert.conditions.theorem import R, Recipe, Theorem
+from tubecert.conditions.theorem import R, Theorem
 from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded
 from tubecert.enclosure.interval import Interval
 
 THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
-    theorem.recipe: theorem for theorem in (rates.THEOREM, distance.THEOREM, sampled.THEOREM)
+    theorem.recipe: theorem for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM, sampled.THEOREM)
 }
 
 
@@ -115,7 +115,7 @@ def _margins(problem: TubeProblem, recipe: R) -> Mapping[str, Interval]:
     }
 
 
-def _proves(problem: TubeProblem, recipe: Recipe, margins: Mapping[str, Interval]) -> bool:
+def _proves(problem: TubeProblem, recipe: object, margins: Mapping[str, Interval]) -> bool:
     """Whether all that the theorem asks for is proven."""
     theorem = theorem_of(type(recipe))
     sound = not theorem.provisos(problem) and not theorem.unbounded(problem)
@@ -246,7 +246,7 @@ def _ultimate(problem: TubeProblem, decisive: Checked[R], proposal: Proposal[R])
     return check(problem, proposal.companion).ultimate_radius
 
 
-def _same_gains(first: Recipe, second: Recipe) -> bool:
+def _same_gains(first: object, second: object) -> bool:
     """Whether two recipes are about the same loop."""
     names = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
     return all(getattr(first, name, None) == getattr(second, name, None) for name in names)

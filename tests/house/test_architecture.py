@@ -22,6 +22,7 @@ ROOMS = [
     "executor",
     "libraries",
     "verdict",
+    "letters",
     "expression",
     "records",
     "recheck",

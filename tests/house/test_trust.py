@@ -16,6 +16,7 @@ TRUSTED_ROOMS = {
     "claims",
     "records",
     "verdict",
+    "letters",
     "printable",
     "files",
     "expression",

@@ -209,9 +209,10 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
 
 
 def test_the_choices_are_those_of_the_readers():
+    from tubecert.letters import ADAPTIVE, words_of
     from tubecert.spec.plan import KINDS
     from tubecert.spec.settings import RANGES, VERDICTS
-    from tubecert.spec.simulation import CONTROLLERS, GAINS
+    from tubecert.spec.simulation import CONTROLLERS
     from tubecert.spec.synthesis import OBJECTIVES, ROUTES, SOLVERS
 
     properties = SCHEMAS["spec"]["properties"]
@@ -220,7 +221,7 @@ def test_the_choices_are_those_of_the_readers():
     assert set(properties["expect"]["properties"]) == {"verdict", *RANGES}
     simulation = properties["simulation"]["properties"]
     assert simulation["controllers"]["items"]["enum"] == list(CONTROLLERS)
-    assert set(map(str, simulation["gains"]["enum"])) == set(GAINS)
+    assert set(map(str, simulation["gains"]["enum"])) == set(words_of(ADAPTIVE))
     synthesis = properties["metric"]["properties"]["synthesise"]["properties"]
     for key, choices in (("objective", OBJECTIVES), ("route", ROUTES)):
         assert synthesis[key]["enum"] == list(choices)

@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 from tubecert.certificate.effective import Asked, Effective
 from tubecert.claims import Assumption, Outcome, Reason
-from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
@@ -225,7 +224,7 @@ def _recipes() -> dict[str, Any]:
 class Recipes:
     """What proves the gains of each kind that is certified, by the name of its section."""
 
-    of: Mapping[str, Recipe] = field(default_factory=dict, metadata=keyed(_recipes))
+    of: Mapping[str, Any] = field(default_factory=dict, metadata=keyed(_recipes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -65,7 +65,8 @@ def _numbers(result: Result) -> Iterator[tuple[str, float]]:
         yield "rho", float(result.tube.rho)
     pair = next(iter(result.deciding().values()), None)
     if pair is not None:
-        yield "bandwidth", float(pair.bandwidth)
+        if pair.bandwidth is not None:
+            yield "bandwidth", float(pair.bandwidth)
         if pair.adaptation_rate is not None:
             yield "adaptation_rate", float(pair.adaptation_rate)
     sampled = result.sections.get(SAMPLED.key)

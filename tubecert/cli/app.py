@@ -14,7 +14,7 @@ from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
 from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
 from tubecert.errors import ExitCode
-from tubecert.kinds import NAMES
+from tubecert.letters import ALL, words_of
 
 # ClickException: typer has a click of its own, or uses click's
 _USAGE: type[Exception] = typer.BadParameter.__mro__[2]
@@ -64,9 +64,8 @@ app = typer.Typer(
 )
 
 
-# which certificates must hold: one choice per kind
-Conditions = StrEnum("Conditions", [(n.key, n.option) for n in NAMES] + [("all", "all")])  # type: ignore[misc]
-_DECIDES = Conditions(NAMES[0].option)
+# which certificates must hold: each kind by its letter or its word
+Conditions = StrEnum("Conditions", [(word, word) for word in (*words_of(), ALL)])  # type: ignore[misc]
 
 
 class Formulas(StrEnum):
@@ -100,8 +99,12 @@ def certify(
         Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
     ] = None,
     conditions: Annotated[
-        Conditions, typer.Option(help="Which certificates decide the verdict; all are always computed.")
-    ] = _DECIDES,
+        Conditions | None,
+        typer.Option(
+            help="Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
+            show_default=False,
+        ),
+    ] = None,
     formulas: Annotated[
         Formulas, typer.Option(help="Corrected formulas, or the paper's own (proves nothing).")
     ] = Formulas.CORRECTED,

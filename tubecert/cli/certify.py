@@ -43,7 +43,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert.report import progress
 
     started, clock = datetime.now(UTC), time.perf_counter()
-    words: dict[str, Any] = {"conditions": str(given["conditions"]), "formulas": str(given["formulas"])}
+    words: dict[str, Any] = {"formulas": str(given["formulas"])}
+    if given["conditions"] is not None:
+        words["conditions"] = str(given["conditions"])
     options = pipeline.Options(**numbers, **words, metric=given["metric"])
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:

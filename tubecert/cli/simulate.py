@@ -19,6 +19,7 @@ from tubecert.cli.report import open_certificate, read_certificate
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding
+from tubecert.letters import DISTANCE, name_of
 from tubecert.libraries import versions
 from tubecert.report.terminal import Terminal
 
@@ -119,7 +120,7 @@ def _wishes(
     from tubecert.spec import Simulation
 
     default = system.simulation or Simulation()
-    gains = (given["gains"] and str(given["gains"])) or default.gains or "distance"
+    gains = name_of(str(given["gains"] or default.gains or DISTANCE.option)).option
     adaptive = KINDS[gains].controller
     values = dict(numbers)
     if values["control_rate"] is None:

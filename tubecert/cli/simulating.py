@@ -10,7 +10,7 @@ import typer
 
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Output, SpecFile, number_option, with_output
-from tubecert.kinds import NAMES
+from tubecert.letters import ADAPTIVE, words_of
 
 _AFTER = """\b
 Examples:
@@ -25,8 +25,8 @@ left the tube; 2 invalid input; 4 no result, or no tube to leave; 130 interrupte
 """
 
 
-# whose gains: one choice per kind
-Source = StrEnum("Source", [(name.key, name.option) for name in NAMES])  # type: ignore[misc]
+# whose gains: each kind that has any, by its letter or its word
+Source = StrEnum("Source", [(word, word) for word in words_of(ADAPTIVE)])  # type: ignore[misc]
 
 
 def register(app: typer.Typer) -> None:

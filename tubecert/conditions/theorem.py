@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
-from typing import Any, Generic, Protocol, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
@@ -18,23 +18,11 @@ Margins = Mapping[str, Interval]
 """By condition, shape `(len(recipes),)`: (allowed - needed)/allowed, a proven lower end and what it can be at most."""
 
 
-class Recipe(Protocol):
-    """The gains that a claim is about, and the auxiliary numbers of its proof, as exact decimals."""
+R = TypeVar("R")
+"""A recipe: the gains that a claim is about, and the auxiliary numbers of its proof, as exact decimals.
 
-    @property
-    def bandwidth(self) -> Fraction:
-        """omega, in rad/s."""
-
-    @property
-    def predictor_gain(self) -> Fraction | None:
-        """The g of A_m = -g I; None for another A_m."""
-
-    @property
-    def projection_radius(self) -> Fraction:
-        """R_H, in units of the input."""
-
-
-R = TypeVar("R", bound=Recipe)
+Where the loop has a predictor A_m = -g I its gain g is called `predictor_gain`, and None stands for another A_m.
+"""
 
 _AUXILIARY = ("speed", "prediction_error", "uncertainty")  # bounds, which may be 0; all else are gains
 
@@ -74,7 +62,7 @@ class Theorem(Generic[R]):
         if type(recipe) is not self.recipe:
             return False
         numbers = {item.name: getattr(recipe, item.name) for item in fields(cast("Any", recipe))}
-        g = numbers.pop("predictor_gain")
+        predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
         sizes = [value for name, value in numbers.items() if name in _AUXILIARY]
         gains = [
             *(value for name, value in numbers.items() if name not in _AUXILIARY),
@@ -83,7 +71,7 @@ class Theorem(Generic[R]):
         signed = all(isinstance(x, Fraction) and x > 0 for x in gains) and all(
             isinstance(x, Fraction) and x >= 0 for x in sizes
         )
-        return signed and self._fits(problem, g)
+        return signed and (not predicts or self._fits(problem, g))
 
     def _fits(self, problem: TubeProblem, g: Fraction | None) -> bool:
         """Whether -g I (None: the matrix A_m) is the predictor of the problem, or free to be chosen."""

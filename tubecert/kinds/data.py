@@ -19,16 +19,19 @@ from tubecert.enclosure.interval import Interval
 from tubecert.kinds import Name
 from tubecert.verdict import Verdict
 
-Role = Literal["asked", "least_bandwidth", "least_adaptation", "longest_sample"]
+Role = Literal["feedback", "asked", "least_bandwidth", "least_adaptation", "longest_sample"]
 _BEYOND = 1e300  # larger margins are not told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """One set of gains with its own margins, by condition; rows of different sets never mix."""
+    """One set of gains with its own margins, by condition; rows of different sets never mix.
+
+    Without a bandwidth it is the feedback alone.
+    """
 
     role: Role
-    bandwidth: Fraction
+    bandwidth: Fraction | None
     margins: Mapping[str, Constant]
     adaptation_rate: Fraction | None = None
     sample_time: Fraction | None = None

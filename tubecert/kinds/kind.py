@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar, Generic
 
 from tubecert.claims import GainsSuffice
@@ -38,6 +39,11 @@ class Section(ABC, Generic[R]):
     def at(self, role: str) -> Checked[R] | None:
         """The gains in a role, if there are any."""
         return self.decisive if role == self.judgement.role else self.judgement.beside.get(role)
+
+    @property
+    def predictor_gain(self) -> Fraction | None:
+        """g of the decisive gains; None for another predictor, or none."""
+        return None if self.decisive is None else getattr(self.decisive.recipe, "predictor_gain", None)
 
     @property
     def proof(self) -> Proof[R] | None:

@@ -6,12 +6,13 @@ from typing import Any, Final
 
 from tubecert.conditions.problem import TubeProblem
 from tubecert.kinds import name_of
+from tubecert.kinds.alone import Alone
 from tubecert.kinds.distance import Distance
 from tubecert.kinds.kind import Kind
 from tubecert.kinds.rates import Rates
 from tubecert.kinds.sampled import Sampled
 
-KINDS: Final[tuple[Kind[Any], ...]] = (Rates(), Distance(), Sampled())
+KINDS: Final[tuple[Kind[Any], ...]] = (Alone(), Rates(), Distance(), Sampled())
 
 
 def kind_of(word: str) -> Kind[Any]:
@@ -21,5 +22,5 @@ def kind_of(word: str) -> Kind[Any]:
 
 
 def needed_by_all(problem: TubeProblem) -> frozenset[str]:
-    """The constants without which no kind can say anything, by field name."""
-    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in KINDS))
+    """The constants without which no kind with adaptation can say anything, by field name."""
+    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in KINDS if kind.name.adapts))

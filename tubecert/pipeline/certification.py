@@ -11,6 +11,7 @@ from tubecert.certificate.result import Result
 from tubecert.claims import MendPlan, Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
+from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import KINDS
 from tubecert.pipeline.reasons import reasons
@@ -80,7 +81,7 @@ def judge(bounded: Bounded) -> Judged:
 
 def explain(judged: Judged) -> Explanation:
     """What the gains depend on, and why the verdict is what it is."""
-    problem, printed = judged.bounded.problem, [KINDS[0].key] if judged.as_printed else []
+    problem, printed = judged.bounded.problem, [RATES.key] if judged.as_printed else []
     explained = {
         kind.key: PROPOSERS[kind.theorem.recipe].explain(problem, _least(judged.sections[kind.key]))
         for kind in KINDS

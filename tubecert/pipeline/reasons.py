@@ -34,9 +34,7 @@ def reasons(section: Section[Any], halved: Mapping[str, float]) -> list[Reason]:
     """Reasons of one kind: what its gains leave, or what is missing."""
     if section.verdict is Verdict.CERTIFIED:
         return [_certified(section, halved)]
-    pair = section.decisive
-    gain = None if pair is None else pair.recipe.predictor_gain
-    return _short(section.name.key, section.verdict, section.shortfalls, gain)
+    return _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
 
 
 def _certified(section: Section[Any], halved: Mapping[str, float]) -> Reason:

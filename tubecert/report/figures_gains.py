@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 from itertools import groupby
 
 from tubecert.certificate.result import Result
@@ -19,7 +20,7 @@ from tubecert.report.numbers import exact, short
 from tubecert.report.page import Figure
 from tubecert.words.conditions import equation
 
-STYLES = {"conditions_26": "a", "distance": "b", "sampled": "c"}
+STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b", "sampled": "c"}
 _LOWEST = -0.5  # margins below are not drawn
 _MOST = 12  # constants shown
 
@@ -36,12 +37,11 @@ def _trade_off(result: Result) -> Figure | None:
         for key, section in result.sections.items()
         if key in NAMES and not isinstance(section, SampledData)
     }
-    chosen = [(row, row.pair.adaptation_rate) for row in rows(result)]
     return _curves(
         "trade-off",
         "Adaptation rate against bandwidth",
         curves,
-        [(row, (float(row.pair.bandwidth), float(rate))) for row, rate in chosen if rate is not None],
+        [(row, at) for row in rows(result) if (at := _place(row, row.pair.adaptation_rate)) is not None],
         label="adaptation rate Γ",
         caption="Every point of a curve is a proven pair.",
     )
@@ -51,15 +51,20 @@ def _sample_time(result: Result) -> Figure | None:
     section = result.sections.get(SAMPLED.key)
     if section is None:
         return None
-    chosen = [(row, row.pair.sample_time) for row in rows(result)]
     return _curves(
         "sample-time",
         "Sample time against bandwidth",
         {SAMPLED.key: list(section.points())},
-        [(row, (float(row.pair.bandwidth), float(time))) for row, time in chosen if time is not None],
+        [(row, at) for row in rows(result) if (at := _place(row, row.pair.sample_time)) is not None],
         label="sample time (s)",
         caption="The longest sample time that is proven to serve at each bandwidth.",
     )
+
+
+def _place(row: Gains, other: Fraction | None) -> Point | None:
+    """Where a row is drawn: its bandwidth, and its rate or its sample time."""
+    bandwidth = row.pair.bandwidth
+    return None if bandwidth is None or other is None else (float(bandwidth), float(other))
 
 
 def _curves(
@@ -124,9 +129,10 @@ def _margin_figure(result: Result, section: str, around: Around) -> Figure:
         legend.append((style, equation(condition) if several else NAMES[section]))
     rate = around.adaptation_rate
     row = next(r for r in rows(result) if r.section == section and r.pair.adaptation_rate == rate)
-    chart.rule(float(row.pair.bandwidth), "chosen")
-    chosen = f"{row.which}: ω = {exact(row.pair.bandwidth)} rad/s"
-    legend += [("chosen", chosen), ("fails", "does not hold")]
+    if row.pair.bandwidth is not None:
+        chart.rule(float(row.pair.bandwidth), "chosen")
+        legend.append(("chosen", f"{row.which}: ω = {exact(row.pair.bandwidth)} rad/s"))
+    legend.append(("fails", "does not hold"))
     caption = (
         f"With the adaptation rate kept at Γ = {exact(rate)}; each value is proven for its own bandwidth."
     )

@@ -31,7 +31,8 @@ class Gains:
 
     def text(self, *, titled: bool = False) -> str:
         """The gains for the verdict line, with their certificate's name if there are several."""
-        parts = [f"omega = {exact(self.pair.bandwidth)} rad/s"]
+        omega = self.pair.bandwidth
+        parts = ["feedback alone" if omega is None else f"omega = {exact(omega)} rad/s"]
         if self.pair.adaptation_rate is not None:
             parts.append(f"Gamma = {exact(self.pair.adaptation_rate)}")
         if self.pair.sample_time is not None:
@@ -40,6 +41,8 @@ class Gains:
 
     def words(self) -> str:
         """The gains in a sentence."""
+        if self.pair.bandwidth is None:
+            return "its feedback and no adaptation"
         loop = f"a filter bandwidth of {exact(self.pair.bandwidth)} rad/s"
         if self.pair.sample_time is not None:
             return f"{loop} and adaptation every {exact(self.pair.sample_time)} s"

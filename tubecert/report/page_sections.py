@@ -64,7 +64,10 @@ def _tiles(result: Result) -> Iterator[Tile]:
     chosen = deciding(result)
     for row in chosen:
         who = f", {NAMES[row.section]}" if len(chosen) > 1 else ""
-        yield Tile(symbol="ω", value=exact(row.pair.bandwidth), unit="rad/s", words=f"filter bandwidth{who}")
+        if row.pair.bandwidth is not None:
+            yield Tile(
+                symbol="ω", value=exact(row.pair.bandwidth), unit="rad/s", words=f"filter bandwidth{who}"
+            )
         if row.pair.adaptation_rate is not None:
             yield Tile(
                 symbol="Γ", value=exact(row.pair.adaptation_rate), unit="", words=f"adaptation rate{who}"
@@ -121,6 +124,7 @@ def _gains(result: Result) -> Iterator[Block]:
         NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
     ]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
+    yield from (Words(text=line) for line in sections.without_adaptation(result))
     if (limit := sections.sample_time_limit(result)) is not None:
         yield Words(text=f"However large the bandwidth, C needs a sample time below {down(limit)} s.")
     yield from _reasons(result, certified=True)

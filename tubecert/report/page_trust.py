@@ -36,6 +36,7 @@ def proven(result: Result) -> Iterator[str]:
 
 
 _CLAIMS = {
+    "no_adaptation": "the feedback alone, without adaptation, keeps the state in the tube.",
     "conditions_26": "the conditions (26a), (26b) and (26c), corrected, hold at its gains.",
     "distance": "the Riemannian distance to the plan stays below its bound at its gains.",
     "sampled": "the same with adaptation in samples, at its sample time.",

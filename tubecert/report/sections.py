@@ -15,7 +15,8 @@ from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.certificate.result import Bound, MetricData, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness
-from tubecert.kinds import SAMPLED
+from tubecert.kinds import ALONE, SAMPLED
+from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
@@ -126,7 +127,19 @@ def _gains(result: Result) -> list[RenderableType]:
         NAMES[key] for key in NAMES if key in result.sections and all(row.section != key for row in found)
     ]
     body += [Text(f"{title}: no gains were found") for title in missing]
+    body += [Text(line) for line in without_adaptation(result)]
     return body + _limit(result)
+
+
+def without_adaptation(result: Result) -> Iterator[str]:
+    """What adaptation is for: how much uncertainty the feedback alone can take in this tube."""
+    section, h = result.sections.get(ALONE.key), result.constants.get("h")
+    if not isinstance(section, AloneData) or h is None or h.above is None:
+        return
+    limit = (
+        "no |h|" if section.uncertainty_limit is None else f"every |h| < {down(section.uncertainty_limit)}"
+    )
+    yield f"In this tube the feedback alone can take {limit}; the uncertainty has |h| <= {up(h.above)}."
 
 
 def gain_columns(row: Gains) -> tuple[Fraction | None, Fraction | None, Fraction | None]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
 
+from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
@@ -48,6 +49,7 @@ class Explained:
 
 
 PROPOSERS: Final[Mapping[type, Proposer]] = {
+    NoGains: Proposer(propose=lambda problem, asked: Proposal(decisive=NoGains(), role="feedback")),
     RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
     DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
     SampledRecipe: Proposer(propose=propose_sampled),

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.kinds import DISTANCE, RATES, SAMPLED, Name
+from tubecert.kinds import ALONE, DISTANCE, RATES, SAMPLED, Name
 from tubecert.simulate.certified import Certified, Values
 from tubecert.simulate.loops import Controller
 
@@ -92,15 +92,17 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
     if section is None:
         return None
     recipe = section.recipe
-    radius = recipe["projection_radius"]  # R_H
     k = certified["feedback_gain"] * certified.reach  # (2.3) |k| <= du dbar
     bounds = {
         "distance": certified.reach,  # d(x*, x) < dbar
         "deviation": certified.rho,  # 1.4 (i)
         "k": k,
-        "u": certified["u_star"] + k + radius,  # (0.4), |u_a| <= R_H
-        "sigma_error": certified["h"] + radius,  # (2.10)
+        "u": certified["u_star"] + k,  # (0.4)
     }
+    if kind.name.adapts:
+        radius = recipe["projection_radius"]  # R_H
+        bounds["u"] += radius  # |u_a| <= R_H
+        bounds["sigma_error"] = certified["h"] + radius  # (2.10)
     error = kind.prediction_error(certified, recipe)
     if error is not None:
         bounds["xtilde"] = error
@@ -132,6 +134,14 @@ def _error_of_speed(certified: Certified, recipe: Values) -> float | None:
     reach = certified["h"] + recipe["projection_radius"]
     square = 2 * reach * s1 / (2 * recipe["predictor_gain"]) + reach**2
     return math.sqrt(square / recipe["adaptation_rate"])
+
+
+def _decay_alone(certified: Certified, recipe: Values) -> Decay:
+    """Theorem 0: (2.15) with nothing filtered away, H0 = S = Dh."""
+    del recipe
+    return Decay(
+        bandwidth=2 * certified.rate, first=certified["h"], rest=certified["h"], **_common(certified)
+    )
 
 
 def _decay_of_distance(certified: Certified, recipe: Values) -> Decay:
@@ -169,6 +179,12 @@ KINDS: Final[Mapping[str, Kind]] = {
     kind.name.option: kind
     for kind in (
         Kind(
+            name=ALONE,
+            controller="ccm",
+            prediction_error=_nothing,
+            decay=_decay_alone,
+        ),
+        Kind(
             name=RATES,
             controller="l1",
             prediction_error=_error_of_paper,
@@ -192,4 +208,5 @@ PREFERRED: Final = (
     DISTANCE.option,
     SAMPLED.option,
     RATES.option,
+    ALONE.option,
 )  # where the kind that was asked for is not about the loop

@@ -31,7 +31,11 @@ def canonical(spec: Spec) -> dict[str, Any]:
             "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),
             "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
         },
-        "conditions": {} if spec.kernel is None else {"kernel": spec.kernel},
+        "conditions": {
+            name: value
+            for name, value in (("kernel", spec.kernel), ("decides", spec.decides))
+            if value is not None
+        },
     }
     if spec.metric is not None:
         data["metric"] = _metric(spec)

@@ -12,7 +12,14 @@ from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
-from tubecert.spec.settings import read_adaptation, read_expectation, read_kernel, read_name, read_tube
+from tubecert.spec.settings import (
+    read_adaptation,
+    read_decides,
+    read_expectation,
+    read_kernel,
+    read_name,
+    read_tube,
+)
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty, wanted_metric
@@ -133,6 +140,7 @@ def _read_named(
         tube=tube,
         adaptation=adaptation,
         kernel=kernel,
+        decides=read_decides(entries.get("conditions")),
         expect=expect,
         obstacles=obstacles,
         simulation=simulation,

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Final, Literal
 
 from tubecert.expression import number_text
+from tubecert.letters import ALL, name_of, words_of
 from tubecert.spec import codes
 from tubecert.spec.algebra import is_positive_definite
 from tubecert.spec.document import Scalar
@@ -118,9 +119,18 @@ def _read_projection(field: Field | None, names: Names) -> tuple[Fraction | None
     return smooth, smooth is not None
 
 
+def read_decides(field: Field | None) -> str | None:
+    """The certificate that decides, by its option; None if it is not said."""
+    entries = field.mapping(optional=("kernel", "decides")) if field else None
+    if entries is None or "decides" not in entries:
+        return None
+    word = entries["decides"].word((*words_of(), ALL))
+    return word if word is None or word == ALL else name_of(word).option
+
+
 def read_kernel(field: Field | None) -> tuple[Literal["tight", "paper"] | None, bool]:
     """The kernel of the conditions, and whether what is written is sound."""
-    entries = field.mapping(optional=("kernel",)) if field else {}
+    entries = field.mapping(optional=("kernel", "decides")) if field else {}
     if entries is None:
         return None, False
     if "kernel" not in entries:

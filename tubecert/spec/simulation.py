@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Final
 
+from tubecert.letters import ADAPTIVE, name_of, words_of
 from tubecert.spec import codes
 from tubecert.spec.names import Names
 from tubecert.spec.obstacles import read_plane
@@ -13,7 +14,6 @@ from tubecert.spec.types import Simulation, Trajectory
 
 KEYS: Final = ("controllers", "gains", "duration", "runs", "seed", "control_rate", "plane", "h")
 CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1", "sampled")
-GAINS: Final = ("26", "distance", "sampled")
 MAX_RUNS: Final = 1_000_000
 MAX_SEED: Final = 2**63 - 1
 
@@ -28,7 +28,7 @@ def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) 
     h = entries.get("h")
     found = Simulation(
         controllers=_controllers(entries.get("controllers")),
-        gains=entries["gains"].word(GAINS) if "gains" in entries else None,
+        gains=_gains(entries.get("gains")),
         duration=_duration(entries.get("duration"), plan, names),
         runs=_whole(entries.get("runs"), names, least=1, most=MAX_RUNS),
         seed=_whole(entries.get("seed"), names, least=0, most=MAX_SEED),
@@ -39,6 +39,12 @@ def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) 
         h=h.terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input") if h else None,
     )
     return found if len(field.reader.findings) == before else None
+
+
+def _gains(field: Field | None) -> str | None:
+    """The kind whose gains are taken, by its word."""
+    word = field.word(words_of(ADAPTIVE)) if field else None
+    return None if word is None else name_of(word).option
 
 
 def _controllers(field: Field | None) -> tuple[str, ...]:

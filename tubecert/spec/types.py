@@ -251,6 +251,7 @@ class Spec:
     tube: Tube
     adaptation: Adaptation
     kernel: Literal["tight", "paper"] | None
+    decides: str | None
     expect: Expectation | None
     obstacles: tuple[Obstacle, ...] = ()
     simulation: Simulation | None = None

@@ -11,8 +11,10 @@ from tubecert.conditions.problem import Formulas
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import overall
+from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import KINDS, kind_of
+from tubecert.letters import ALL
 from tubecert.stages.bounded import Bounded
 from tubecert.stages.question import Question
 from tubecert.verdict import Verdict
@@ -33,8 +35,11 @@ class Judged:
     @property
     def deciding(self) -> tuple[str, ...]:
         """The kinds that the verdict is about, by key."""
-        chosen = self.question.options.conditions
-        return tuple(kind.key for kind in KINDS) if chosen == "all" else (kind_of(chosen).key,)
+        question = self.question
+        chosen = question.options.conditions or question.spec.decides or RATES.option
+        return (
+            tuple(kind.key for kind in KINDS if kind.name.adapts) if chosen == ALL else (kind_of(chosen).key,)
+        )
 
     @property
     def as_printed(self) -> bool:

@@ -19,8 +19,8 @@ class Options:
     rho_a: Fraction | None = None
     epsilon: Fraction | None = None
     metric: Path | None = None
-    conditions: str = "26"
     formulas: Literal["corrected", "as-printed"] = "corrected"
+    conditions: str | None = None
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     gap: Fraction = Fraction(1, 100)

@@ -12,6 +12,7 @@ SECTIONS: Mapping[str, str] = {name.key: str(name) for name in kinds.NAMES}
 
 # what a set of gains is chosen for, in the order in which they are shown
 ROLES: Mapping[Role, str] = {
+    "feedback": "feedback alone",
     "asked": "asked for",
     "least_bandwidth": "least omega",
     "least_adaptation": "least Gamma",
@@ -28,12 +29,17 @@ NAMES: Mapping[str, str] = {
 }
 
 # the quantity that the only condition of a certificate bounds
-SHOWN: Mapping[str, str] = {"distance": "sup D(t)", "sampled": "sup D(t), sampled"}
+SHOWN: Mapping[str, str] = {
+    "no_adaptation": "sup D(t), feedback alone",
+    "distance": "sup D(t)",
+    "sampled": "sup D(t), sampled",
+}
 
 SAYS: Mapping[str, str] = {
     "26a": "the initial error and the filter's share must fit into rho_r",
     "26b": "the metric's lower bound must exceed zeta_2 + zeta_3",
     "26c": "the adaptation rate must make up for the estimation error",
+    "no_adaptation": "the feedback alone must keep the distance below dbar",
     "distance": "the distance bound sup D(t) must stay below dbar",
     "sampled": "the distance bound with sampled adaptation must stay below dbar",
     "initial_distance": "d0, the length of the segment to the start, must be below dbar = sqrt(a) rho",
