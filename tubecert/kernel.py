@@ -20,7 +20,7 @@ from tubecert.conditions import alone, distance, rates, sampled
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
-from tubecert.conditions.theorem import R, Theorem
+from tubecert.conditions.theorem import R, Recipe, Theorem
 from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded
 from tubecert.enclosure.interval import Interval
 
@@ -115,7 +115,7 @@ def _margins(problem: TubeProblem, recipe: R) -> Mapping[str, Interval]:
     }
 
 
-def _proves(problem: TubeProblem, recipe: object, margins: Mapping[str, Interval]) -> bool:
+def _proves(problem: TubeProblem, recipe: Recipe, margins: Mapping[str, Interval]) -> bool:
     """Whether all that the theorem asks for is proven."""
     theorem = theorem_of(type(recipe))
     sound = not theorem.provisos(problem) and not theorem.unbounded(problem)

@@ -180,7 +180,7 @@ def test_the_command_line_starts_with_typer_errors_and_names_only():
             if isinstance(node, (ast.Import, ast.ImportFrom)):
                 names |= imported(node)
         own = {name for name in names if name.startswith("tubecert")}
-        light = ("tubecert.cli", "tubecert.errors", "tubecert.printable", "tubecert.kinds")
+        light = ("tubecert.cli", "tubecert.errors", "tubecert.printable", "tubecert.letters")
         assert all(name.startswith(light) for name in own), own
         foreign = {name.split(".")[0] for name in names - own} - set(sys.stdlib_module_names)
         assert foreign <= ALLOWED_AT_START

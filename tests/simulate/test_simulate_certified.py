@@ -17,6 +17,7 @@ from tubecert.claims import MetricDefinite, Reason
 from tubecert.cli.report import open_certificate
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.letters import ADAPTIVE, NAMES, words_of
 from tubecert.model import build
 from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted, certified_plan, require_tube
@@ -24,7 +25,6 @@ from tubecert.simulate.grid import computer
 from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
 from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
-from tubecert.spec.simulation import GAINS
 from tubecert.verdict import Verdict
 
 
@@ -240,10 +240,11 @@ def test_a_control_period_longer_than_the_sample_time_is_located():
 
 
 def test_kinds_are_named_alike_everywhere():
-    assert set(KINDS) == {item.value for item in Source} == set(GAINS) == set(PREFERRED)
+    assert set(KINDS) == {name.option for name in NAMES} == set(PREFERRED)
+    assert {item.value for item in Source} == set(words_of(ADAPTIVE))
     assert all(kind.name.option == key for key, kind in KINDS.items())
     _, result = certified("two_state", "0.4")
-    assert {kind.name.key for kind in KINDS.values()} == set(result.proof.of)
+    assert {kind.name.key for kind in KINDS.values() if kind.name.adapts} == set(result.proof.of)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated import Failure, certified, runs, setting
 
-from tubecert.simulate.certified import Values, read_numbers
+from tubecert.simulate.certified import Section, Values, read_numbers
 from tubecert.simulate.compare import compare
 from tubecert.simulate.promise import KINDS, promise
 from tubecert.simulate.uncertainty import class_of
@@ -25,13 +25,18 @@ def numbers():
         "B_pinv_x plan_defect plan_defect_metric drift_on_plan M_x"
     )
     constants = Values({name: 0.3 + 0.11 * i for i, name in enumerate(names.split())})
-    return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants)
+    alone = Section(
+        certified=True, recipe=Values(), ultimate=None
+    )  # its class is too large to be certified there
+    sections = {**own.sections, "no_adaptation": alone}
+    return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants, sections=sections)
 
 
 @pytest.mark.parametrize("key", KINDS)
 def test_bounds_are_those_of_the_theory(numbers, key):
     c, recipe = numbers.constants, numbers.sections[KINDS[key].name.key].recipe
-    R_H, kmax = recipe["projection_radius"], c["feedback_gain"] * 0.4
+    kmax = c["feedback_gain"] * 0.4
+    R_H = recipe["projection_radius"] if KINDS[key].name.adapts else 0.0
     expected = {
         "distance": 0.4,
         "deviation": 0.7,
@@ -39,6 +44,8 @@ def test_bounds_are_those_of_the_theory(numbers, key):
         "u": c["u_star"] + kmax + R_H,
         "sigma_error": c["h"] + R_H,
     }
+    if key == "none":
+        del expected["sigma_error"]
     if key == "26":
         expected["xtilde"] = c["prediction_error"] / recipe["adaptation_rate"] ** 0.5
     if key == "distance":
@@ -46,6 +53,13 @@ def test_bounds_are_those_of_the_theory(numbers, key):
         V = (2 * (c["h"] + R_H) * s1 / q + (c["h"] + R_H) ** 2) / recipe["adaptation_rate"]  # (2.11)
         expected["xtilde"] = V**0.5
     assert promise(numbers, KINDS[key]).bounds == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_decay_without_adaptation(numbers):
+    c, t = numbers.constants, np.linspace(0, 5, 50)
+    pushed = (c["metric_input_gain"] * c["h"] + c["plan_defect_metric"]) / numbers.rate
+    expected = pushed + (c["initial_distance"] - pushed) * np.exp(-numbers.rate * t)
+    assert promise(numbers, KINDS["none"]).decay(t) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("h_initial", [0.1, 5.0])

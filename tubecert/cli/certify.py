@@ -43,9 +43,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert.report import progress
 
     started, clock = datetime.now(UTC), time.perf_counter()
-    words: dict[str, Any] = {"formulas": str(given["formulas"])}
-    if given["conditions"] is not None:
-        words["conditions"] = str(given["conditions"])
+    words: dict[str, Any] = {
+        name: str(given[name]) for name in ("conditions", "formulas") if given[name] is not None
+    }
     options = pipeline.Options(**numbers, **words, metric=given["metric"])
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:

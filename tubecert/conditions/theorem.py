@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from fractions import Fraction
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -18,11 +18,16 @@ Margins = Mapping[str, Interval]
 """By condition, shape `(len(recipes),)`: (allowed - needed)/allowed, a proven lower end and what it can be at most."""
 
 
-R = TypeVar("R")
-"""A recipe: the gains that a claim is about, and the auxiliary numbers of its proof, as exact decimals.
+class Recipe(Protocol):
+    """The gains that a claim is about, and the auxiliary numbers of its proof: a dataclass of exact decimals.
 
-Where the loop has a predictor A_m = -g I its gain g is called `predictor_gain`, and None stands for another A_m.
-"""
+    Where the loop has a predictor A_m = -g I its gain g is called `predictor_gain`, and None stands for another A_m.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+
+R = TypeVar("R", bound=Recipe)
 
 _AUXILIARY = ("speed", "prediction_error", "uncertainty")  # bounds, which may be 0; all else are gains
 

@@ -145,7 +145,7 @@ def read_numbers(result: Result) -> Certified:
 
 
 def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Section:
-    numbers = {item.name: getattr(recipe, item.name) for item in fields(recipe)}  # type: ignore[arg-type]
+    numbers = {item.name: getattr(recipe, item.name) for item in fields(recipe)}
     certified = found is not None and found.verdict is Verdict.CERTIFIED
     return Section(
         certified=certified and result.formulas == "corrected",

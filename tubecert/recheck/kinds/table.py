@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from tubecert.recheck.kinds.alone import Alone
 from tubecert.recheck.kinds.distance import Distance
 from tubecert.recheck.kinds.kind import Kind
 from tubecert.recheck.kinds.rates import Rates
 from tubecert.recheck.kinds.sampled import Sampled
 
-KINDS: Final[tuple[Kind[Any, Any], ...]] = (Rates(), Distance(), Sampled())
+KINDS: Final[tuple[Kind[Any, Any], ...]] = (Alone(), Rates(), Distance(), Sampled())
 KEYS: Final = tuple(kind.key for kind in KINDS)
 CONDITIONS: Final = tuple(condition for kind in KINDS for condition in kind.conditions)

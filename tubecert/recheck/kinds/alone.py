@@ -1,0 +1,126 @@
+"""Certificate 0: the feedback alone, without adaptation. Implements: theory 4a, theorem 0."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+from tubecert.recheck.balls import Ball, exact, larger, root
+from tubecert.recheck.conditions import Setting, margin
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Node
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.examination import Claim
+from tubecert.recheck.kinds import printed
+from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
+from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section
+from tubecert.recheck.metric import stated
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AloneSection(Section):
+    """The margin of dbar; an enclosure of sup D; below which |h| the theorem holds."""
+
+    margin: Enclosure | None
+    distance: Enclosure
+    uncertainty_limit: Fraction | None
+    ultimate_radius: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
+class NoGains:
+    """The recipe of theorem 0: there is nothing to choose."""
+
+
+class Alone(Kind[AloneSection, NoGains]):
+    """Certificate 0."""
+
+    key: ClassVar = "no_adaptation"
+    conditions: ClassVar = ("no_adaptation",)
+
+    def read(self, node: Node, n: int) -> AloneSection:
+        """The section `no_adaptation`."""
+        del n
+        own = node.closed(
+            "verdict", "margin", "distance", "uncertainty_limit", "ultimate_radius", "shortfalls"
+        )
+        found = AloneSection(
+            verdict=own["verdict"].word(*VERDICTS),
+            margin=own.known("margin", enclosure),
+            distance=enclosure(own["distance"]),
+            uncertainty_limit=own.known("uncertainty_limit", Node.number),
+            ultimate_radius=own.known("ultimate_radius", Node.number),
+            shortfalls=printed.read_shortfalls(own["shortfalls"]),
+        )
+        if found.verdict == "certified" and found.margin is None:
+            raise node.refused("is certified without a margin")
+        return found
+
+    def read_recipe(self, node: Node) -> NoGains:
+        """Nothing."""
+        node.closed()
+        return NoGains()
+
+    def said(self, section: AloneSection) -> dict[str, object]:
+        """The margin."""
+        return {} if section.margin is None else {"margins": {self.key: section.margin.below}}
+
+    def claims(self, section: AloneSection, recipe: NoGains | None, ground: Ground) -> Iterator[Claim]:
+        """The margin if it is certified; the bound of the distance and the largest uncertainty in any case."""
+        setting, top, limit = ground.setting, section.distance.above, section.uncertainty_limit
+        if section.verdict == "certified":
+            yield ground.claim(
+                "0: sup D < dbar without adaptation",
+                (section, recipe),
+                lambda: _holds(section, recipe, setting),
+            )
+        if top is not None:
+            yield ground.claim(
+                f"0: sup D <= {float(top):.6g} without adaptation",
+                (top,),
+                lambda: at_most(supremum(setting, setting.n.h), top, "sup D without adaptation"),
+            )
+        if limit is not None:
+            yield ground.claim(
+                f"0: without adaptation for |h| < {float(limit):.6g}",
+                (limit,),
+                lambda: _serves(limit, setting),
+            )
+
+
+def settled(setting: Setting, h: Ball) -> Ball:
+    """A1 of (4.0) for |h| <= h."""
+    n = setting.n
+    return (n.metric_input_gain * h + n.plan_defect_metric) / setting.rate
+
+
+def supremum(setting: Setting, h: Ball) -> Ball:
+    """sup D of (4.0) over the horizon: at one of its ends."""
+    d0, A1 = setting.n.initial_distance, settled(setting, h)
+    if setting.horizon is None:
+        return larger(d0, A1)
+    left = (-setting.rate * setting.horizon).exp()
+    return larger(d0, d0 * left + A1 * (1 - left))
+
+
+def _holds(section: AloneSection, recipe: NoGains | None, setting: Setting) -> Outcome:
+    """Theorem 0 with the margin and the radius printed."""
+    shown, radius = section.margin, section.ultimate_radius
+    if recipe is None or shown is None:
+        return stated(False, "it has no recipe")
+    own = margin_at_least(
+        margin(setting, supremum(setting, setting.n.h)), shown, "the distance without adaptation"
+    )
+    if radius is None:
+        return own
+    last = settled(setting, setting.n.h) / root(setting.n.lower)
+    return all_of((own, at_most(last, radius, "the ultimate radius")))
+
+
+def _serves(limit: Fraction, setting: Setting) -> Outcome:
+    """Whatever |h| is below the limit, sup D < dbar: D rises with h, and d0 < dbar by itself."""
+    started = stated(bool(setting.n.initial_distance < setting.reach), "d0 is not below dbar")
+    reached = at_most(supremum(setting, exact(limit)) / setting.reach, Fraction(1), "sup D/dbar at that |h|")
+    return all_of((started, reached))
