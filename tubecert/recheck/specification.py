@@ -384,7 +384,9 @@ def _loop(adaptation: Node, conditions: Node, n: int) -> Loop:
     own, chosen = adaptation.closed("A_m", "projection"), conditions.closed(optional=("kernel", "decides"))
     A_m, projection = own["A_m"], own["projection"]
     kernel = chosen.get("kernel", lambda item: item.word("tight", "paper"))
-    chosen.get("decides", lambda item: item.word(*_DECIDES))  # the certificate says itself which sections decide
+    chosen.get(
+        "decides", lambda item: item.word(*_DECIDES)
+    )  # the certificate says itself which sections decide
     return Loop(
         A_m=None if A_m.value == "auto" else _square(A_m, n),
         smooth=None if projection.value == "hard" else _positive(projection.closed("smooth")["smooth"]),

@@ -1,0 +1,82 @@
+"""Certificate 0 is examined: what it prints is proven again, and each planted fault is refused."""
+
+import copy
+
+import pytest
+from rechecked import CONFIGS, certified, examine, failing, sealed
+
+from tubecert.errors import TubecertError
+
+CALM = (
+    (CONFIGS / "two_state_orbit.yaml")
+    .read_text("utf-8")
+    .replace("-2*sin(2*t) - 0.1*norm(x1, x2)", "0.2*sin(2*t)")
+)
+
+
+def refused(document):
+    """Whether a forged certificate is not confirmed: not of the form, or a claim that does not hold."""
+    try:
+        return bool(failing(examine(sealed(document))))
+    except TubecertError:
+        return True
+
+
+@pytest.fixture(scope="module")
+def calm():
+    """A class so small that the feedback alone holds the tube."""
+    return certified(CALM, conditions="none")
+
+
+@pytest.mark.slow
+def test_the_feedback_alone_is_certified_and_confirmed(calm):
+    section = calm["result"]["no_adaptation"]
+    assert (calm["result"]["verdict"], section["verdict"]) == ("certified", "certified")
+    assert calm["result"]["decided_by"] == ["no_adaptation"]
+    assert calm["result"]["proof"]["no_adaptation"] == {}
+    assert not failing(examine(calm))
+    h = calm["result"]["constants"]["h"]
+    assert section["uncertainty_limit"] > h["above"]
+
+
+FAULTS = {
+    "margin": lambda s: s.update(margin=[s["margin"][0] * 1.001, s["margin"][1] * 1.001]),
+    "distance": lambda s: s.update(distance=[s["distance"][0] * 0.9, s["distance"][1] * 0.999]),
+    "limit": lambda s: s.update(uncertainty_limit=s["uncertainty_limit"] * 1.0001),
+    "radius": lambda s: s.update(
+        ultimate_radius=s["ultimate_radius"] * 0.99 if s["ultimate_radius"] else 0.01
+    ),
+    "no margin": lambda s: s.update(margin=None),
+    "unknown": lambda s: s.update(bandwidth=10),
+    "shortfalls": lambda s: s.update(
+        shortfalls=[{"condition": "x", "margin": [0, 1], "allowed": 1, "needed": 1, "missing": 0}]
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_planted_fault_is_refused(calm, fault):
+    forged = copy.deepcopy(calm)
+    FAULTS[fault](forged["result"]["no_adaptation"])
+    assert refused(forged)
+
+
+@pytest.mark.slow
+def test_what_it_prints_is_examined_where_another_kind_decides(calm):
+    other = certified(CALM, conditions="B")
+    assert not failing(examine(other))
+    forged = copy.deepcopy(other)
+    forged["result"]["no_adaptation"]["uncertainty_limit"] *= 1.01
+    assert refused(forged)
+
+
+@pytest.mark.slow
+def test_a_recipe_is_needed_and_is_empty(calm):
+    for change in (
+        lambda proof: proof.pop("no_adaptation"),
+        lambda proof: proof["no_adaptation"].update(speed="1"),
+    ):
+        forged = copy.deepcopy(calm)
+        change(forged["result"]["proof"])
+        assert refused(forged)
