@@ -224,7 +224,7 @@ def _recipes() -> dict[str, Any]:
 class Recipes:
     """What proves the gains of each kind that is certified, by the name of its section."""
 
-    of: Mapping[str, Any] = field(default_factory=dict, metadata=keyed(_recipes))
+    of: Mapping[str, object] = field(default_factory=dict, metadata=keyed(_recipes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -377,7 +377,7 @@ def read_wanted(node: Node) -> Wanted:
     return Wanted(own.get("rate", _positive), own.get("condition_number", _positive))
 
 
-_DECIDES = ("none", "26", "distance", "sampled", "all")
+_DECIDES = ("0", "A", "B", "C", "all")
 
 
 def _loop(adaptation: Node, conditions: Node, n: int) -> Loop:

@@ -120,12 +120,12 @@ def _read_projection(field: Field | None, names: Names) -> tuple[Fraction | None
 
 
 def read_decides(field: Field | None) -> str | None:
-    """The certificate that decides, by its option; None if it is not said."""
+    """The certificate that decides, by its letter, or all; None if it is not said."""
     entries = field.mapping(optional=("kernel", "decides")) if field else None
     if entries is None or "decides" not in entries:
         return None
     word = entries["decides"].word((*words_of(), ALL))
-    return word if word is None or word == ALL else name_of(word).option
+    return word if word is None or word == ALL else name_of(word).letter
 
 
 def read_kernel(field: Field | None) -> tuple[Literal["tight", "paper"] | None, bool]:
