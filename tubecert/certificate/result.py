@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from tubecert.certificate.effective import Asked, Effective
 from tubecert.claims import Assumption, Outcome, Reason
+from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
@@ -216,7 +217,7 @@ def _sections() -> dict[str, type[SectionData]]:
     return {kind.key: kind.form for kind in KINDS}
 
 
-def _recipes() -> dict[str, Any]:
+def _recipes() -> dict[str, type[Recipe]]:
     return {kind.key: kind.theorem.recipe for kind in KINDS}
 
 
@@ -224,7 +225,7 @@ def _recipes() -> dict[str, Any]:
 class Recipes:
     """What proves the gains of each kind that is certified, by the name of its section."""
 
-    of: Mapping[str, object] = field(default_factory=dict, metadata=keyed(_recipes))
+    of: Mapping[str, Recipe] = field(default_factory=dict, metadata=keyed(_recipes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -66,7 +66,7 @@ class Theorem(Generic[R]):
         """
         if type(recipe) is not self.recipe:
             return False
-        numbers = {item.name: getattr(recipe, item.name) for item in fields(cast("Any", recipe))}
+        numbers = {item.name: getattr(recipe, item.name) for item in fields(self.recipe)}
         predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
         sizes = [value for name, value in numbers.items() if name in _AUXILIARY]
         gains = [
