@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import sqrt
+from math import isfinite, sqrt
 from typing import Any
 
 from tubecert.certificate.result import Result
@@ -93,8 +93,13 @@ def explain(judged: Judged) -> Explanation:
     ]
     return Explanation(
         reasons=_advised(judged, told),
-        elasticities={key: each.slopes for key, each in explained.items() if each.slopes is not None},
+        elasticities={key: _told(each.slopes) for key, each in explained.items() if each.slopes is not None},
     )
+
+
+def _told(slopes: Mapping[str, float]) -> dict[str, float]:
+    """What a search says of slopes, as far as it is numbers."""
+    return {name: slope for name, slope in slopes.items() if isfinite(slope)}
 
 
 def _least(section: Section[Any]) -> object:
