@@ -264,6 +264,21 @@ class NothingFound(Failure):
     last: Outcome | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoneCertified(Failure):
+    """Metrics were found at `compared` rates from `slowest` to `fastest`, and none certifies.
+
+    `slow` and `fast` are the claims that ended the certifications with them.
+    """
+
+    tag: ClassVar[str] = "none_certified"
+    compared: int
+    slowest: Fraction
+    fastest: Fraction
+    slow: Claim
+    fast: Claim
+
+
 # -- what became of an attempt to find a metric
 
 

@@ -187,6 +187,24 @@ class MetricRow:
     rho: float | None = None
     ultimate_radius: float | None = None
     adaptation_rate: float | None = None
+    bandwidth: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateLimit:
+    """What is against another rate; there `factor` times the gains would be needed."""
+
+    rate: Fraction
+    cause: Literal["distance", "overshoot", "gains", "no_metric", "idle", "input_gain", "tube"]
+    factor: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateLimits:
+    """What is against slower and against faster rates than the one that was chosen."""
+
+    slower: RateLimit | None = None
+    faster: RateLimit | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +227,8 @@ class SynthesisData:
     attempts: tuple[AttemptData, ...]
     rate: Fraction | None = None
     table: tuple[MetricRow, ...] = ()
+    limits: RateLimits | None = None
+    cut: Literal["deadline", "interrupted"] | None = None
     solver: SolverData | None = None
     reason: Reason | None = None
 

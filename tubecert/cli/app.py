@@ -12,7 +12,7 @@ import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising
 from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
-from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Deadline, Output, SpecFile, number_option, with_output
 from tubecert.errors import ExitCode
 from tubecert.letters import ALL, words_of
 
@@ -118,6 +118,7 @@ def certify(
         str, number_option("--gap", "Relative width at which a constant is sharp enough.")
     ] = "1/100",
     budget: Budget = None,
+    deadline: Deadline = None,
     output: Annotated[
         str | None,
         typer.Option(

@@ -15,7 +15,7 @@ from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, read_certificate, write_pages
-from tubecert.cli.targets import plan_of, refused, spare
+from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
 from tubecert.libraries import versions
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Certify; `given` holds the options by the names of their parameters."""
     numbers = _numbers(given)
+    deadline = numbers.pop("deadline", None)
     target = _target(given)
     pages = _pages(given, target)
     from tubecert import spec
@@ -49,7 +50,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     options = pipeline.Options(**numbers, **words, metric=given["metric"])
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        result = pipeline.certify(system, options, report)
+        result = pipeline.certify(system, options, report, deadline=deadline_after(deadline))
     sealed = certificate.seal(result.to_json(), _record(started, time.perf_counter() - clock))
     if target != certificate.STDOUT:
         certificate.write(target, sealed)
@@ -64,7 +65,7 @@ def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
     values: dict[str, Any] = {
-        name: numbers.positive(flag(name), given[name]) for name in ("rho_a", "epsilon")
+        name: numbers.positive(flag(name), given[name]) for name in ("rho_a", "epsilon", "deadline")
     }
     for name in ("bandwidth", "adaptation_rate"):
         values[name] = numbers.gain(flag(name), given[name])

@@ -57,6 +57,11 @@ def number_option(flag: str, help: str) -> object:
 
 Budget = Annotated[str | None, number_option("--budget", "Boxes examined per claim before giving up.")]
 
+Deadline = Annotated[
+    str | None,
+    number_option("--deadline", "Seconds after which the best metric found so far is taken."),
+]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:

@@ -11,9 +11,10 @@ from tubecert import certificate
 from tubecert.cli.options import Numbers, Output, flag
 from tubecert.cli.places import OptionPlace
 from tubecert.cli.presenting import present
-from tubecert.cli.targets import plan_of, refused, spare
+from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding
+from tubecert.kinds import DISTANCE
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.synthesis import solver_name
@@ -21,13 +22,15 @@ from tubecert.spec.synthesis import solver_name
 if TYPE_CHECKING:
     from tubecert.pipeline import Synthesised
 
+_DECIDES = DISTANCE.option  # what metrics are compared by
+
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Synthesise; `given` holds the options by the names of their parameters."""
     numbers = Numbers()
     values = {
         name: numbers.positive(flag(name), given[name])
-        for name in ("rate", "condition_number", "rho_a", "epsilon")
+        for name in ("rate", "condition_number", "rho_a", "epsilon", "deadline")
     }
     budget = numbers.count("--budget", given["budget"])
     numbers.check()
@@ -45,13 +48,19 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert import pipeline
     from tubecert.report import progress
 
-    options = pipeline.Options(rho_a=values["rho_a"], epsilon=values["epsilon"])
+    options = pipeline.Options(rho_a=values["rho_a"], epsilon=values["epsilon"], conditions=_DECIDES)
     if budget is not None:
         options = replace(options, budget=budget)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         found = pipeline.synthesise(
-            system, wanted, options, report, sweep=bool(given["sweep"] or given["plot"])
+            system,
+            wanted,
+            options,
+            report,
+            sweep=bool(given["sweep"] or given["plot"]),
+            deadline=deadline_after(values["deadline"]),
+            told=lambda so_far: _tell(so_far, system, terminal, output),
         )
     if found.file is not None and target != certificate.STDOUT:
         certificate.write(target, found.file.to_json())
@@ -60,7 +69,17 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 
         certificate.write_text(given["plot"], draw(found.data().table))
     _report(found, system, target, output)
+    if found.cut == "interrupted":
+        return ExitCode.INTERRUPTED
     return found.verdict.exit_code
+
+
+def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) -> None:
+    """The verdict, before advice is looked for."""
+    from tubecert.report import synthesis
+
+    if not output.quiet:
+        terminal.show(synthesis.verdict_line(found.data(), found.file, system.name))
 
 
 def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -> Synthesis:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Deadline, Output, SpecFile, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -84,6 +84,7 @@ def synth(
     rho_a: Annotated[str | None, number_option("--rho-a", "Overrides tube.rho_a.")] = None,
     epsilon: Annotated[str | None, number_option("--epsilon", "Overrides tube.epsilon.")] = None,
     budget: Budget = None,
+    deadline: Deadline = None,
     output: Annotated[
         str | None,
         typer.Option(

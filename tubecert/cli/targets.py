@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.spec import Spec
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from tubecert.pipeline import Deadline
 
 _REMEDY = "choose another file with -o FILE"
 
@@ -24,6 +29,13 @@ def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
     for what, source in inputs.items():
         if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
             raise refused(f"{target} is the {what} itself and would be overwritten")
+
+
+def deadline_after(seconds: Fraction | None) -> Deadline | None:
+    """When a search has to come to an end, so many seconds from now."""
+    from tubecert.pipeline import Deadline
+
+    return None if seconds is None else Deadline.after(float(seconds))
 
 
 def plan_of(given: Mapping[str, Any], system: Spec) -> Path | None:

@@ -7,9 +7,11 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | stage after stage, with what planners and searches propose |
 | `reasons` | why a verdict about gains is what it is |
-| `synthesis`, `synthesised` | a metric where none is given: objectives, the sweep over rates, why there is none |
+| `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
+| `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from tubecert.certificate.result import Result
@@ -19,17 +21,18 @@ from tubecert.findings import Severity
 from tubecert.model import domain_findings
 from tubecert.pipeline.certification import answer, result
 from tubecert.pipeline.checks import inspect, missing_parts
+from tubecert.pipeline.deadline import Deadline
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options, Progress, Step, overridden
 from tubecert.stages.question import Question, Stopped
-from tubecert.stages.result import Stage
 from tubecert.stages.time import time_of
 from tubecert.synthesis.bridge import required
 
 __all__ = [
+    "Deadline",
     "Memory",
     "Options",
     "Progress",
@@ -43,16 +46,24 @@ __all__ = [
 
 
 def certify(
-    spec: Spec, options: Options, progress: Progress | None = None, memory: Memory | None = None
+    spec: Spec,
+    options: Options,
+    progress: Progress | None = None,
+    memory: Memory | None = None,
+    *,
+    deadline: Deadline | None = None,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
-    With a `memory` that is shared between calls, what does not depend on what changed is not proven again.
+    With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
+    a metric that is looked for is by then the best that was found.
     """
     question = question_of(spec, options, progress, memory)
     if question.spec.metric is not None or spec.synthesis is None:
         return result(answer(question))
-    found = synthesise(spec, spec.synthesis, options, progress)
+    found = synthesise(spec, spec.synthesis, options, progress, deadline=deadline)
+    if found.cut == "interrupted":
+        raise KeyboardInterrupt
     question = replace(question, spec=found.spec or question.spec, synthesis=found.data())
     return result(answer(question) if found.reason is None else Stopped(at=question, reason=found.reason))
 
@@ -78,10 +89,19 @@ def question_of(
 
 
 def synthesise(
-    spec: Spec, wanted: Synthesis, options: Options, progress: Progress | None = None, *, sweep: bool = False
+    spec: Spec,
+    wanted: Synthesis,
+    options: Options,
+    progress: Progress | None = None,
+    *,
+    sweep: bool = False,
+    deadline: Deadline | None = None,
+    told: Callable[[Synthesised], None] | None = None,
 ) -> Synthesised:
     """A proven metric for a specification, or why there is none; with `sweep` others over a range of rates beside it.
 
+    `told` hears why there is none before advice is looked for. At the `deadline`, and at an interruption, the best that
+    was proven by then is what comes out (`Synthesised.cut`).
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
     required(wanted.solver)
@@ -90,9 +110,5 @@ def synthesise(
     findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
-    return SynthesisRun(spec, wanted, options, _answered, progress).run(sweep=sweep)
-
-
-def _answered(spec: Spec, options: Options) -> Stage | Stopped:
-    """How a certification of a candidate ends."""
-    return answer(question_of(spec, options))
+    run = SynthesisRun(spec, wanted, options, question_of, progress, deadline=deadline, told=told)
+    return run.run(sweep=sweep)

@@ -8,11 +8,11 @@ text that a metric file will hold, and is what its proof is about.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from math import isfinite, sqrt
-from typing import Any
+from math import inf
+from typing import Any, Literal
 
 from tubecert.certificate.metric_file import metric_file
 from tubecert.certificate.result import SolverData
@@ -21,12 +21,14 @@ from tubecert.claims import (
     AskForRateBelow,
     AskForRateUpTo,
     ConditionNumber,
+    EnlargeSafeSet,
     Failure,
     GiveInput,
     HigherDegree,
     LowerDegree,
     LowerRate,
     MetricFound,
+    NoneCertified,
     NothingFound,
     NotProvenAsWritten,
     NotWritable,
@@ -35,51 +37,70 @@ from tubecert.claims import (
     RaiseConditionNumber,
     RankUnproven,
     Reason,
+    ReduceRadii,
     Relax,
     ShrinkSafeSet,
+    TubeInSafeSet,
 )
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
-from tubecert.kinds import DISTANCE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
+from tubecert.pipeline.candidates import judged_row
+from tubecert.pipeline.climb import Climb, slow_scale
+from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.records import exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
-from tubecert.stages.judged import Judged
+from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options, Progress, Step
-from tubecert.stages.question import Stopped
-from tubecert.stages.result import Stage
+from tubecert.stages.question import Question
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, suggested
 from tubecert.synthesis.ladder import Ladder, Request, digits_below
-from tubecert.synthesis.problem import Floor
+from tubecert.synthesis.problem import FLOORS, Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
-_RATES = 6  # of the first sweep
-_REFINED = 3  # times, about the best row
-_ROUGH = 1.25  # factor to which the largest rate is known for a sweep: the best rate is far below it
-_SHARE = 0.97  # of the largest rate: where the sweep ends
-_COARSE = Options(gap=Fraction(1, 20), conditions="distance", budget=200_000)
+_RATES = 5  # of a sweep
+_GAP = Fraction(1, 5)  # to which constants are known where metrics are compared
+_BOXES = 100_000  # and what each claim may cost there
 
-Answer = Callable[[Spec, Options], Stage | Stopped]
+Ask = Callable[[Spec, Options, Progress, Memory], Question]
+Told = Callable[["Synthesised"], None]
 
 
 class SynthesisRun:
-    """One synthesis: its ladder, and the certifications that metrics are compared by."""
+    """One synthesis: its ladder, and the certifications that metrics are compared by.
+
+    `ask` makes a question of a specification; `told` hears a verdict before advice is looked for.
+    """
 
     def __init__(
-        self, spec: Spec, wanted: Synthesis, options: Options, answer: Answer, progress: Progress | None
+        self,
+        spec: Spec,
+        wanted: Synthesis,
+        options: Options,
+        ask: Ask,
+        progress: Progress | None,
+        *,
+        deadline: Deadline | None = None,
+        told: Told | None = None,
     ) -> None:
-        self.spec, self.wanted, self.options, self.answer = spec, wanted, options, answer
+        self.spec, self.wanted, self.options, self.ask = spec, wanted, options, ask
         self.model = build(replace(spec, metric=None))
-        self.progress = progress
-        self.effort = Effort(gap=float(options.gap), budget=options.budget)
+        self.progress, self.told = progress, told
+        self.deadline = deadline or Deadline()
+        self.memory = Memory()
+        whole_way = wanted.objective in ("adaptation", "tube")
+        budget = min(options.budget, _BOXES) if whole_way and wanted.rate is None else options.budget
+        self.effort = Effort(
+            gap=float(options.gap), budget=budget, progress=lambda *bounds: self.deadline.check()
+        )
         self.limit = None if wanted.condition_number is None else float(wanted.condition_number)
         self.ladder = Ladder(
             Request(
@@ -94,8 +115,9 @@ class SynthesisRun:
                 progress=self._tell,
             )
         )
-        self.rows: list[Row] = []
-        self.fails: Fraction | None = None  # the least rate that was compared and had no metric
+        self.rows: dict[tuple[Fraction, Floor, int], Row] = {}
+        self.climb = Climb(self._compare, wanted.objective)
+        self.cut: Literal["deadline", "interrupted"] | None = None
         self.said = 0
 
     def run(self, *, sweep: bool) -> Synthesised:
@@ -115,11 +137,31 @@ class SynthesisRun:
             best = self._best()
         except FamilyError as error:  # what C3 forbids
             return self._failed(error.failure, OtherVariables())
+        except (OutOfTime, KeyboardInterrupt) as end:
+            best = self._so_far(end)
         if best is None:
             return self._explained()
-        if sweep and not self.rows:
+        if sweep and not self.rows and not self.cut:
             self._sweep(best.rate)
         return self._written(best)
+
+    def _so_far(self, end: BaseException) -> VerifiedMetric | None:
+        """The best of what is proven when the search is cut short; an interruption goes on if there is nothing."""
+        self.deadline = Deadline()
+        wanted, self.cut = self.wanted, "deadline" if isinstance(end, OutOfTime) else "interrupted"
+        if wanted.objective in ("adaptation", "tube"):
+            found = self._chosen()
+        else:
+            proven = [metric for metric in self.ladder.proven if self._allowed(metric)]
+            if wanted.rate is not None:
+                proven = [metric for metric in proven if metric.rate >= wanted.rate]
+                found = min(proven, key=lambda metric: metric.condition_number.above, default=None)
+                found = found and self._at_rate(found, wanted.rate)
+            else:
+                found = max(proven, key=lambda metric: metric.rate, default=None)
+        if found is None and not isinstance(end, OutOfTime):
+            raise end
+        return found
 
     # -- objectives ------------------------------------------------------------------------------------------------
 
@@ -156,19 +198,14 @@ class SynthesisRun:
         """The metric whose certification comes out best, over rates and over what is bounded from below."""
         self._certifiable()
         if self.wanted.rate is not None:
-            self._compared([self.wanted.rate])
+            self.climb.at(self.wanted.rate)
         else:
-            top = self.ladder.largest_rate(self.limit, sharp=_ROUGH)
-            if top is None:
-                return None
-            self._sweep(top.rate)
-            for _ in range(_REFINED):
-                best = min(self.rows, key=lambda row: row.score(objective), default=None)
-                if best is not None:
-                    self._compared(self._around(best.rate), (best.floor,))
-        if not self.rows:
-            return None
-        return min(self.rows, key=lambda row: row.score(objective)).metric
+            self.climb.run(slow_scale(self.model, self.spec))
+        return self._chosen()
+
+    def _chosen(self) -> VerifiedMetric | None:
+        best = self.climb.best
+        return None if best is None else best.metric
 
     def _certifiable(self) -> None:
         """Raises `SpecError` if the end cannot be judged: what `certify` needs is missing."""
@@ -178,30 +215,20 @@ class SynthesisRun:
         if missing:
             raise SpecError(missing)
 
-    def _sweep(self, top: Fraction) -> None:
-        last = _SHARE * float(top)
-        self._compared([digits_below(last * (k + 1) / _RATES, 3) for k in range(_RATES)])
+    def _sweep(self, last: Fraction) -> None:
+        for k in range(_RATES):
+            for floor in FLOORS:
+                self._compare(digits_below(last / 2**k, 3), floor, full=True)
 
-    def _compared(self, rates: Sequence[Fraction], floors: tuple[Floor, ...] = ("identity", "input")) -> None:
-        done = {(row.rate, row.floor) for row in self.rows}
-        for rate in rates:
-            for floor in floors:
-                if (rate, floor) in done:
-                    continue
-                metric = self.ladder.metric(rate, floor)
-                if metric is None or not self._allowed(metric):
-                    self.fails = min(rate, self.fails or rate)
-                else:
-                    self.rows.append(self._row(metric, floor))
-
-    def _around(self, best: Fraction) -> list[Fraction]:
-        """Rates halfway between the best one and its neighbours, and one beyond all if the best is the last."""
-        rates = sorted({row.rate for row in self.rows})
-        i = rates.index(best)
-        neighbours = [rates[k] for k in (i - 1, i + 1) if 0 <= k < len(rates)]
-        if best == rates[-1]:
-            neighbours.append(best + 2 * (best - rates[i - 1]) if self.fails is None else self.fails)
-        return [digits_below((best + other) / 2, 3) for other in neighbours]
+    def _compare(self, rate: Fraction, floor: Floor, full: bool) -> Row | None:
+        """A row for a metric of this rate; None if there is none."""
+        metric = self.ladder.metric(rate, floor, 0.0 if full else inf if self.limit is None else self.limit)
+        if metric is None or (floor == "identity" and not self._allowed(metric)):
+            return None
+        key = rate, floor, metric.family.degree
+        if key not in self.rows:
+            self.rows[key] = self._row(metric, floor)
+        return self.rows[key]
 
     def _row(self, metric: VerifiedMetric, floor: Floor) -> Row:
         row = Row(
@@ -216,10 +243,21 @@ class SynthesisRun:
             return row
         try:
             spec = self._with(metric)
-        except SpecError:  # too long to be written: the last choice, see `_written`
+        except SpecError:  # too long to be written, see `_written`
             return row
         self._tell(f"rate {float(metric.rate):.4g}: certifying")
-        return _judged(row, self.answer(spec, _COARSE))
+        options = replace(
+            self.options,
+            gap=max(self.options.gap, _GAP),
+            budget=min(self.options.budget, _BOXES),
+            metric=None,
+        )
+        return judged_row(row, self.ask(spec, options, self._watch, self.memory))
+
+    def _watch(self, step: Step) -> None:
+        self.deadline.check()
+        if self.progress is not None:
+            self.progress(step)
 
     # -- outcomes ---------------------------------------------------------------------------------------------------
 
@@ -245,9 +283,14 @@ class SynthesisRun:
             file=metric_file(
                 dict(zip(spec.states, spec.safe_set, strict=True)), metric_data(spec, proof), _solver(metric)
             ),
-            rows=tuple(sorted(self.rows, key=lambda row: (row.rate, row.floor))),
+            rows=self._table(),
             attempts=tuple(self.ladder.attempts),
+            limits=self.climb.limits(),
+            cut=self.cut,
         )
+
+    def _table(self) -> tuple[Row, ...]:
+        return tuple(sorted(self.rows.values(), key=lambda row: (row.rate, row.floor, row.degree)))
 
     def _failed(
         self,
@@ -261,8 +304,9 @@ class SynthesisRun:
             verdict=verdict,
             wanted=self.wanted,
             reason=Reason(claim=claim, verdict=verdict, at=at, relax=relax),
-            rows=tuple(self.rows),
+            rows=self._table(),
             attempts=tuple(self.ladder.attempts),
+            cut=self.cut,
         )
 
     def _explained(self) -> Synthesised:
@@ -277,7 +321,22 @@ class SynthesisRun:
                     RaiseConditionNumber(to=number),
                     LowerRate(),
                 )
+        if (failure := self._none_certified()) is not None:
+            relax = (ReduceRadii(), EnlargeSafeSet()) if isinstance(failure.slow, TubeInSafeSet) else ()
+            return self._failed(failure, *relax)
+        if self.told is not None:
+            self.told(self._failed(self._tried()))
         return self._failed(self._tried(), *self._remedies(rate))
+
+    def _none_certified(self) -> NoneCertified | None:
+        """That metrics were found, and what each of them lacks; None if none was found."""
+        rows = [row for row in self._table() if row.claim is not None and row.floor == "identity"]
+        claims = [row.claim for row in rows if row.claim is not None]
+        if not claims:
+            return None
+        return NoneCertified(
+            compared=len(rows), slowest=rows[0].rate, fastest=rows[-1].rate, slow=claims[0], fast=claims[-1]
+        )
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""
@@ -300,11 +359,12 @@ class SynthesisRun:
             remedies.append(HigherDegree(degree=self.wanted.degree))
         if rate is not None:
             self._tell("looking for a rate that works")
-            lower = self.ladder.lower_rate(rate)
+            cheap = self.ladder.cheap()
+            lower = cheap.lower_rate(rate)
             if lower is not None:
                 remedies.append(AskForRateUpTo(rate=lower))
             self._tell("looking for a box that works")
-            box = self.ladder.smaller_box(rate)
+            box = cheap.smaller_box(rate)
             if box is not None:
                 remedies.append(ShrinkSafeSet(factor=float(box), rate=rate))
         return remedies or [LowerRate(), ShrinkSafeSet()]
@@ -326,6 +386,7 @@ class SynthesisRun:
         ]
 
     def _tell(self, words: str) -> None:
+        self.deadline.check()
         if self.progress is not None:
             self.said += 1
             self.progress(Step(name=f"synthesis, {words}", boxes=self.said, unit="steps"))
@@ -345,22 +406,3 @@ def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
         "rate": exact_json(metric.rate),
         "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],
     }
-
-
-def _judged(row: Row, end: Stage | Stopped) -> Row:
-    """The row with what a certification with its metric came to."""
-    if isinstance(end, Stopped):
-        return replace(row, verdict=end.reason.verdict)
-    if not isinstance(end, Judged):
-        raise TypeError("a certification ends in a verdict")
-    problem, distance = end.bounded.problem, end.sections[DISTANCE.key]
-    least = distance.at("least_adaptation")
-    gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
-    return replace(
-        row,
-        verdict=end.verdict,
-        input_gain=gain / sqrt(lower) if isfinite(gain) else None,
-        rho=float(problem.rho),
-        ultimate_radius=distance.judgement.ultimate_radius,
-        adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
-    )

@@ -8,11 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import inf, isfinite
+from typing import Literal
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.result import AttemptData, MetricRow, SynthesisData
-from tubecert.claims import Reason
+from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SynthesisData
+from tubecert.claims import Claim, Reason
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
 from tubecert.synthesis.ladder import Attempt
@@ -23,9 +24,11 @@ from tubecert.verdict import Verdict
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One metric of a sweep.
+    """One metric of a comparison.
 
-    `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form.
+    `verdict` is that of the kinds that decide, `claim` what failed; `served`: certificate B holds, whatever decides.
+    `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form. `bandwidth` and
+    `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate or sampling frequency.
     """
 
     rate: Fraction
@@ -33,20 +36,34 @@ class Row:
     degree: int
     condition_number: float
     verdict: Verdict | None = None
+    claim: Claim | None = None
+    served: bool = False
     input_gain: float | None = None
     rho: float | None = None
     ultimate_radius: float | None = None
     adaptation_rate: float | None = None
+    bandwidth: float | None = None
+    demand: float = inf
     metric: VerifiedMetric = field(repr=False)
 
+    @property
+    def counts(self) -> bool:
+        """Whether something is certified with it."""
+        return self.verdict is Verdict.CERTIFIED or self.served
+
+    @property
+    def idle(self) -> bool:
+        """Whether the filter that it needs is slower than its own contraction: what is gained beyond is not needed."""
+        return self.bandwidth is not None and self.bandwidth < self.rate
+
     def score(self, objective: str) -> tuple[float, ...]:
-        """Smaller is better; what is not certified comes last."""
+        """Smaller is better: certified, then by B alone, then not at all."""
+        rank = 0 if self.verdict is Verdict.CERTIFIED else 1 if self.served else 2
         if objective == "tube":
-            wanted = (_or_inf(self.rho), _or_inf(self.ultimate_radius))
-        else:
-            wanted = (_or_inf(self.adaptation_rate), 0.0)
-        certified = self.verdict is Verdict.CERTIFIED
-        return (*wanted, self.condition_number) if certified else (inf, inf, self.condition_number)
+            return (rank, _or_inf(self.rho), _or_inf(self.ultimate_radius), self.condition_number)
+        if self.idle:
+            return (rank, 1, float(self.rate), self.condition_number)
+        return (rank, 0, self.demand, self.condition_number)
 
     def data(self) -> MetricRow:
         """As certificates and reports hold it."""
@@ -60,6 +77,7 @@ class Row:
             rho=self.rho,
             ultimate_radius=self.ultimate_radius,
             adaptation_rate=self.adaptation_rate,
+            bandwidth=self.bandwidth,
         )
 
 
@@ -68,7 +86,8 @@ class Synthesised:
     """What became of a synthesis.
 
     `verdict`: certified (then `spec` has the metric and `file` is the metric file's content), refuted (no metric has
-    the rate, or B loses rank, see `reason`), or undecided.
+    the rate, or B loses rank, see `reason`), or undecided. `limits`: what is against other rates than the one chosen.
+    `cut`: what ended the search before it was through, if anything did.
     """
 
     verdict: Verdict
@@ -78,6 +97,8 @@ class Synthesised:
     reason: Reason | None = None
     rows: tuple[Row, ...] = ()
     attempts: tuple[Attempt, ...] = ()
+    limits: RateLimits | None = None
+    cut: Literal["deadline", "interrupted"] | None = None
 
     def data(self) -> SynthesisData:
         """`result.synthesis` of a certificate: what was asked for, what was tried; no times."""
@@ -88,6 +109,8 @@ class Synthesised:
             attempts=tuple(map(_attempt, self.attempts)),
             rate=self.wanted.rate,
             table=tuple(row.data() for row in self.rows),
+            limits=self.limits,
+            cut=self.cut,
             solver=None if self.file is None else self.file.solver,
             reason=self.reason,
         )

@@ -48,7 +48,7 @@ def synthesis(node: Node, n: int) -> Wanted:
         "objective",
         "verdict",
         "attempts",
-        optional=("rate", "table", "solver", "reason"),
+        optional=("rate", "table", "limits", "cut", "solver", "reason"),
     )
     for key in ("objective", "verdict"):
         own[key].text()
@@ -65,6 +65,8 @@ def synthesis(node: Node, n: int) -> Wanted:
     if "table" in own:
         for item in own["table"].entries():
             _row(item)
+    own.get("limits", _limits)
+    own.get("cut", Node.text)
     if "solver" in own:
         solver = own["solver"].closed("route", "degree", "variables", "digits")
         solver["route"].text()
@@ -76,7 +78,7 @@ def synthesis(node: Node, n: int) -> Wanted:
 
 def _row(node: Node) -> None:
     """A metric that was compared."""
-    numbers = ("condition_number", "input_gain", "rho", "ultimate_radius", "adaptation_rate")
+    numbers = ("condition_number", "input_gain", "rho", "ultimate_radius", "adaptation_rate", "bandwidth")
     row = node.closed("rate", "floor", "degree", "condition_number", optional=("verdict", *numbers[1:]))
     row["rate"].decimal()
     row["floor"].text()
@@ -84,3 +86,17 @@ def _row(node: Node) -> None:
     row.get("verdict", Node.text)
     for key in numbers:
         row.get(key, Node.number)
+
+
+def _limits(node: Node) -> None:
+    """What is against other rates than the one that was chosen."""
+    own = node.closed(optional=("slower", "faster"))
+    for key in ("slower", "faster"):
+        own.get(key, _limit)
+
+
+def _limit(node: Node) -> None:
+    own = node.closed("rate", "cause", optional=("factor",))
+    own["rate"].decimal()
+    own["cause"].text()
+    own.get("factor", Node.number)

@@ -150,6 +150,16 @@ _FAILURES: Mapping[str, Form] = {
     "not_writable": ({"code": Node.text}, {}),
     "not_proven_as_written": ({"condition": _claim}, {}),
     "condition_number": ({"rate": Node.decimal, "condition_number": Node.number}, {}),
+    "none_certified": (
+        {
+            "compared": Node.count,
+            "slowest": Node.decimal,
+            "fastest": Node.decimal,
+            "slow": _claim,
+            "fast": _claim,
+        },
+        {},
+    ),
     "nothing_found": (
         {
             "attempts": Node.count,

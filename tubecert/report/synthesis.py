@@ -17,11 +17,24 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.certificate.metric_file import MetricFile
-    from tubecert.certificate.result import AttemptData, MetricRow, SynthesisData
+    from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SynthesisData
     from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
+_CUT = {
+    "deadline": "cut short by the deadline: this is the best of what was proven by then",
+    "interrupted": "interrupted: this is the best of what was proven by then",
+}
+_CAUSES = {
+    "distance": "{more}: the distance that the uncertainty drives the state grows as 1/rate",
+    "gains": "no gains suffice: the distance that the uncertainty drives the state leaves no room in the tube",
+    "overshoot": "the tube does not fit into the safe set: the overshoot sqrt(A/a) of the initial error is too large",
+    "no_metric": "no metric was found",
+    "idle": "the filter would be slower than the contraction: more feedback, and nothing that adaptation needs",
+    "input_gain": "{more}: the input gain beta/sqrt(a) grows",
+    "tube": "{more}: the tube grows, and the constants over it",
+}
 
 
 def verdict_line(data: SynthesisData, file: MetricFile | None, name: str) -> Text:
@@ -44,6 +57,10 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
         parts += map(indented, _proven(file))
     if data.table:
         parts += titled("Metrics compared", [_compared(data.table)])
+    if data.limits is not None:
+        parts += titled("What limits the rate", _limits(data.limits))
+    if data.cut is not None:
+        parts += [Text(), Text(_CUT[data.cut], style="yellow")]
     if file is None:
         return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify SPEC --metric {target}"
@@ -77,9 +94,20 @@ def _proven(file: MetricFile) -> list[Text]:
     ]
 
 
+def _limits(limits: RateLimits) -> list[Text]:
+    """What is against slower and against faster rates, in words."""
+    lines = []
+    for side, limit in (("slower", limits.slower), ("faster", limits.faster)):
+        if limit is None:
+            continue
+        more = "more gain" if limit.factor is None else f"{short(limit.factor, 2)} times the gain"
+        lines.append(Text(f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"))
+    return lines
+
+
 def _compared(rows: Sequence[MetricRow]) -> RenderableType:
     shown = plain_table(
-        ">rate", "least", ">condition number", ">beta/sqrt(a)", ">rho", ">Gamma (B)", "verdict"
+        ">rate", "least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "verdict"
     )
     for row in rows:
         shown.add_row(
@@ -88,6 +116,7 @@ def _compared(rows: Sequence[MetricRow]) -> RenderableType:
             up(row.condition_number),
             _number(row.input_gain),
             _number(row.rho),
+            _number(row.bandwidth),
             _number(row.adaptation_rate),
             Text() if row.verdict is None else Text(row.verdict, style=VERDICTS[row.verdict]),
         )

@@ -87,7 +87,12 @@ def enclose(tube: TubeFound) -> Enclosed:
 
 def bound(enclosed: Enclosed) -> Bounded | Stopped:
     """The constants, if they are bounded and as declared; then what else is told of the tube."""
-    return _unbounded(enclosed) or _undeclared(enclosed) or _bounded(enclosed)
+    return unmet(enclosed) or _bounded(enclosed)
+
+
+def unmet(enclosed: Enclosed) -> Stopped | None:
+    """What keeps the theorems from being asked at all: a constant without a bound, a declared one that is broken."""
+    return _unbounded(enclosed) or _undeclared(enclosed)
 
 
 def _bounded(enclosed: Enclosed) -> Bounded:

@@ -82,7 +82,8 @@ class _Synthesis:
 
     def run(self) -> Proposal:
         """Rounds of solving and attacking until the metric holds within the gap."""
-        for self.rounds in range(1, _ROUNDS + 1):
+        most = _ROUNDS if self.problem.rounds is None else min(_ROUNDS, self.problem.rounds)
+        for self.rounds in range(1, most + 1):
             y = self._candidate()
             inner = self.unknowns.matrices(y)
             attack = self.attacker.attack(inner, self.bound * (1 + self.gap))
@@ -98,7 +99,7 @@ class _Synthesis:
                         return self.answer(True, _words(judged))
                     attack, self.best = self._with_witness(attack, judged), None
             self._add(attack, y)
-        return self.answer(None, f"gave up after {_ROUNDS} rounds")
+        return self.answer(None, f"gave up after {most} rounds")
 
     def answer(self, feasible: bool | None, status: str) -> Proposal:
         """What there is now."""

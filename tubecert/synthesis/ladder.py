@@ -27,6 +27,7 @@ _LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
 _PAYS = 0.9  # a higher degree must lower the condition number to this share
 _SHARP = 1.01  # a searched rate is settled to this factor
 _LOOKS = 4  # for advice on what would work instead
+_CHEAP_ROUNDS, _CHEAP_BOXES = 30, 20_000  # what advice may cost, if the search did not cost more
 
 Route = Callable[[SynthesisProblem], Proposal]
 Box = tuple[tuple[Fraction, Fraction], ...]
@@ -38,7 +39,7 @@ class Request:
 
     `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
     for constant W, backwards where W moves; `limit` of the condition number. Unless
-    `thorough`, only the first route and back-off are tried.
+    `thorough`, only the first route and back-off are tried; `rounds`: of all proposals together.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -49,6 +50,7 @@ class Request:
     limit: float | None = None
     solver: str = "clarabel"
     thorough: bool = True
+    rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
     progress: Callable[[str], None] | None = None
 
@@ -72,11 +74,13 @@ class Attempt:
 
 
 class Ladder:
-    """Metrics at rates; what was found, and what was tried (`attempts`), is kept."""
+    """Metrics at rates; what was found (`proven`), and what was tried (`attempts`), is kept."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
         self.attempts: list[Attempt] = []
+        self.proven: list[VerifiedMetric] = []
+        self.rounds = 0  # of all proposals so far
         self._families: dict[int, MetricFamily] = {}
         self._found: dict[tuple[Fraction, Floor, float], VerifiedMetric | None] = {}
         self._least_degree = 0  # below it nothing worked at a rate that was asked for before
@@ -116,8 +120,9 @@ class Ladder:
 
     def lower_rate(self, rate: Fraction) -> Fraction | None:
         """A rate below one that does not work, found with few quick attempts; None if none of them works."""
-        quick = Ladder(replace(self.request, thorough=False))
+        quick = self._quick()
         factor = _largest(lambda f: quick._within(two_digits(rate * f), self.request.limit) is not None)
+        self.rounds += quick.rounds
         return factor and two_digits(rate * factor)
 
     def smaller_box(self, rate: Fraction) -> Fraction | None:
@@ -125,10 +130,32 @@ class Ladder:
 
         def works(factor: Fraction) -> bool:
             box = shrunk(self.request.safe_set, factor)
-            quick = Ladder(replace(self.request, thorough=False, safe_set=box))
-            return quick.metric(rate, enough=inf) is not None
+            quick = self._quick(safe_set=box)
+            found = quick.metric(rate, enough=inf) is not None
+            self.rounds += quick.rounds
+            return found
 
         return _largest(works)
+
+    def cheap(self) -> Ladder:
+        """A ladder for advice: metrics of the lowest degree, by the first route, for as much work as this one did."""
+        request = self.request
+        return Ladder(
+            replace(
+                request,
+                thorough=False,
+                routes=request.routes[:1],
+                degree=request.degree or 0,
+                rounds=max(self.rounds, _CHEAP_ROUNDS),
+                effort=replace(request.effort, budget=min(request.effort.budget, _CHEAP_BOXES)),
+            )
+        )
+
+    def _quick(self, **changes: Box) -> Ladder:
+        """One with the first route and back-off, for the rounds that are left."""
+        request = self.request
+        left = None if request.rounds is None else max(request.rounds - self.rounds, 0)
+        return Ladder(replace(request, thorough=False, rounds=left, **changes))  # type: ignore[arg-type]
 
     # -- one rate -----------------------------------------------------------------------------------------------
 
@@ -193,11 +220,12 @@ class Ladder:
         retreated = False
         room = _ROOM if self._family(degree).degree else 1.0
         back_offs = [room * part for part in (_BACK_OFF if self.request.thorough else _BACK_OFF[:1])]
-        while back_offs:
+        while back_offs and self.rounds != self.request.rounds:
             back_off = back_offs.pop(0)
             problem = self._problem(rate, floor, degree, back_off)
             started = time.perf_counter()
             proposal = _guarded(name, route, problem)
+            self.rounds += proposal.rounds
             outcome = shortest_proven(problem, proposal, rate, self.request.effort)
             self._note(
                 Attempt(
@@ -215,6 +243,7 @@ class Ladder:
                 )
             )
             if isinstance(outcome, VerifiedMetric):
+                self.proven.append(outcome)
                 return outcome
             if proposal.coefficients is not None and not retreated and self.request.thorough:
                 back_offs, retreated = [back_off * _RETREAT], True
@@ -232,6 +261,7 @@ class Ladder:
             floor=floor,
             limit=None if request.limit is None or floor != "identity" else 1.05 * request.limit,
             solver=request.solver,
+            rounds=None if request.rounds is None else request.rounds - self.rounds,
             progress=request.progress,
         )
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal
+from typing import Final, Literal
 
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily
 
 Floor = Literal["identity", "input"]
+FLOORS: Final[tuple[Floor, ...]] = ("identity", "input")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +23,8 @@ class SynthesisProblem:
       `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well);
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
-    W and the rate of `model` are not used. Above `limit` the answer is of no use. `progress` is told a route's steps.
+    W and the rate of `model` are not used. Above `limit` the answer is of no use, and
+    after so many `rounds` none is asked for. `progress` is told a route's steps.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -32,6 +34,7 @@ class SynthesisProblem:
     floor: Floor = "identity"
     limit: float | None = None
     solver: str = "clarabel"
+    rounds: int | None = None
     progress: Callable[[str], None] | None = field(default=None, repr=False)
 
 

@@ -21,6 +21,7 @@ from tubecert.claims import (
     MetricFound,
     MetricKilling,
     NoFrame,
+    NoneCertified,
     NoProposal,
     NothingFound,
     NotProven,
@@ -268,6 +269,17 @@ def _nothing(item: NothingFound, reason: Reason) -> str:
     )
 
 
+def _none_certified(item: NoneCertified, reason: Reason) -> str:
+    slowest, fastest = f"{float(item.slowest):g}", f"{float(item.fastest):g}"
+    slow, fast = (_MESSAGES[type(claim)](claim, reason) for claim in (item.slow, item.fast))
+    if item.compared == 1:
+        return f"the metric at rate {slowest} 1/s does not certify: {slow}"
+    rates = f"none of {item.compared} metrics, of rates from {slowest} to {fastest} 1/s, certifies"
+    if slow == fast:
+        return f"{rates}: {slow}"
+    return f"{rates}: at the slowest {slow}; at the fastest {fast}"
+
+
 def outcome(item: Outcome) -> str:
     """What became of an attempt to find a metric."""
     match item:
@@ -301,6 +313,7 @@ _FAILURES: Mapping[type[Failure], Callable[[Any, Reason], str]] = {
     NotWritable: _not_writable,
     NotProvenAsWritten: _as_written,
     ConditionNumber: _above_limit,
+    NoneCertified: _none_certified,
     NothingFound: _nothing,
 }
 

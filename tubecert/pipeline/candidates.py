@@ -1,0 +1,118 @@
+"""What a metric comes to in the end: a certification with it, as far as it is needed to compare metrics.
+
+In: a specification with a proven metric in it. Out: the gains that the deciding theorems certify, or the claim that
+fails. What only explains or describes a certificate is left out; what is certified here is the kernel's word.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, isfinite, sqrt
+from typing import Any
+
+from tubecert.claims import Claim
+from tubecert.conditions.proposal import Asked
+from tubecert.kernel import overall
+from tubecert.kinds import DISTANCE
+from tubecert.kinds.data import Pair
+from tubecert.kinds.kind import Section
+from tubecert.kinds.table import KINDS, kind_of
+from tubecert.pipeline.certification import plan
+from tubecert.pipeline.reasons import reasons
+from tubecert.pipeline.synthesised import Row
+from tubecert.search.proposers import LEAST, PROPOSERS
+from tubecert.stages.bounded import Enclosed, enclose, unmet
+from tubecert.stages.metric import ProvenMetric, prove_metric
+from tubecert.stages.question import Question, Stopped
+from tubecert.stages.tube import find_tube
+from tubecert.synthesis.rounding import VerifiedMetric
+from tubecert.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ending:
+    """How a certification ends: with the constants of the tube and the sections of kinds, or at a claim that fails."""
+
+    enclosed: Enclosed | None = None
+    sections: tuple[Section[Any], ...] = ()
+    claim: Claim | None = None
+    verdict: Verdict
+
+
+def ending(question: Question, metric: VerifiedMetric) -> Ending:
+    """The end of the question, whose metric is the one given."""
+    proven = _proven(question, metric)
+    if isinstance(proven, Stopped):
+        return _stopped(proven)
+    tube = find_tube(plan(proven))
+    if isinstance(tube, Stopped):
+        return _stopped(tube)
+    enclosed = enclose(tube)
+    if (broken := unmet(enclosed)) is not None:
+        return _stopped(broken)
+    return _judged(question, enclosed)
+
+
+def judged_row(row: Row, question: Question) -> Row:
+    """The row with what its metric comes to."""
+    end = ending(question, row.metric)
+    row = replace(row, verdict=end.verdict, claim=end.claim)
+    if end.enclosed is None:
+        return row
+    problem, by_key = end.enclosed.problem, {section.name.key: section for section in end.sections}
+    gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
+    distance = by_key[DISTANCE.key]
+    least = distance.at(LEAST)
+    decisive = next((found for section in end.sections if (found := _pair(question, section))), None)
+    return replace(
+        row,
+        served=distance.verdict is Verdict.CERTIFIED,
+        input_gain=gain / sqrt(lower) if isfinite(gain) else None,
+        rho=float(problem.rho),
+        ultimate_radius=distance.judgement.ultimate_radius,
+        adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
+        bandwidth=None if decisive is None else float(decisive.bandwidth),
+        demand=float(problem.rho) if decisive is None else _demand(decisive),
+    )
+
+
+def _proven(question: Question, metric: VerifiedMetric) -> ProvenMetric | Stopped:
+    """The proof that the ladder made, where the text of the metric reads back as the same expressions."""
+    proof = metric.proof
+    if proof.lower_on_set is None or not proof.is_about(question.model, question.spec.safe_set):
+        return prove_metric(question)
+    return ProvenMetric(question=question, proof=proof, lower=proof.lower_on_set)
+
+
+def _stopped(end: Stopped) -> Ending:
+    return Ending(claim=end.reason.claim, verdict=end.reason.verdict)
+
+
+def _judged(question: Question, enclosed: Enclosed) -> Ending:
+    options, problem = question.options, enclosed.problem
+    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
+    chosen = options.conditions
+    deciding = [kind.key for kind in KINDS] if chosen == "all" else [kind_of(chosen).key]
+    sections = {
+        key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
+        for key in dict.fromkeys([*deciding, DISTANCE.key])
+    }
+    verdict = overall([sections[key].verdict for key in deciding])
+    short = next((s for key in deciding if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
+    claim = None if short is None else reasons(short, {})[0].claim
+    return Ending(enclosed=enclosed, sections=tuple(sections.values()), claim=claim, verdict=verdict)
+
+
+def _pair(question: Question, section: Section[Any]) -> Pair | None:
+    """The gains of a kind that a metric is judged by: those of least adaptation rate where it has one."""
+    options = question.options
+    fixed = options.bandwidth is not None or options.adaptation_rate is not None
+    pairs = section.data().pairs(asked=fixed)
+    return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
+
+
+def _demand(pair: Pair) -> float:
+    """What a kind asks of the computer that adapts: the adaptation rate, or the rate at which it samples."""
+    if pair.adaptation_rate is not None:
+        return float(pair.adaptation_rate)
+    return inf if pair.sample_time is None else 1 / float(pair.sample_time)

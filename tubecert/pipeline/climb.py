@@ -1,0 +1,181 @@
+"""Rates for a metric, from slow to fast, by what a certification with each of them comes to.
+
+A slow metric leaves the uncertainty much room (the distance grows as 1/rate), a fast one is ill-conditioned: its tube
+overshoots, its feedback is strong. So certifiable rates form an interval as a rule. The climb doubles the rate from a
+slow scale of the system until nothing is gained any more, and then halves the steps (geometrically) around the best.
+Untrusted: it chooses among metrics that are proven.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import inf, sqrt
+
+import numpy as np
+
+from tubecert.certificate.result import RateLimit, RateLimits
+from tubecert.claims import TubeInSafeSet, TubeRadius
+from tubecert.enclosure.tape import Tape
+from tubecert.model import ControlAffineModel
+from tubecert.pipeline.synthesised import Row
+from tubecert.spec import Spec
+from tubecert.synthesis.ladder import digits_below, two_digits
+from tubecert.synthesis.problem import FLOORS, Floor
+
+_DOUBLINGS, _HALVINGS = 12, 10
+_WORSE = 2  # rates in a row that are worse than the best end the climb
+_ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
+_BELOW = 4  # the climb starts so far below the slowest mode
+_NOTHING = 1e-3  # a mode is 0 below this share of the fastest motion
+
+Compare = Callable[[Fraction, Floor, bool], Row | None]
+
+
+@dataclass(slots=True)
+class Climb:
+    """What was tried: the best row of each rate, None where there is no metric.
+
+    `compare` certifies a metric of a rate and a floor; at a degree that is raised as long as it pays only if `full`.
+    """
+
+    compare: Compare
+    objective: str
+    tried: dict[Fraction, Row | None] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Row | None:
+        """The best row that counts."""
+        rows = [row for row in self.tried.values() if row is not None and row.counts]
+        return min(rows, key=self._score, default=None)
+
+    def run(self, start: Fraction) -> None:
+        """The whole search."""
+        self._up(start)
+        best = self.best
+        if best is None or best.rate == start:
+            self._down(start)
+        for _ in range(_ROUNDS):
+            if (best := self.best) is not None:
+                for rate in self._around(best.rate):
+                    self._try(rate, best.floor)
+        if (best := self.best) is not None:
+            self._try(best.rate, best.floor, full=True)
+        if (best := self.best) is not None:
+            self._try(best.rate, "input")
+        if (best := self.best) is not None and best.floor == "input":
+            for rate in self._around(best.rate):
+                self._try(rate, best.floor)
+
+    def at(self, rate: Fraction) -> None:
+        """The metrics of one rate."""
+        for floor in FLOORS:
+            self._try(rate, floor, full=True)
+
+    def limits(self) -> RateLimits | None:
+        """What is against a slower and against a faster rate than the best."""
+        best = self.best
+        if best is None:
+            return None
+        slower = max((rate for rate in self.tried if rate < best.rate), default=None)
+        faster = min((rate for rate in self.tried if rate > best.rate), default=None)
+        return RateLimits(
+            slower=None if slower is None else self._limit(slower, best),
+            faster=None if faster is None else self._limit(faster, best),
+        )
+
+    # -- steps ---------------------------------------------------------------------------------------------------
+
+    def _up(self, start: Fraction) -> None:
+        rate, worse, overshoots = start, 0, 0
+        for _ in range(_DOUBLINGS):
+            before = self.best
+            row = self._try(rate)
+            if row is None or (before is not None and not row.counts):
+                return
+            if row.counts:
+                worse = 0 if self.best is row else worse + 1
+                if worse == _WORSE or row.idle:
+                    return
+            elif _overshoots(row):
+                overshoots += 1
+                if overshoots == _WORSE:
+                    return
+            rate *= 2
+
+    def _down(self, start: Fraction) -> None:
+        rate = start / 2
+        for _ in range(_HALVINGS):
+            before = self.best
+            row = self._try(rate)
+            if before is not None and self.best is before:
+                return
+            if row is not None and not row.counts and not _overshoots(row):
+                return
+            rate /= 2
+
+    def _try(self, rate: Fraction, floor: Floor = "identity", *, full: bool = False) -> Row | None:
+        row = self.compare(rate, floor, full)
+        known = self.tried.get(rate)
+        if known is None or (row is not None and self._score(row) < self._score(known)):
+            self.tried[rate] = row
+        return row
+
+    def _around(self, best: Fraction) -> list[Fraction]:
+        """Rates halfway, in their logarithms, to the neighbours that were tried."""
+        slower = max((rate for rate in self.tried if rate < best), default=None)
+        faster = min((rate for rate in self.tried if rate > best), default=None)
+        return [digits_below(sqrt(best * other), 3) for other in (slower, faster) if other is not None]
+
+    def _score(self, row: Row) -> tuple[float, ...]:
+        return row.score(self.objective)
+
+    def _limit(self, rate: Fraction, best: Row) -> RateLimit:
+        row = self.tried[rate]
+        if row is None:
+            return RateLimit(rate=rate, cause="no_metric")
+        if not row.counts:
+            return RateLimit(rate=rate, cause="overshoot" if _overshoots(row) else "gains")
+        if row.idle:
+            return RateLimit(rate=rate, cause="idle")
+        factor = row.demand / best.demand if 0 < best.demand < inf else None
+        if rate < best.rate:
+            return RateLimit(rate=rate, cause="distance", factor=factor)
+        grown = (row.input_gain or 0) * (best.rho or 0) > (best.input_gain or inf) * (row.rho or inf)
+        return RateLimit(rate=rate, cause="input_gain" if grown else "tube", factor=factor)
+
+
+def slow_scale(model: ControlAffineModel, spec: Spec) -> Fraction:
+    """A rate below those that matter, in 1/s: a fourth of the slowest mode at the centre of the safe set.
+
+    Where the linearisation has no mode but 0 (chains of integrators), the speed at which it moves the half-widths of
+    the set stands in. No rate is useful that is below 1/horizon. Free of units, but for the unit of time.
+    """
+    centre = np.array([float((low + high) / 2) for low, high in spec.safe_set])
+    half = np.array([float((high - low) / 2) for low, high in spec.safe_set])
+    n = len(centre)
+    with np.errstate(all="ignore"):
+        slopes = Tape([e for row in model.f_x for e in row], model.states).run_floats(
+            list(centre[:, None]), (1,)
+        )
+    A = np.asarray(slopes, dtype=float).reshape(n, n) * half[None, :] / half[:, None]
+    scale = _slowest(A) / _BELOW
+    if spec.trajectory.horizon is not None:
+        scale = max(scale, 1 / float(spec.trajectory.horizon))
+    return two_digits(Fraction(scale))
+
+
+def _slowest(A: np.ndarray) -> float:
+    """The least modulus of a mode that is not 0, else the norm, else 1."""
+    if not np.isfinite(A).all():
+        return 1.0
+    norm = float(np.linalg.norm(A, 2))
+    modes = np.abs(np.linalg.eigvals(A))
+    moving = modes[modes > _NOTHING * norm]
+    return float(moving.min()) if len(moving) else norm or 1.0
+
+
+def _overshoots(row: Row) -> bool:
+    """Whether the certification ended at the size of the tube."""
+    return isinstance(row.claim, TubeInSafeSet | TubeRadius)
