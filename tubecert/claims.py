@@ -268,7 +268,7 @@ class NothingFound(Failure):
 class NoneCertified(Failure):
     """Metrics were found at `compared` rates from `slowest` to `fastest`, and none certifies.
 
-    `slow` and `fast` are the claims that ended the certifications with them.
+    `slow` and `fast` are the claims that ended the certifications with the slowest and the fastest.
     """
 
     tag: ClassVar[str] = "none_certified"
@@ -276,7 +276,9 @@ class NoneCertified(Failure):
     slowest: Fraction
     fastest: Fraction
     slow: Claim
+    slow_verdict: Verdict
     fast: Claim
+    fast_verdict: Verdict
 
 
 # -- what became of an attempt to find a metric

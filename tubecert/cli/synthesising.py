@@ -12,6 +12,7 @@ from tubecert.cli.options import Budget, Deadline, Output, SpecFile, number_opti
 
 _AFTER = """\b
 Examples:
+  tubecert synth plant.yaml
   tubecert synth plant.yaml --rate 0.8 -o metric.json
   tubecert synth plant.yaml --objective adaptation --plot sweep.svg
   tubecert synth plant.yaml --rate 0.8 --solver cvxpy:MOSEK
@@ -19,7 +20,7 @@ Examples:
 
 \b
 Exit codes: 0 a metric was proven and written; 1 no metric has the rate (the report says why); 2 invalid
-input; 4 none was found (the report says what was tried and what would help).
+input; 4 none was found, or none certifies (the report says what was tried and what would help).
 """
 
 

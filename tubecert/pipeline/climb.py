@@ -28,6 +28,8 @@ _DOUBLINGS, _HALVINGS = 12, 10
 _WORSE = 2  # rates in a row that are worse than the best end the climb
 _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
+_ROUNDER = 0.95  # of the condition number
+_UP = 1 + 1e-9  # so that rounding down starts from what the last digits of a mode do not change
 _NOTHING = 1e-3  # a mode is 0 below this share of the fastest motion
 
 Compare = Callable[[Fraction, Floor, bool], Row | None]
@@ -105,15 +107,15 @@ class Climb:
             rate *= 2
 
     def _down(self, start: Fraction) -> None:
-        rate = start / 2
-        for _ in range(_HALVINGS):
+        above = self.tried.get(start)
+        for k in range(1, _HALVINGS + 1):
             before = self.best
-            row = self._try(rate)
+            row = self._try(digits_below(start / 2**k, 3))
             if before is not None and self.best is before:
                 return
-            if row is not None and not row.counts and not _overshoots(row):
+            if row is not None and not row.counts and not (_overshoots(row) and _rounder(row, above)):
                 return
-            rate /= 2
+            above = row
 
     def _try(self, rate: Fraction, floor: Floor = "identity", *, full: bool = False) -> Row | None:
         row = self.compare(rate, floor, full)
@@ -163,7 +165,7 @@ def slow_scale(model: ControlAffineModel, spec: Spec) -> Fraction:
     scale = _slowest(A) / _BELOW
     if spec.trajectory.horizon is not None:
         scale = max(scale, 1 / float(spec.trajectory.horizon))
-    return two_digits(Fraction(scale))
+    return two_digits(Fraction(scale * _UP))
 
 
 def _slowest(A: np.ndarray) -> float:
@@ -174,6 +176,11 @@ def _slowest(A: np.ndarray) -> float:
     modes = np.abs(np.linalg.eigvals(A))
     moving = modes[modes > _NOTHING * norm]
     return float(moving.min()) if len(moving) else norm or 1.0
+
+
+def _rounder(row: Row, above: Row | None) -> bool:
+    """Whether a slower rate made the metric rounder, so that a still slower one may overshoot less."""
+    return above is None or row.condition_number < _ROUNDER * above.condition_number
 
 
 def _overshoots(row: Row) -> bool:

@@ -331,11 +331,19 @@ class SynthesisRun:
     def _none_certified(self) -> NoneCertified | None:
         """That metrics were found, and what each of them lacks; None if none was found."""
         rows = [row for row in self._table() if row.claim is not None and row.floor == "identity"]
-        claims = [row.claim for row in rows if row.claim is not None]
-        if not claims:
+        if not rows:
             return None
+        slow, fast = rows[0], rows[-1]
+        assert slow.claim is not None
+        assert fast.claim is not None
         return NoneCertified(
-            compared=len(rows), slowest=rows[0].rate, fastest=rows[-1].rate, slow=claims[0], fast=claims[-1]
+            compared=len(rows),
+            slowest=slow.rate,
+            fastest=fast.rate,
+            slow=slow.claim,
+            slow_verdict=slow.verdict or Verdict.UNDECIDED,
+            fast=fast.claim,
+            fast_verdict=fast.verdict or Verdict.UNDECIDED,
         )
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:

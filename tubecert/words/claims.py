@@ -271,7 +271,8 @@ def _nothing(item: NothingFound, reason: Reason) -> str:
 
 def _none_certified(item: NoneCertified, reason: Reason) -> str:
     slowest, fastest = f"{float(item.slowest):g}", f"{float(item.fastest):g}"
-    slow, fast = (_MESSAGES[type(claim)](claim, reason) for claim in (item.slow, item.fast))
+    slow = message(Reason(claim=item.slow, verdict=item.slow_verdict))
+    fast = message(Reason(claim=item.fast, verdict=item.fast_verdict))
     if item.compared == 1:
         return f"the metric at rate {slowest} 1/s does not certify: {slow}"
     rates = f"none of {item.compared} metrics, of rates from {slowest} to {fastest} 1/s, certifies"

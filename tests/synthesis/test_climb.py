@@ -1,0 +1,261 @@
+"""Metrics without a rate: from slow to fast, by what a certification with them comes to, or nothing is written."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from tubecert import pipeline
+from tubecert.claims import NoneCertified, NothingFound, TubeInSafeSet
+from tubecert.cli.app import app
+from tubecert.model import build
+from tubecert.pipeline import Deadline, Options, Synthesised, synthesis
+from tubecert.pipeline.climb import Climb, slow_scale
+from tubecert.pipeline.synthesised import Row
+from tubecert.spec import Synthesis, load, load_text
+from tubecert.verdict import Verdict
+
+ROBOTS = Path(__file__).parents[1] / "specs" / "robots"
+BARE = Synthesis(rate=None, objective="adaptation")
+BY_B = Options(conditions="distance")
+
+
+def robot(name):
+    return load(str(ROBOTS / f"{name}.yaml"))
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["synth", "--no-progress", *map(str, arguments)], catch_exceptions=False)
+
+
+# -- systems written from their equations
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pendulum", "car", "flexible_joint"])
+def test_a_metric_for_nothing_but_the_equations_certifies(name):
+    """Without a rate, `synth` used to write a metric of the largest one, which nothing certifies."""
+    found = pipeline.synthesise(robot(name), BARE, BY_B)
+    assert found.verdict is Verdict.CERTIFIED
+    certified = pipeline.certify(found.spec, BY_B)
+    assert certified.verdict is Verdict.CERTIFIED
+    (pair,) = certified.deciding().values()
+    rate = float(found.file.rate)
+    assert rate <= float(pair.bandwidth) < 20 * rate
+    assert 0.3 < rate < 10
+    assert found.limits.slower.cause == "distance"
+    assert found.limits.slower.factor > 1
+    assert found.limits.faster is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["26", "sampled"])
+def test_the_kind_that_decides_is_what_a_metric_is_chosen_for(kind):
+    options = replace(BY_B, conditions=kind)
+    found = pipeline.synthesise(robot("pendulum"), BARE, options)
+    assert pipeline.certify(found.spec, options).verdict is Verdict.CERTIFIED
+    rows = [row for row in found.rows if row.verdict is Verdict.CERTIFIED]
+    best = min(rows, key=lambda row: row.score("adaptation"))
+    assert found.file.rate == best.rate
+
+
+# -- nothing certifies
+
+
+def test_where_nothing_certifies_nothing_is_written(tmp_path):
+    text = (ROBOTS / "pendulum.yaml").read_text().replace("epsilon: 0.1", "epsilon: 1")
+    path, target = tmp_path / "wide.yaml", tmp_path / "wide.json"
+    path.write_text(text)
+    target.write_text("older")
+    done = run(path, "-o", target)
+    assert done.exit_code == 4
+    assert target.read_text() == "older"
+    assert "certifies: the tube of radius 1.07 leaves the safe set" in " ".join(done.stdout.split())
+    assert "reduce epsilon" in done.stdout
+    found = pipeline.synthesise(load_text(text), BARE, BY_B)
+    failure = found.reason.claim.failure
+    assert isinstance(failure, NoneCertified)
+    assert isinstance(failure.slow, TubeInSafeSet)
+    assert failure.slowest < failure.fastest
+    assert found.file is None
+
+
+@pytest.mark.slow
+def test_a_certificate_that_says_so_is_read_and_rechecked(tmp_path):
+    text = (ROBOTS / "pendulum.yaml").read_text().replace("epsilon: 0.1", "epsilon: 1")
+    (tmp_path / "wide.yaml").write_text(text)
+    target = str(tmp_path / "wide.json")
+    arguments = ["certify", str(tmp_path / "wide.yaml"), "--no-progress", "-o", target]
+    done = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    assert done.exit_code == 4
+    assert json.loads(Path(target).read_text())["result"]["reasons"][0]["failure"]["id"] == "none_certified"
+    for command in ("recheck", "report"):
+        again = CliRunner().invoke(app, [command, target], catch_exceptions=False)
+        assert again.exit_code in (0, 4), again.output
+
+
+# -- the climb itself
+
+
+class Valley:
+    """Metrics whose demand falls with the rate, up to where the tube leaves the safe set."""
+
+    def __init__(self, least, most, reach=1e9):
+        self.least, self.most, self.reach, self.asked = least, most, reach, []
+
+    def __call__(self, rate, floor, full):
+        self.asked.append(rate)
+        if rate > self.reach or floor == "input":
+            return None
+        fits = self.least <= rate <= self.most
+        claim = None if fits else TubeInSafeSet(radius=Fraction(1), state="x", side="upper", excess=0.1)
+        return Row(
+            rate=rate,
+            floor=floor,
+            degree=0,
+            condition_number=float(rate),
+            verdict=Verdict.CERTIFIED if fits else Verdict.REFUTED,
+            claim=claim,
+            bandwidth=1e12,
+            demand=1 / float(rate) if fits else np.inf,
+            metric=None,
+        )
+
+
+@settings(deadline=None)
+@given(most=st.floats(0.05, 1e4), start=st.floats(1e-2, 20))
+def test_the_climb_finds_the_edge_of_what_fits(most, start):
+    """Whether it starts below, inside or above what certifies."""
+    valley = Valley(0, most)
+    climb = Climb(valley, "adaptation")
+    climb.run(Fraction(start))
+    assert climb.best is not None
+    reach = min(most, start * 2**11)
+    assert reach / 1.3 < climb.best.rate <= most
+    assert len(valley.asked) < 40
+    assert not climb.limits().faster or climb.limits().faster.cause == "overshoot"
+
+
+def test_what_is_refuted_is_never_the_best():
+    climb = Climb(Valley(10, 5), "adaptation")
+    climb.run(Fraction(1))
+    assert climb.best is None
+    assert climb.limits() is None
+
+
+def test_a_rate_without_a_metric_ends_the_climb():
+    climb = Climb(Valley(0, 100, reach=3), "adaptation")
+    climb.run(Fraction(1))
+    assert Fraction(2) < climb.best.rate <= 3
+    assert climb.limits().faster.cause == "no_metric"
+
+
+# -- where it starts
+
+CHAIN = """
+tubecert: 1
+name: chain
+system: {{states: [p, v], inputs: [u], f: [v, "{slope}*p"], B: [[0], [1]]}}
+safe_set: {{p: [-{p}, {p}], v: [-{v}, {v}]}}
+uncertainty: {{h: [0]}}
+trajectory: {{kind: equilibrium, at: [0, 0]}}
+"""
+
+
+@given(st.sampled_from([0.25, 1, 8, 64]))
+def test_the_start_is_free_of_units(scale):
+    """A chain of integrators moves its half-widths at v/p = 3; a mode at 2 is a mode at 2."""
+    free = load_text(CHAIN.format(slope=0, p=scale, v=3 * scale))
+    assert slow_scale(build(free), free) == Fraction(75, 100)
+    moving = load_text(CHAIN.format(slope=-4, p=scale, v=3))
+    assert slow_scale(build(moving), moving) == Fraction(1, 2)
+
+
+# -- deadlines, interruptions
+
+
+class Clock:
+    """A deadline that passes after so many looks at it."""
+
+    def __init__(self, looks):
+        self.left = looks
+
+    def check(self):
+        self.left -= 1
+        if self.left < 0:
+            raise synthesis.OutOfTime
+
+
+@pytest.mark.slow
+def test_a_deadline_leaves_the_best_that_was_proven():
+    """It cuts the list of metrics that are tried and no proof; without any there is nothing, and that is said."""
+    patient = Clock(10**9)
+    whole = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=patient)
+    assert whole.data().cut is None
+    half = Clock((10**9 - patient.left) // 2)
+    cut = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=half)
+    assert cut.data().cut == "deadline"
+    assert cut.verdict is Verdict.CERTIFIED
+    assert {row.rate for row in cut.rows} < {row.rate for row in whole.rows}
+    kept = {(row.rate, row.degree): row.adaptation_rate for row in whole.rows}
+    assert all(kept[row.rate, row.degree] == row.adaptation_rate for row in cut.rows)
+    none = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=Deadline.after(0))
+    assert (none.verdict, none.cut, none.file) == (Verdict.UNDECIDED, "deadline", None)
+    assert isinstance(none.reason.claim.failure, NothingFound)
+
+
+def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
+    calls = []
+    whole = synthesis.SynthesisRun._row
+
+    def interrupted(self, metric, floor):
+        calls.append(metric)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        return whole(self, metric, floor)
+
+    monkeypatch.setattr(synthesis.SynthesisRun, "_row", interrupted)
+    target = tmp_path / "m.json"
+    done = run(ROBOTS / "van_der_pol.yaml", "-o", target)
+    assert done.exit_code == 130
+    assert "interrupted" in done.stdout
+    assert json.loads(target.read_text())["rate"] == float(calls[0].rate)
+
+
+def test_the_verdict_is_told_before_advice(monkeypatch):
+    said = []
+
+    def remedies(self, rate):
+        said.append("advice")
+        return []
+
+    monkeypatch.setattr(synthesis.SynthesisRun, "_remedies", remedies)
+    lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
+    wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)
+    pipeline.synthesise(lonely, wanted, Options(), told=said.append)
+    assert isinstance(said[0], Synthesised)
+    assert said[0].verdict is Verdict.UNDECIDED
+    assert said[1] == "advice"
+
+
+def test_advice_costs_no_more_than_the_search():
+    lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
+    wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)
+    run = synthesis.SynthesisRun(lonely, wanted, Options(), pipeline.question_of, None)
+    spent = []
+    honest = run.ladder.cheap
+
+    def cheap():
+        spent.append(honest())
+        return spent[0]
+
+    run.ladder.cheap = cheap
+    found = run.run(sweep=False)
+    assert found.reason.relax
+    assert spent[0].rounds <= max(run.ladder.rounds, 30)
