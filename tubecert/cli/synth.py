@@ -22,7 +22,7 @@ from tubecert.spec.synthesis import solver_name
 if TYPE_CHECKING:
     from tubecert.pipeline import Synthesised
 
-_DECIDES = DISTANCE.option  # what metrics are compared by
+_DECIDES = DISTANCE.option  # what metrics are compared by, where the specification says nothing
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
@@ -48,7 +48,9 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert import pipeline
     from tubecert.report import progress
 
-    options = pipeline.Options(rho_a=values["rho_a"], epsilon=values["epsilon"], conditions=_DECIDES)
+    options = pipeline.Options(
+        rho_a=values["rho_a"], epsilon=values["epsilon"], conditions=system.decides or _DECIDES
+    )
     if budget is not None:
         options = replace(options, budget=budget)
     terminal = Terminal.stderr(color=output.color)

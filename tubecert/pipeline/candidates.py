@@ -11,17 +11,19 @@ from math import inf, isfinite, sqrt
 from typing import Any
 
 from tubecert.claims import Claim
+from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
 from tubecert.kinds import DISTANCE
 from tubecert.kinds.data import Pair
 from tubecert.kinds.kind import Section
-from tubecert.kinds.table import KINDS, kind_of
+from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
 from tubecert.search.proposers import LEAST, PROPOSERS
 from tubecert.stages.bounded import Enclosed, enclose, unmet
+from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.tube import find_tube
@@ -71,8 +73,8 @@ def judged_row(row: Row, question: Question) -> Row:
         rho=float(problem.rho),
         ultimate_radius=distance.judgement.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
-        bandwidth=None if decisive is None else float(decisive.bandwidth),
-        demand=float(problem.rho) if decisive is None else _demand(decisive),
+        bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
+        demand=inf if decisive is None else _demand(decisive, problem),
     )
 
 
@@ -91,14 +93,13 @@ def _stopped(end: Stopped) -> Ending:
 def _judged(question: Question, enclosed: Enclosed) -> Ending:
     options, problem = question.options, enclosed.problem
     asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
-    chosen = options.conditions
-    deciding = [kind.key for kind in KINDS] if chosen == "all" else [kind_of(chosen).key]
+    keys = deciding(question)
     sections = {
         key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
-        for key in dict.fromkeys([*deciding, DISTANCE.key])
+        for key in dict.fromkeys([*keys, DISTANCE.key])
     }
-    verdict = overall([sections[key].verdict for key in deciding])
-    short = next((s for key in deciding if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
+    verdict = overall([sections[key].verdict for key in keys])
+    short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
     claim = None if short is None else reasons(short, {})[0].claim
     return Ending(enclosed=enclosed, sections=tuple(sections.values()), claim=claim, verdict=verdict)
 
@@ -111,8 +112,8 @@ def _pair(question: Question, section: Section[Any]) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def _demand(pair: Pair) -> float:
-    """What a kind asks of the computer that adapts: the adaptation rate, or the rate at which it samples."""
+def _demand(pair: Pair, problem: TubeProblem) -> float:
+    """What a kind asks of the computer that adapts: the adaptation rate, or the sampling frequency; else the tube."""
     if pair.adaptation_rate is not None:
         return float(pair.adaptation_rate)
-    return inf if pair.sample_time is None else 1 / float(pair.sample_time)
+    return float(problem.rho) if pair.sample_time is None else 1 / float(pair.sample_time)

@@ -35,11 +35,7 @@ class Judged:
     @property
     def deciding(self) -> tuple[str, ...]:
         """The kinds that the verdict is about, by key."""
-        question = self.question
-        chosen = question.options.conditions or question.spec.decides or RATES.option
-        return (
-            tuple(kind.key for kind in KINDS if kind.name.adapts) if chosen == ALL else (kind_of(chosen).key,)
-        )
+        return deciding(self.question)
 
     @property
     def as_printed(self) -> bool:
@@ -60,6 +56,14 @@ class Judged:
             for kind in KINDS
             for name, value in kind.derived(self.sections[kind.key]).items()
         }
+
+
+def deciding(question: Question) -> tuple[str, ...]:
+    """The kinds that decide a question, by key."""
+    chosen = question.options.conditions or question.spec.decides or RATES.option
+    if chosen == ALL:
+        return tuple(kind.key for kind in KINDS if kind.name.adapts)
+    return (kind_of(chosen).key,)
 
 
 def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judged:
