@@ -573,3 +573,28 @@ def test_what_is_known_needs_no_numerics(certified):
     )
     assert done.stdout == "1 specification checked: no errors\n"
     assert not {"numpy", "scipy", "tubecert.pipeline"} & set(done.stderr.split())
+
+
+OTHER = "nav2:\n  ros__parameters: {rate: 20.0}\n"
+
+
+def test_other_yaml_files_in_a_folder_are_left_alone(folder):
+    """U7: every ROS repository has some; what is left alone is said."""
+    (folder / "nav.yaml").write_text(OTHER)
+    (folder / "deep").mkdir()
+    (folder / "deep" / "more.yml").write_text("[1, 2]\n")
+    (folder / "plant.yaml").write_text(SPEC, encoding="utf-8")
+    result = run(folder, "--json")
+    assert result.exit_code == 0
+    assert codes(result) == ["TC123"]
+    assert "2 files are no specifications and were left alone" in result.output
+    assert "nav.yaml" in result.output
+    (folder / "half.yaml").write_text("name: x\nsafe_set: {x: [0, 1]}\n")
+    assert run(folder, "--json").exit_code == 2
+
+
+def test_a_file_that_is_named_is_a_specification_unless_others_are_to_be_skipped(folder):
+    (folder / "nav.yaml").write_text(OTHER)
+    assert run(folder / "nav.yaml", "--json").exit_code == 2
+    result = run(folder / "nav.yaml", "--skip-others", "--json")
+    assert (result.exit_code, codes(result)) == (0, ["TC123"])

@@ -25,6 +25,7 @@ from tubecert.expression import (
     symbol,
     to_text,
 )
+from tubecert.expression.elsewhere import ELSEWHERE
 
 x, y, t = (SYMBOLS[name] for name in ("x", "y", "t"))
 
@@ -367,3 +368,27 @@ def test_what_powers_multiply_to_is_bounded_for_every_sign() -> None:
 def test_a_divisor_that_is_zero_is_no_constant_to_forget() -> None:
     for text in ("1/0", "x/0", "0/0", "0**-1", "x/(y - y)"):
         assert refusal(text).message == "division by zero"
+
+
+@pytest.mark.parametrize("word", sorted(ELSEWHERE))
+def test_words_of_other_languages_are_never_taken_for_typing_errors(word: str) -> None:
+    """U7: sign was taken for sin, min for sin: what parses then means something else."""
+    error = refusal(f"x + {word}(y)")
+    assert error.kind == "symbol"
+    assert "did you mean" not in error.help
+    assert error.help == ELSEWHERE[word]
+
+
+@pytest.mark.parametrize(
+    "word", ["sinq", "tann", "coss", "sih", "expo", "sqroot", "tanx", "sinus", "atann", "lag"]
+)
+def test_another_function_is_never_proposed(word: str) -> None:
+    assert "did you mean" not in refusal(f"{word}(y)").help
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"), [("Sin", "sin"), ("TANH", "tanh"), ("tahn", "tanh"), ("exp_", None), ("lgo", "log")]
+)
+def test_the_same_letters_are_a_typing_error(word: str, meant: str | None) -> None:
+    assert ("did you mean" in refusal(f"{word}(y)").help) == (meant is not None)
+    assert meant is None or f"did you mean {meant}?" in refusal(f"{word}(y)").help

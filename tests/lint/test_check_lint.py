@@ -48,6 +48,7 @@ CASES = {
     "unused": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1}")]),
     "unused but mentioned": ("TC130", "6:25", [("{k: 2}", "{k: 2, m: 1} # m is the mass")]),
     "unused definition": ("TC130", "7:20", [("{k: 2}", "{k: 2}\n  definitions: {d: p}")]),
+    "negative mass": ("TC135", "6:27", [("{k: 2}", "{k: 2, m_1: -1/2}"), ("-k*p", "-k*p*m_1**2")]),
     "case": ("TC131", "6:25", [("{k: 2}", "{k: 2, K: 1}"), ("-k*p", "-k*K*p")]),
     "shape": ("TC131", "6:27", [("{k: 2}", "{l1: 2, II: 1}"), ("-k*p", "-l1*II*p")]),
     "function": ("TC131", "6:21", [("{k: 2}", "{Sin: 2}"), ("-k*p", "-Sin*p")]),
@@ -170,3 +171,9 @@ def test_extreme_numbers_are_no_trouble(value, place):
 def test_floats_say_nothing_about_an_ill_conditioned_metric():
     flat = "  dual_metric: [[1e-9, -0.5e-9], [-0.5e-9, 1e3]]"
     assert "TC302" not in {item.code for item in found(changed((W, flat), ("rate: 0.4", "rate: 0.6")))}
+
+
+def test_customary_names_are_not_confusable():
+    """U7: a cart M, a pendulum m of length l with an inertia I: every cart-pole."""
+    names = changed(("{k: 2}", "{M: 1, m: 0.2, l: 0.5, I: 0.1, i_max: -1}"), ("-k*p", "-M*p*m*l*I*i_max**2"))
+    assert found(names) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
 from tubecert.errors import ExitCode
-from tubecert.findings import Finding
+from tubecert.findings import Finding, Severity
 from tubecert.printable import printable_json
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
@@ -20,15 +21,20 @@ if TYPE_CHECKING:
     from tubecert.checking import Checked, CheckOptions
 
 _SUFFIXES = {".yaml", ".yml"}
+_OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
+_SHOWN = 5
 _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
 
 
-def run(paths: Sequence[str], given: Mapping[str, Any], output: Output) -> ExitCode:
+def run(
+    paths: Sequence[str], given: Mapping[str, Any], output: Output, *, skip_others: bool = False
+) -> ExitCode:
     """Check every file; findings are the result and go to stdout."""
     format_ = _format(given, output)
     jobs, options = _options(given)
-    files = list(_expand(paths))
-    results = _nothing(paths) if not files else _checked(files, options, jobs, output)
+    files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, skip_others)
+    results = _checked(files, options, jobs, output) if files else []
+    results = [*results, *_skipped(others)] or _nothing(paths)
     write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
     if format_ == "github":
         from tubecert.report import github
@@ -60,6 +66,48 @@ def _options(given: Mapping[str, Any]) -> tuple[int, CheckOptions]:
     options = CheckOptions(certify=given["certify"], strict=given["strict"], cached=not given["no_cache"])
     options = replace(options, gap=gap or options.gap, budget=budget or options.budget)
     return jobs or 1, options
+
+
+def _folders(paths: Sequence[str]) -> list[str]:
+    return [path for path in paths if Path(path).is_dir()]
+
+
+def _sorted_out(files: list[str], named: set[str], skip_others: bool) -> tuple[list[str], list[str]]:
+    """Files to be checked, and those that are no specifications; of files that were named only if that is asked for."""
+    others = [file for file in files if (skip_others or file not in named) and not _is_specification(file)]
+    left_out = {*others}
+    return [file for file in files if file not in left_out], others
+
+
+def _is_specification(file: str) -> bool:
+    """Whether a YAML file has a key that every specification has; what cannot be read is left to the check to tell."""
+    from tubecert.errors import TubecertError
+    from tubecert.files import read
+    from tubecert.spec.source import SPECIFICATION
+
+    try:
+        return re.search(_OF_SPECIFICATIONS, read(file, SPECIFICATION)) is not None
+    except TubecertError:
+        return True
+
+
+def _skipped(others: Sequence[str]) -> list[Checked]:
+    """What was left alone is said, once."""
+    from tubecert.checking import Checked
+
+    if not others:
+        return []
+    what = "1 file is no specification" if len(others) == 1 else f"{len(others)} files are no specifications"
+    shown = ", ".join(others[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
+    finding = Finding(
+        code="TC123",
+        severity=Severity.NOTE,
+        message=f"{what} and was left alone: {shown}"
+        if len(others) == 1
+        else f"{what} and were left alone: {shown}",
+        help="a specification has the keys tubecert, system and safe_set",
+    )
+    return [Checked(path=others[0], findings=(finding,), code=ExitCode.CERTIFIED)]
 
 
 def _nothing(paths: Sequence[str]) -> list[Checked]:

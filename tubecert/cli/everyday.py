@@ -91,6 +91,9 @@ def check(
         bool, typer.Option("--certify", help="Certify, too, and compare with the file's expect.")
     ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings are errors.")] = False,
+    skip_others: Annotated[
+        bool, typer.Option("--skip-others", help="Leave YAML files that are no specifications alone.")
+    ] = False,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Files checked at a time.")] = "1",
     no_cache: Annotated[
         bool, typer.Option("--no-cache", help="Do not use what earlier checks have found.")
@@ -112,7 +115,7 @@ def check(
     with guarded(how):
         from tubecert.cli.check import run
 
-        code = run(specs, given, how)
+        code = run(specs, given, how, skip_others=skip_others)
     raise typer.Exit(code)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
@@ -60,8 +60,41 @@ def refuse_usage(error: Any) -> int:
 
     text = StringIO()
     error.show(file=text)
-    _tell_as_is(printable_lines(text.getvalue()).rstrip("\n"))
+    hint = usage_hint(error, sys.argv[1:])
+    _tell_as_is(printable_lines(text.getvalue() + hint).rstrip("\n"))
     return int(error.exit_code)
+
+
+def usage_hint(error: Exception, words: Sequence[str]) -> str:
+    """What may have been meant by a command line that is refused, as a line; empty if nothing is known."""
+    option = str(getattr(error, "option_name", ""))
+    for word in words if len(option) == 2 else ():
+        if word.startswith(option) and len(word) > 2 and word[1:].split("=")[0].replace("-", "").isalpha():
+            return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
+    if option in _OTHER_OPTIONS:
+        return f"  {_OTHER_OPTIONS[option]}\n"
+    if not option and "unexpected" in str(getattr(error, "message", "")):
+        return "  one specification at a time; tubecert check takes several, and folders\n"
+    return ""
+
+
+_OTHER_OPTIONS: Final[Mapping[str, str]] = {
+    **dict.fromkeys(
+        ("--omega", "--bw"), "omega is --bandwidth, in rad/s; it is given together with --adaptation-rate"
+    ),
+    **dict.fromkeys(
+        ("--Gamma", "--gamma"), "Gamma is --adaptation-rate; it is given together with --bandwidth"
+    ),
+    **dict.fromkeys(("--rho", "--rho_a", "--rhoa"), "the radius left to the adaptation is --rho-a"),
+    **dict.fromkeys(("--eps",), "the radius beyond the initial offset is --epsilon"),
+    **dict.fromkeys(("--out", "--json-out"), "the certificate's file is --output FILE, or -o FILE"),
+    **dict.fromkeys(("--Ts", "--ts"), "the sample time is found: --conditions sampled shows it"),
+    **dict.fromkeys(
+        ("--rate", "--lambda"), "the rate belongs to the metric: metric.rate, or tubecert synth --rate"
+    ),
+    **dict.fromkeys(("--x0",), "the start is initial_state in the specification"),
+}
+"""Names that options have in the literature or elsewhere."""
 
 
 def write_stdout(text: str) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Final, Literal
 
+from tubecert.expression.elsewhere import ELSEWHERE
 from tubecert.expression.graph import FUNCTIONS as SMOOTH
 
 MAX_LENGTH: Final = 4_000
@@ -310,8 +311,23 @@ class _Walk:
             raise token.error(words.refused[name], kind="symbol")
         if name in _ANGLES:
             raise token.error(f"{name} is no name", _ANGLES[name])
-        known = [*words.symbols, "pi", *(f for f in FUNCTIONS if words.kinks or f not in KINKED)]
-        raise token.error(f"unknown symbol {name[:40]}", suggestion(name, known), "symbol")
+        raise token.error(f"unknown symbol {name[:40]}", self._help(name), "symbol")
+
+    def _help(self, name: str) -> str:
+        """What was meant, if that is plain; a function only for its own letters in another order or case."""
+        words = self.vocabulary
+        if name in ELSEWHERE:
+            return ELSEWHERE[name]
+        functions = [f for f in FUNCTIONS if words.kinks or f not in KINKED]
+        meant = [f for f in functions if sorted(f) == sorted(name.lower())] or near(
+            name, [*words.symbols, "pi"]
+        )
+        listed = sorted({*words.symbols, "pi"})
+        shown = ", ".join(listed[:20]) + (", ..." if len(listed) > 20 else "")
+        return (
+            "".join(f"did you mean {word}? " for word in meant)
+            + f"names: {shown}; functions: {' '.join(functions)}"
+        )
 
     def _uncalled(self) -> ExpressionError:
         assert self.last is not None

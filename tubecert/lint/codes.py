@@ -10,6 +10,7 @@ CONFUSABLE: Final = "TC131"
 UNITS: Final = "TC132"
 IDLE_STATE: Final = "TC133"
 EMPTY_EXPECTATION: Final = "TC134"
+NOT_POSITIVE: Final = "TC135"
 NO_UNCERTAINTY: Final = "TC205"
 LOOSE_BOUND: Final = "TC206"
 BROKEN_BOUND: Final = "TC207"
@@ -33,6 +34,7 @@ CODES: Final[Mapping[str, str]] = {
     UNITS: "some states or inputs have a unit and others have none",
     IDLE_STATE: "a state cannot change",
     EMPTY_EXPECTATION: "an expectation that expects nothing",
+    NOT_POSITIVE: "a mass, an inertia or a length is not positive",
     NO_UNCERTAINTY: "there is no uncertainty: h is zero",
     LOOSE_BOUND: "a declared bound of h is larger than its expression needs",
     BROKEN_BOUND: "the expression of h breaks a declared bound",

@@ -6,18 +6,28 @@ import re
 from collections.abc import Iterator
 from itertools import combinations
 
-from tubecert.expression import FUNCTIONS, ZERO
+from tubecert.expression import FUNCTIONS, ZERO, number_text
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
 from tubecert.spec import Spec
 
 _WORDS = (*FUNCTIONS, "pi", "t")
+# of a cart and its pendulum: masses m and M, a length l beside an inertia I; a current i beside one
+_CUSTOMARY = {frozenset(pair) for pair in ("mM", "lI", "iI", "rR")}
+_BODY = re.compile(r"(?:m|M|J|I|l|L)(?:\d+|_\w+)?|[IJ][xyz]{1,2}|(?:mass|inertia|length)\w*", re.ASCII)
 _ALIKE = str.maketrans({"O": "0", "o": "0", "l": "1", "I": "1", "i": "1"})
 
 
 def name_findings(spec: Spec) -> list[Finding]:
     """Findings about names."""
-    return [*_unused(spec), *_confusable(spec), *_units(spec), *_idle(spec), *_expectation(spec)]
+    return [
+        *_unused(spec),
+        *_confusable(spec),
+        *_negative(spec),
+        *_units(spec),
+        *_idle(spec),
+        *_expectation(spec),
+    ]
 
 
 def _unused(spec: Spec) -> Iterator[Finding]:
@@ -44,8 +54,20 @@ def _confusable(spec: Spec) -> Iterator[Finding]:
             what = {"t": "the time", "pi": "the number"}.get(word, "the function")
             yield _alike(spec, name, f"{name} is easily taken for {what} {word}")
     for first, second in combinations(names, 2):
-        if _folded(first) == _folded(second):
+        if _folded(first) == _folded(second) and frozenset((first, second)) not in _CUSTOMARY:
             yield _alike(spec, second, f"{second} is easily taken for {first}")
+
+
+def _negative(spec: Spec) -> Iterator[Finding]:
+    for name, value in spec.parameters:
+        if value <= 0 and _BODY.fullmatch(name):
+            yield Finding(
+                code=codes.NOT_POSITIVE,
+                severity=Severity.WARNING,
+                message=f"{name} is {number_text(value)}; masses, inertias and lengths are positive",
+                location=spec.location(f"system.parameters.{name}"),
+                help="write its value, or another name if it is something else",
+            )
 
 
 def _folded(name: str) -> str:

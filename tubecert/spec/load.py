@@ -7,7 +7,7 @@ from typing import Final
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, capped
 from tubecert.spec import codes
-from tubecert.spec.document import Scalar, compose
+from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import completed, read_initial_state, read_trajectory
@@ -28,6 +28,14 @@ from tubecert.spec.types import Metric, Places, Spec, Synthesis
 VERSION: Final = 1
 
 _REQUIRED = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory")
+_FORMATS = (
+    ("tubecert-certificate/", "a certificate", "tubecert recheck and tubecert report read certificates"),
+    (
+        "tubecert-metric/",
+        "a metric file",
+        "give it beside a specification: tubecert certify SPEC --metric FILE",
+    ),
+)
 _OPTIONAL = (
     "initial_state",
     "metric",
@@ -79,6 +87,8 @@ def _read(root: Field) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
+    if _is_another_file(root):
+        return None
     entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL)
     if entries is None:
         return None
@@ -95,6 +105,17 @@ def _read(root: Field) -> Spec | None:
     if system is None or names is None:
         return None  # without names nothing else can be read
     return _read_named(root.reader, entries, system, name, names)
+
+
+def _is_another_file(root: Field) -> bool:
+    """Reports a file of ours of another kind."""
+    for key, node in root.node.pairs if isinstance(root.node, MappingNode) else ():
+        if key.text == "format" and isinstance(node, Scalar):
+            for start, what, help in _FORMATS:
+                if node.text.startswith(start):
+                    root.fail(codes.WRONG_TYPE, f"this is {what}, not a specification", help)
+                    return True
+    return False
 
 
 def _read_named(

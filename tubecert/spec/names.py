@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -163,6 +164,11 @@ def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
         return "t is the time; it cannot be a name", "choose another name"
     if name in _RESERVED:
         return f"{name} is a reserved word", f"choose another name, e.g. {name}_"
+    if name.isdigit():
+        return (
+            f"{name[:60]!r} is not a name",
+            "after a decimal comma it would be a key: write a decimal point",
+        )
     if not is_name(name):
         rule = f"a name is a letter followed by letters, digits and _ (at most {MAX_NAME_LENGTH})"
         return f"{name[:60]!r} is not a name", rule
@@ -183,12 +189,34 @@ def _read_parameters(field: Field | None, taken: dict[str, str]) -> dict[str, Ex
     for key, node in field.pairs("of names to numbers") or []:
         entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "parameter", taken)
-        value = entry.constant(values)
+        value = None if _is_range(entry) else entry.constant(values)
         if name is not None:
             values[name] = (
                 ONE if value is None else value
             )  # the finding stands; users of it are not wrong too
     return values
+
+
+_RANGE = re.compile(r"([0-9.eE]+) *(?:-|\.\.+|\u2013|to) *([0-9.eE]+)|.*(?:\+-|\+/-|\u00b1).*")
+
+
+def _is_range(field: Field) -> bool:
+    """Reports a parameter whose text reads as a range or a tolerance: it would be a difference or a sum."""
+    text = field.node.text.strip() if isinstance(field.node, Scalar) else ""
+    found = _RANGE.fullmatch(text)
+    if found is None or (found[1] and not _rises(found[1], found[2])):
+        return False
+    message = f"{text[:40]} reads as a range; a parameter is one exact number"
+    help = "write the nominal value, and what may differ from it in uncertainty (h or bounds)"
+    field.fail(codes.NUMBER, message, f"{help}; a difference may stand in parentheses" if found[1] else help)
+    return True
+
+
+def _rises(first: str, second: str) -> bool:
+    try:
+        return Fraction(first) < Fraction(second)
+    except ValueError:
+        return False
 
 
 def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:

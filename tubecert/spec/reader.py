@@ -39,6 +39,24 @@ T = TypeVar("T")
 
 _GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
 
+_LIMITS = "input limits are no part of a specification: no claim is made about them (simulate shows the largest |u|)"
+_OTHER_KEYS = {
+    **dict.fromkeys(
+        ("saturation", "saturations", "input_limits", "limits", "u_max", "u_min", "actuators"), _LIMITS
+    ),
+    **dict.fromkeys(("x0", "start", "initial", "initial_condition"), "write initial_state: {at: [...]}"),
+    **dict.fromkeys(("reference", "path", "setpoint", "desired"), "the plan is the key trajectory"),
+    **dict.fromkeys(("disturbance", "disturbances"), "what is not known is the key uncertainty"),
+    **dict.fromkeys(
+        ("noise", "delay", "sensors"),
+        "no claim covers it: what is assumed instead is listed in every report",
+    ),
+    **dict.fromkeys(
+        ("constraints", "domain", "bounds_x"), "the box that the tube must stay in is the key safe_set"
+    ),
+}
+"""Keys that other formats have, and what there is of them here."""
+
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
     "symbol": codes.UNKNOWN_SYMBOL,
@@ -359,8 +377,9 @@ class Field:
         message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
         if not key.text.isascii():
             message += " (it contains letters outside ASCII)"
-        self._at(codes.UNKNOWN_KEY, key, message, suggestion(key.text, known, what="known keys"))
-        return near(key.text, known)
+        advice = _OTHER_KEYS.get(key.text) or suggestion(key.text, known, what="known keys")
+        self._at(codes.UNKNOWN_KEY, key, message, advice)
+        return [] if key.text in _OTHER_KEYS else near(key.text, known)
 
     def _wrong_type(self, wanted: str, help: str = "") -> None:
         if isinstance(self.node, BrokenNode):

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Final, NoReturn
 
-from tubecert.errors import SpecError
+from tubecert.errors import SpecError, TargetError
 from tubecert.files import Kind, read
 from tubecert.findings import Finding, Location
 from tubecert.printable import blanked
@@ -75,6 +75,13 @@ class Source:
 
 def read_source(path: str, kind: Kind = SPECIFICATION) -> Source:
     """The file's text; raises `TargetError` if it cannot be read or is too large, `SpecError` if it is no text."""
+    if path == "-":
+        finding = Finding(
+            code=codes.UNREADABLE,
+            message="- is no file: nothing is read from stdin",
+            help="write it to a file first; its name is part of the reports",
+        )
+        raise TargetError([finding])
     return decoded(path, read(path, kind))
 
 

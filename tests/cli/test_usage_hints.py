@@ -1,0 +1,55 @@
+"""What is said to a command line, or to a file, that means something else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tubecert.cli.app import app, start
+
+ROOT = Path(__file__).parents[2]
+
+
+def said(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str) -> str:
+    monkeypatch.setattr("sys.argv", ["tubecert", *words])
+    assert start() == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("certify", "a.yaml", "--omega", "3"), "omega is --bandwidth"),
+        (("certify", "a.yaml", "--Gamma", "3"), "Gamma is --adaptation-rate"),
+        (("certify", "a.yaml", "-rho-a", "0.1"), "begin with two dashes: --rho-a"),
+        (("certify", "a.yaml", "-epsilon=0.1"), "begin with two dashes: --epsilon"),
+        (("certify", "a.yaml", "b.yaml"), "one specification at a time"),
+        (("certify", "a.yaml", "--rate", "1"), "tubecert synth --rate"),
+        (("certify", "-"), "nothing is read from stdin"),
+    ],
+)
+def test_a_command_line_that_means_something_else(
+    words: tuple[str, ...], hint: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert hint in said(capsys, monkeypatch, *words)
+
+
+def test_nothing_is_guessed_of_an_option_of_one_letter(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "two dashes" not in said(capsys, monkeypatch, "certify", "a.yaml", "-z", "b-c")
+
+
+@pytest.mark.parametrize(
+    ("form", "what"), [("tubecert-certificate/2", "a certificate"), ("tubecert-metric/1", "a metric file")]
+)
+def test_another_file_of_ours_is_named(tmp_path: Path, form: str, what: str) -> None:
+    path = tmp_path / "file.json"
+    path.write_text(json.dumps({"format": form, "result": {}}, indent=1))
+    result = CliRunner().invoke(app, ["certify", str(path)])
+    assert result.exit_code == 2
+    assert f"this is {what}, not a specification" in result.stderr
+    assert result.stderr.count("error TC") == 1
