@@ -132,9 +132,9 @@ def three_state(**options: Any) -> TubeProblem:
         "rate": Fraction("0.9999"),
         "epsilon": Fraction("0.01"),
         "rho_a": Fraction("0.01"),
-        "rho_r": rho_r,
-        "rho": rho * (1 + 1e-12),
-        "initial_offset": offset,
+        "rho_r": Fraction(rho_r),
+        "rho": Fraction(rho * (1 + 1e-12)),
+        "initial_offset": Fraction(offset),
         "states": 3,
     }
     return TubeProblem(constants=constants(**values), **(defaults | options))
@@ -177,7 +177,7 @@ def alive(**options) -> TubeProblem:
         "rho_a": Fraction("0.2"),
         "rho_r": Fraction("0.7"),
         "rho": Fraction("0.9"),
-        "initial_offset": 0.15,
+        "initial_offset": Fraction(0.15),
         "A_m": scalar_predictor("3.5", 2),
         "states": 2,
     }

@@ -247,12 +247,12 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
     if found is None:
         return None
     if not found.rational and not found.of_pi:
-        return Interval(0.0)
+        return Interval.exact(0.0)
     if found.period is None:
-        return Interval(1.0)  # t occurs, as in sin((t + 1) - t), but changes nothing
+        return Interval.exact(1.0)  # t occurs, as in sin((t + 1) - t), but changes nothing
     length, of_pi = found.period
     with np.errstate(over="ignore"):
-        period = Interval.of(length) * (PI if of_pi else Interval(1.0))
+        period = Interval.of(length) * (PI if of_pi else Interval.exact(1.0))
     return period if np.isfinite(period.hi) else None
 
 

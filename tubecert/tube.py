@@ -153,7 +153,7 @@ class Tube:
         reach = np.maximum(self._rho * (1 - 1e-9) - 2 * blur, 0.0)
         scale = np.minimum(1.0, reach / np.maximum(length, 1e-300))
         points[:, state] = centre.mid + scale * offset
-        distance = (Interval(points[:, state]) - centre) ** 2
+        distance = (Interval.exact(points[:, state]) - centre) ** 2
         total = distance.hi.sum(axis=1) * (1 + 1e-14)
         ok = total <= down(np.square(self._rho))
         lo, hi = points.copy(), points.copy()

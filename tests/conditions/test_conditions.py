@@ -249,7 +249,7 @@ def test_sampled_margin_against_an_independent_evaluation():
 
 def test_a_comparison_that_cannot_be_decided_yields_both_branches():
     test = Interval(np.array([-1.0, 0.5, -2.0, np.nan]), np.array([1.0, 1.0, 0.0, np.nan]))
-    value = choose(test, Interval(np.full(4, 5.0)), Interval(np.full(4, 2.0)))
+    value = choose(test, Interval.exact(np.full(4, 5.0)), Interval.exact(np.full(4, 2.0)))
     assert list(value.lo) == [2.0, 5.0, 2.0, 2.0]
     assert list(value.hi) == [5.0, 5.0, 2.0, 5.0]
 

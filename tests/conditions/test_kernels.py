@@ -67,7 +67,7 @@ def test_kappa_is_the_supremum_and_stable_at_equal_rates(ratio):
     with mpmath.workdps(60):
         C, w = mpmath.mpf(c), mpmath.mpf(c * ratio)
         exact = 1 / (mpmath.e * C) if w == C else (C / w) ** (w / (w - C)) / C
-        value = kappa(Interval(c), Interval(c * ratio))
+        value = kappa(Interval.exact(c), Interval.exact(c * ratio))
         assert value.lo <= exact <= value.hi
         assert value.hi - value.lo < 1e-13
 
@@ -84,7 +84,7 @@ def test_tight_kernel_interval_contains_the_value_at_high_precision():
                 p, q = W * S0 - S1, C * S0 - S1
                 power = mpmath.exp(-C * S0 / q) if W == C else (q / p) ** (C / (W - C))
                 exact = (S1 + q * power) / (C * W)
-            J = tight_kernel(*(Interval(x) for x in (c, w, s0, s1)))
+            J = tight_kernel(*(Interval.exact(x) for x in (c, w, s0, s1)))
             assert J.lo <= exact <= J.hi
             assert J.hi - J.lo <= 1e-11 * float(exact)
 
@@ -115,7 +115,7 @@ def test_sup_D_against_dense_grids(horizon):
         t = np.concatenate([[0.0], np.geomspace(1e-6 * end, end, 30001)])
         brute = D_of_t(case, t).max()
         exact = float(DistanceBound(**{k: scalar(v) for k, v in case.items()}).supremum())
-        enclosed = DistanceBound(**{k: Interval(v) for k, v in case.items()}).supremum()
+        enclosed = DistanceBound(**{k: Interval.exact(v) for k, v in case.items()}).supremum()
         assert brute <= exact * (1 + 1e-9) + 1e-12
         assert exact <= brute * (1 + 1e-4) + 1e-12
         assert enclosed.lo <= exact * (1 + 1e-12) + 1e-15
@@ -146,7 +146,7 @@ def test_sup_D_interval_contains_the_value_at_high_precision():
         for _ in range(400):
             case = random_bound()
             exact = sup_D_exact({name: mpmath.mpf(value) for name, value in case.items()})
-            value = DistanceBound(**{k: Interval(v) for k, v in case.items()}).supremum()
+            value = DistanceBound(**{k: Interval.exact(v) for k, v in case.items()}).supremum()
             assert value.lo <= exact <= value.hi
             narrow += bool(value.hi - value.lo <= 1e-11 * float(exact) + 1e-300)
     assert narrow > 380  # undecided branches cost width, but only where rounding decides
@@ -187,7 +187,7 @@ sizes = st.floats(0.0, 5.0)
 def test_sup_D_rises_with_every_size_and_intervals_include(low, extra, lam, omega):
     names = ("d0", "beta", "H0", "S", "e", "delta")
     high = [x + y for x, y in zip(low, extra, strict=True)]
-    rates = {"lam": Interval(lam), "omega": Interval(omega)}
+    rates = {"lam": Interval.exact(lam), "omega": Interval.exact(omega)}
     below = DistanceBound(**dict(zip(names, map(Interval, low), strict=True)), **rates).supremum()
     above = DistanceBound(**dict(zip(names, map(Interval, high), strict=True)), **rates).supremum()
     hull = DistanceBound(**{k: Interval(a, b) for k, a, b in zip(names, low, high, strict=True)}, **rates)
@@ -223,10 +223,10 @@ def test_removable_singularities_at_high_precision(function):
             X = mpmath.mpf(x)
             if function == "r":
                 exact = mpmath.log1p(X) / X if x else mpmath.mpf(1)
-                value, near = log1p_ratio(Interval(x)), log1p_ratio(scalar(x))
+                value, near = log1p_ratio(Interval.exact(x)), log1p_ratio(scalar(x))
             else:
                 exact = -mpmath.expm1(-X) / X if x else mpmath.mpf(1)
-                value, near = decay_mean(Interval(x)), decay_mean(scalar(x))
+                value, near = decay_mean(Interval.exact(x)), decay_mean(scalar(x))
             assert value.lo <= exact <= value.hi
             assert value.hi - value.lo < 1e-9
             assert float(near) == pytest.approx(float(exact), rel=1e-10)
@@ -234,18 +234,20 @@ def test_removable_singularities_at_high_precision(function):
 
 def test_undecided_signs_widen_but_never_exclude():
     # q may have either sign: the interval must hold both kernels
-    wide = tight_kernel(Interval(1.0), Interval(2.0), Interval(0.9, 1.1), Interval(0.9, 1.1))
+    wide = tight_kernel(Interval.exact(1.0), Interval.exact(2.0), Interval(0.9, 1.1), Interval(0.9, 1.1))
     for s0 in (0.9, 1.0, 1.1):
         for s1 in (0.9, 1.0, 1.1):
             assert wide.contains(float(tight_kernel(*map(scalar, (1.0, 2.0, s0, s1)))))
     assert np.isfinite(wide.hi)
-    assert not np.isfinite(paper_kernel(Interval(1.0, 2.0), Interval(1.5), Interval(1.0), Interval(1.0)).hi)
+    assert not np.isfinite(
+        paper_kernel(Interval(1.0, 2.0), Interval.exact(1.5), Interval.exact(1.0), Interval.exact(1.0)).hi
+    )
 
 
 def test_least_solution_is_the_least_prefixed_point():
     assert float(least_solution(scalar(2.0), scalar(0.5))) == 4.0
     assert np.isinf(least_solution(scalar(2.0), scalar(1.0)))
-    value = least_solution(Interval(2.0), Interval(0.4, 1.2))
+    value = least_solution(Interval.exact(2.0), Interval(0.4, 1.2))
     assert value.lo <= Fraction(2) / Fraction(6, 10)
     assert np.isinf(value.hi)
 
@@ -254,7 +256,7 @@ def test_least_solution_is_the_least_prefixed_point():
 def test_an_undecided_sign_of_q_costs_next_to_nothing(w):
     """h = b sin t has s0 = s1 = b: with c = 1 its q is 0 up to a rounding, and J is s1/(c w) all the same."""
     b = Interval(0.01 * (1 - 1e-12), 0.01 * (1 + 1e-12))
-    c, omega = Interval(1 - 1e-15, 1 + 1e-15), Interval(w)
+    c, omega = Interval(1 - 1e-15, 1 + 1e-15), Interval.exact(w)
     found = tight_kernel(c, omega, b, b)
     exact = float(tight_kernel(scalar(1.0), scalar(w), scalar(0.01), scalar(0.01)))
     assert found.lo <= exact * (1 + 1e-12)

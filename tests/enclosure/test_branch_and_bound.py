@@ -395,4 +395,4 @@ def test_sanitised_bounds_reach_the_search():
     with np.errstate(all="ignore"):
         assert e.upper(minus, plus, -np.inf).upper[0] == np.inf
         assert e.lower(minus, minus)[0] == -np.inf
-    assert Interval(np.nan).sanitised().hi == np.inf
+    assert Interval.exact(np.nan).sanitised().hi == np.inf

@@ -48,23 +48,23 @@ def test_an_absolute_value_reaches_zero_where_its_argument_does():
     for lo, hi, least in ((-1.0, 2.0, 0.0), (-2.0, 1.0, 0.0), (1.0, 2.0, 1.0), (-2.0, -1.0, 1.0)):
         assert iv.norm([Interval(lo, hi)]).lo == least
         assert iv.norm([Interval(lo, hi)]).hi == max(-lo, hi)
-        assert iv.norm([Interval(lo, hi), Interval(0.0)]).lo <= least
+        assert iv.norm([Interval(lo, hi), Interval.exact(0.0)]).lo <= least
 
 
 def test_functions_do_not_stop_at_an_underflow():
-    assert iv.exp(Interval(-746.0)).hi > 0  # 1e-324 is no float
-    assert iv.log1p(Interval(1e-310)).lo < 1e-310  # x - x**2/2
-    assert iv.expm1(Interval(1e-310)).hi > 1e-310
-    assert iv.tan(Interval(1e-310)).hi > 1e-310
-    assert iv.sin(Interval(1e-310)).lo < 1e-310
+    assert iv.exp(Interval.exact(-746.0)).hi > 0  # 1e-324 is no float
+    assert iv.log1p(Interval.exact(1e-310)).lo < 1e-310  # x - x**2/2
+    assert iv.expm1(Interval.exact(1e-310)).hi > 1e-310
+    assert iv.tan(Interval.exact(1e-310)).hi > 1e-310
+    assert iv.sin(Interval.exact(1e-310)).lo < 1e-310
 
 
 @pytest.mark.parametrize("large", [1e7, 1e17, 1e300])
 def test_of_large_angles_nothing_is_known(large):
-    opened = iv.tan(Interval(large)).sanitised()
+    opened = iv.tan(Interval.exact(large)).sanitised()
     assert (opened.lo, opened.hi) == (-math.inf, math.inf)
     for function in (iv.sin, iv.cos):
-        assert (function(Interval(large)).lo, function(Interval(large)).hi) == (-1, 1)
+        assert (function(Interval.exact(large)).lo, function(Interval.exact(large)).hi) == (-1, 1)
 
 
 def test_a_radius_below_the_last_place_is_counted():

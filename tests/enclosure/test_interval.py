@@ -66,7 +66,7 @@ def within(value, found):
 
 
 def thin_or_wide(bounds):
-    return Interval(bounds[0]) if bounds[0] == bounds[1] else Interval(*bounds)
+    return Interval.exact(bounds[0]) if bounds[0] == bounds[1] else Interval(*bounds)
 
 
 ARITHMETIC = {
@@ -298,9 +298,20 @@ def test_bounded_functions_stay_in_their_ranges():
     assert np.pi < edge.hi < np.pi + 1e-15
 
 
+@pytest.mark.parametrize("near", [0.1, np.float64(0.1), np.array([0.1]), "0.1", None])
+def test_what_says_nothing_of_its_error_is_no_enclosure(near):
+    """A float that was computed or sampled cannot slip into a proof: whoever takes it as exact has to say so."""
+    unit = Interval.exact(1.0)
+    for use in (Interval.of, unit.__add__, unit.__mul__, unit.__sub__, unit.__truediv__, unit.__rsub__):
+        with pytest.raises(TypeError):
+            use(near)
+    assert Interval.of(Fraction(1, 10)).lo < 0.1 <= Interval.of(Fraction(1, 10)).hi
+    assert (Interval.of(3).lo, Interval.of(2**60 + 1).hi) == (3.0, np.nextafter(2.0**60, np.inf))
+
+
 def test_undefined_operations_say_nothing():
     unit = Interval(-1.0, 1.0)
-    for found in (1.0 / unit, iv.sqrt(unit), iv.log1p(Interval(-1.0, 0.0)), unit**-2, unit / unit):
+    for found in (1 / unit, iv.sqrt(unit), iv.log1p(Interval(-1.0, 0.0)), unit**-2, unit / unit):
         opened = found.sanitised()
         assert (opened.lo, opened.hi) == (-np.inf, np.inf)
     for found in (
@@ -412,8 +423,8 @@ def test_removed_outward_rounding_is_noticed(name, operation, monkeypatch):
 def test_removed_outward_rounding_of_powers_and_roots_is_noticed(name, monkeypatch):
     unsafe(name, monkeypatch)
     points = [Fraction(float(x)) for x in np.linspace(0.1, 3, 200)]
-    assert not all(within(ball(q**3), Interval(float(q)) ** 3) for q in points)
-    assert not all(within(ball(q).sqrt(), iv.sqrt(Interval(float(q)))) for q in points)
+    assert not all(within(ball(q**3), Interval.exact(float(q)) ** 3) for q in points)
+    assert not all(within(ball(q).sqrt(), iv.sqrt(Interval.exact(float(q)))) for q in points)
 
 
 @pytest.mark.parametrize("name", ["sin", "exp", "log1p", "expm1"])
@@ -423,7 +434,7 @@ def test_a_library_believed_exact_is_noticed(name, monkeypatch):
     function, exact, _ = DOMAINS[name]
     if name == "sin":
         monkeypatch.setattr(iv, "_wave", lambda a, f, *_: Interval(f(a.lo), f(a.hi)))
-    assert not all(within(exact(arb(float(at))), function(Interval(at))) for at in x)
+    assert not all(within(exact(arb(float(at))), function(Interval.exact(at))) for at in x)
 
 
 def test_steps_outward_reach_at_least_the_next_float():

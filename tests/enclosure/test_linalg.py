@@ -89,7 +89,7 @@ KINDS = ("plain", "graded", "close", "tiny", "huge", "singular")
 @QUICK
 def test_eigenvalues_are_enclosed(kind, seed, n):
     m = symmetric(seed, kind, n)
-    found = eigenvalues(Interval(m[None]))
+    found = eigenvalues(Interval.exact(m[None]))
     size = np.abs(m).max()
     for k, value in enumerate(exact_eigenvalues(m)):
         assert holds(value, found.lo[0, k], found.hi[0, k])
@@ -126,7 +126,7 @@ def test_spectral_norms_are_enclosed(kind, seed, p, q):
         m = m * (
             1e60 if kind == "tiny" else 1e-60
         )  # its square must not leave the range of the sum of squares
-    found = spectral_norm(Interval(m[None]))
+    found = spectral_norm(Interval.exact(m[None]))
     assert holds(exact_norm(m), found.lo[0], found.hi[0])
     assert found.hi[0] - found.lo[0] <= 1e-11 * np.abs(m).max() + 1e-140
 
@@ -209,10 +209,10 @@ def test_midrad_covers_its_interval(seed, n):
 def test_unknown_entries_leave_eigenvalues_and_norms_unbounded(bad):
     m = np.eye(3)[None].repeat(2, axis=0)
     m[1, 0, 1] = m[1, 1, 0] = bad
-    for found in (eigenvalues(Interval(m)), eigenvalues(Interval(np.full((1, 1, 1), bad)))):
+    for found in (eigenvalues(Interval.exact(m)), eigenvalues(Interval.exact(np.full((1, 1, 1), bad)))):
         assert np.all(found.hi[-1] == np.inf)
         assert np.all(found.lo[-1] == -np.inf)
-    norms = spectral_norm(Interval(m))
+    norms = spectral_norm(Interval.exact(m))
     assert norms.hi[0] < 1.01
     assert norms.hi[1] == np.inf
     assert norms.lo[1] == 0
@@ -220,10 +220,10 @@ def test_unknown_entries_leave_eigenvalues_and_norms_unbounded(bad):
 
 def test_squares_that_overflow_leave_nothing_known_but_nothing_false():
     m = 1e200 * np.array([[[1.0, 0.5], [0.5, 2.0]]])
-    found = eigenvalues(Interval(m))
+    found = eigenvalues(Interval.exact(m))
     assert np.all(found.lo <= 1e200)
     assert np.all(found.hi >= 2e200)
-    column = spectral_norm(Interval(m[:, :, :1]))
+    column = spectral_norm(Interval.exact(m[:, :, :1]))
     assert column.lo[0] <= 1.1e200
     assert column.hi[0] >= 1.1e200
 
@@ -282,7 +282,7 @@ def test_a_lying_eigenvalue_routine_never_yields_a_false_enclosure(seed, monkeyp
     told = 0
     for answer in lies(tuple(EIGH(m)), rng):
         monkeypatch.setattr(np.linalg, "eigh", lambda _, answer=answer: answer)
-        found = eigenvalues(Interval(m))
+        found = eigenvalues(Interval.exact(m))
         assert not np.isnan(found.lo).any()
         assert not np.isnan(found.hi).any()
         for k, value in enumerate(exact):
@@ -298,7 +298,7 @@ def test_a_lying_singular_value_routine_never_yields_a_false_enclosure(seed, mon
     top = exact_norm(m[0])
     for answer in lies(tuple(SVD(m, full_matrices=False)), rng):
         monkeypatch.setattr(np.linalg, "svd", lambda *_, answer=answer, **__: answer)
-        found = spectral_norm(Interval(m))
+        found = spectral_norm(Interval.exact(m))
         assert not np.isnan(found.lo).any()
         assert not np.isnan(found.hi).any()
         assert holds(top, found.lo[0], found.hi[0])
@@ -309,7 +309,7 @@ def test_a_lying_singular_value_routine_never_yields_a_false_enclosure(seed, mon
 def test_false_enclosures_would_be_noticed(seed):
     # without the residual the enclosure is LAPACK's word: the checks above must see the difference
     m = symmetric(seed, "plain", 3)
-    found = eigenvalues(Interval(m[None]))
+    found = eigenvalues(Interval.exact(m[None]))
     exact = exact_eigenvalues(m)
     assert not all(holds(v, found.lo[0, k] + 1e-3, found.hi[0, k] + 1e-3) for k, v in enumerate(exact))
 

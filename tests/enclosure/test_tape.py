@@ -57,7 +57,7 @@ def test_thin_intervals_and_floats_agree_with_the_text(text, point):
     tape = Tape([read(text)], NAMES)
     at = [np.array([float(point[name])]) for name in NAMES]
     exact = evaluate(text, {name: Fraction(float(q)) for name, q in point.items()})
-    thin = tape.run([Interval(v) for v in at], (1,))
+    thin = tape.run([Interval.exact(v) for v in at], (1,))
     assert possible(exact, thin.lo[0, 0], thin.hi[0, 0])
     value = float(exact.mid())
     if abs(value) < 1e100 and thin.hi[0, 0] - thin.lo[0, 0] < 1e-3:
@@ -91,7 +91,7 @@ def test_argument_that_is_used_twice_survives():
     s = sin(x)
     e = (s * s + s) * (s + sin(s)) + s
     point = {"x": Fraction(3, 4), "y": Fraction(0), "t": Fraction(0)}
-    found = Tape([e], ("x",)).run([Interval(np.array([0.75]))], (1,))
+    found = Tape([e], ("x",)).run([Interval.exact(np.array([0.75]))], (1,))
     text = "(sin(x)*sin(x) + sin(x))*(sin(x) + sin(sin(x))) + sin(x)"
     assert possible(evaluate(text, point), found.lo[0, 0], found.hi[0, 0])
     assert found.hi[0, 0] - found.lo[0, 0] < 1e-13
@@ -120,7 +120,7 @@ def test_a_sine_of_anything_is_at_most_one():
 def test_constants_beyond_the_floats_bound_nothing_but_break_nothing():
     huge = constant(Fraction(10) ** 400)
     tape = Tape([huge * x, x / huge], ("x",))
-    found = tape.run([Interval(np.array([2.0]))], (1,))
+    found = tape.run([Interval.exact(np.array([2.0]))], (1,))
     assert found.hi[0, 0] == np.inf
     assert found.lo[0, 0] >= 1e308
     assert found.lo[1, 0] <= 0 < found.hi[1, 0]
@@ -130,7 +130,7 @@ def test_constants_beyond_the_floats_bound_nothing_but_break_nothing():
 def test_batches_broadcast():
     e = [x * y, norm([x, y]), sqrt(1 + x * x), constant(2)]
     a = np.linspace(-1, 1, 7)
-    found = Tape(e, ("x", "y")).run([Interval(a, a + 0.1), Interval(a)], (7,))
+    found = Tape(e, ("x", "y")).run([Interval(a, a + 0.1), Interval.exact(a)], (7,))
     assert found.lo.shape == (4, 7)
     assert np.all(found.lo[1] <= np.hypot(a, a))
     assert np.all(found.lo[3] == 2)

@@ -114,3 +114,41 @@ def test_proofs_are_made_by_the_kernel_alone(path):
     assert "Proof" not in called or name_of(path) == SAYS_CERTIFIED
     assert "MetricProof" not in called or name_of(path) == "metric/verify.py"
     assert "Containment" not in called or name_of(path) in {"tube.py", "bounds/compute.py"}
+
+
+_BOUND = "the safe side of a constant, which is a float by definition"
+_ENDS = "ends of an interval, put in for a variable that a formula is monotone in"
+_POINT = "a point that was chosen: it need not be near anything"
+TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant, and not near it
+    "bounds/compute.py": _BOUND,
+    "bounds/start.py": f"{_BOUND}; 0; the congruence T, any will do",
+    "bounds/suprema.py": "1",
+    "conditions/arithmetic.py": f"{_ENDS}; -inf",
+    "conditions/distance.py": f"{_ENDS}; where a fixed point is approached from below",
+    "conditions/kernels.py": _ENDS,
+    "conditions/problem.py": _BOUND,
+    "enclosure/interval.py": "powers; small integers",
+    "enclosure/metric_norm.py": _BOUND,
+    "enclosure/objective.py": "0; the congruence T, any will do",
+    "enclosure/tape.py": "no number",
+    "enclosure/taylor.py": f"corners of a box; {_POINT}",
+    "metric/geodesic.py": "rho, rounded up by the caller",
+    "metric/verify.py": "1",
+    "model.py": "0 and 1",
+    "stages/bounded.py": _BOUND,
+    "trajectory/hermite.py": _POINT,
+    "trajectory/plan.py": _POINT,
+    "tube.py": _POINT,
+}
+
+
+def test_floats_are_taken_as_exact_where_they_are():
+    """A float that was computed, measured or sampled says nothing of its error, and bounds nothing."""
+    found = {
+        name_of(path)
+        for path in TRUSTED
+        if room_of(name_of(path)) != "recheck"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) == "Interval.exact"
+    }
+    assert found == set(TAKES_FLOATS)

@@ -61,7 +61,7 @@ def least_radius(
         if not offset.hi > 0:
             return width
         with np.errstate(all="ignore"):
-            overshoot = float((sqrt(Interval(A.above) / Interval(a.below)) * offset).hi)
+            overshoot = float((sqrt(Interval.exact(A.above) / Interval.exact(a.below)) * offset).hi)
         return decimal_above(Fraction(overshoot) + width) if math.isfinite(overshoot) else None
 
     def check(rho: Fraction) -> Containment:

@@ -57,7 +57,7 @@ class KnownStart:
         """|x*(0) - x(0)|."""
         delta = self._delta(suprema.plan.start)
         if all(d is ZERO for d in delta):
-            return Interval(0.0)
+            return Interval.exact(0.0)
         found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), suprema.effort)
         if np.isfinite(found.above):
             return Interval(found.below, found.above)
@@ -116,8 +116,8 @@ class StartWithin:
         """sqrt(A) times the radius: the segment lies in the tube."""
         del suprema
         a, A = metric
-        least = sqrt(Interval(a.below)) * Interval.of(self.radius)
-        most = sqrt(Interval(A.above)) * Interval.of(self.radius)
+        least = sqrt(Interval.exact(a.below)) * Interval.of(self.radius)
+        most = sqrt(Interval.exact(A.above)) * Interval.of(self.radius)
         return Constant(below=float(least.lo), above=float(most.hi))
 
     def uncertainty(self, suprema: Suprema) -> Constant:
@@ -134,11 +134,11 @@ def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
     mid, rad = midrad(w)
     t = whitening(mid)
     scaled = eigenvalues_midrad(*congruence(t, mid, rad))
-    total = Interval(np.zeros(len(lo)))
+    total = Interval.exact(np.zeros(len(lo)))
     for i in range(t.shape[-2]):
-        entry = Interval(np.zeros(len(lo)))
+        entry = Interval.exact(np.zeros(len(lo)))
         for j in range(t.shape[-1]):
-            entry = entry + delta[:, j, 0] * t[:, i, j]
+            entry = entry + delta[:, j, 0] * Interval.exact(t[:, i, j])
         total = total + entry**2
     square = total / Interval(scaled.lo[:, 0], scaled.hi[:, -1])
     # where the start is a rounding away from the plan's, squares reach 0 and are rounded below it

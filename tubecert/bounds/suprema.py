@@ -65,7 +65,7 @@ class Suprema:
         eye = identity(len(self.model.states))
         largest = self._over_tube("lower", Pencil(self.model.W, eye), fine)
         upper = self._over_tube("upper", Pencil(eye, self.model.W), fine)
-        inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
+        inverse = (Interval.exact(1.0) / Interval(largest.below, largest.above)).sanitised()
         lower = Constant(below=float(inverse.lo), above=float(inverse.hi), at=self._witness(largest))
         return lower, self._constant(upper)
 

@@ -23,11 +23,16 @@ quiet = np.errstate(all="ignore")
 """Branches are evaluated before they are chosen: division by 0 in a branch not taken is not news."""
 
 
-def number(value: Fraction | float, like: T) -> T:
+def number(value: Fraction | int, like: T) -> T:
     """An exact number in the arithmetic of `like`."""
     if isinstance(like, Interval):
         return Interval.of(value)
     return np.asarray(float(value))
+
+
+def nothing(like: T) -> T:
+    """-inf, the margin of what is not bounded."""
+    return Interval.exact(-np.inf) if isinstance(like, Interval) else np.asarray(-np.inf)
 
 
 def vector(values: list[Fraction]) -> Interval:
@@ -105,12 +110,12 @@ def log1p_ratio(x: T) -> T:
 
 def _ratio_at(x: Array) -> Interval:
     """The same at floats; near 0 from 1 - x/2 <= r(x) <= 1 - x/2 + x^2/2, which holds for |x| <= 1/3."""
-    point = Interval(x)
-    line = 1.0 - 0.5 * point
+    point = Interval.exact(x)
+    line = 1 - point / 2
     quotient = iv.log1p(point) / point
     near = np.abs(x) <= 1e-5
     return Interval(
-        np.where(near, line.lo, quotient.lo), np.where(near, (line + 0.5 * point**2).hi, quotient.hi)
+        np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
     )
 
 
@@ -125,12 +130,12 @@ def decay_mean(y: T) -> T:
 
 def _decay_mean_at(y: Array) -> Interval:
     """The same at floats; near 0 from 1 - y/2 <= value <= 1 - y/2 + y^2/2."""
-    point = Interval(y)
-    line = 1.0 - 0.5 * point
+    point = Interval.exact(y)
+    line = 1 - point / 2
     quotient = iv.expm1(-point) / (-point)
     near = np.abs(y) <= 1e-5
     return Interval(
-        np.where(near, line.lo, quotient.lo), np.where(near, (line + 0.5 * point**2).hi, quotient.hi)
+        np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
     )
 
 
@@ -141,8 +146,8 @@ def least_solution(constant: T, slope: T) -> T:
     `constant >= 0`, `slope >= 0`. The set of such Y is a ray, which is why minima and maxima of several such
     bounds are solved by the minimum and maximum of their solutions.
     """
-    rest = 1.0 - slope
+    rest = 1 - slope
     if isinstance(rest, Interval):
-        lo, hi = (constant / Interval(rest.hi)).lo, (constant / Interval(rest.lo)).hi
+        lo, hi = (constant / Interval.exact(rest.hi)).lo, (constant / Interval.exact(rest.lo)).hi
         return Interval(np.where(rest.hi > 0, lo, np.inf), np.where(rest.lo > 0, hi, np.inf))
     return np.where(rest > 0, constant / rest, np.inf)

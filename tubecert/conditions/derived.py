@@ -56,30 +56,30 @@ def _corrected(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
         hs=hs,
         E0=n.d0**2,
         zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),
-        third=n.Dhx * (4.0 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,
+        third=n.Dhx * (4 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,
     )
 
 
 @quiet
 def _printed(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
-    du = n.excess / (2.0 * n.smin)  # no bound of the feedback, and may be negative
-    speed = known_drift(problem, n) + n.DB * (2.0 * n.Dh + n.rho * du)
+    du = n.excess / (2 * n.smin)  # no bound of the feedback, and may be negative
+    speed = known_drift(problem, n) + n.DB * (2 * n.Dh + n.rho * du)
     geodesic_rate = sqrt(n.A / n.a) * (
         n.Dfx + (n.Dh + n.Dus + n.rho * du) * n.Dbx + (n.Dhx + sqrt(n.a) * du / sqrt(n.A)) * n.DB
     )
     terms = _common(n, speed, geodesic_rate)
     return RateTerms(
         **terms,
-        hs=2.0 * n.Dh,
+        hs=2 * n.Dh,
         E0=n.A * n.offset**2,
-        zeta_p=0.0 * n.rho,
-        third=n.A * n.Dhx * (4.0 * n.lam * n.DB + terms["psi_rate"]) / n.lam,
+        zeta_p=0 * n.rho,
+        third=n.A * n.Dhx * (4 * n.lam * n.DB + terms["psi_rate"]) / n.lam,
     )
 
 
 def _common(n: Numbers[T], speed: T, geodesic_rate: T) -> dict[str, T]:
     """What both variants share."""
-    psi_x = 2.0 * n.DBx + n.DB * n.DMx / n.a
+    psi_x = 2 * n.DBx + n.DB * n.DMx / n.a
     psi_rate = n.A * (n.DB * geodesic_rate + n.DB * n.DMx * speed / sqrt(n.A * n.a) + n.DBx * speed)
     return {
         "speed": speed,
@@ -87,7 +87,7 @@ def _common(n: Numbers[T], speed: T, geodesic_rate: T) -> dict[str, T]:
         "psi_x": psi_x,
         "geodesic_rate": geodesic_rate,
         "psi_rate": psi_rate,
-        "weight1": 2.0 * n.rho * n.DB * (n.A / n.a),
+        "weight1": 2 * n.rho * n.DB * (n.A / n.a),
         "weight2": n.A * psi_x,
     }
 
@@ -105,18 +105,18 @@ class Zetas(Generic[T]):
 def zetas(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T) -> Zetas[T]:
     """(zeta_1) to (zeta_3) with the kernel that the problem asks for."""
     kernel = paper_kernel if problem.active_kernel is Kernel.PAPER else tight_kernel
-    k = kernel(2.0 * n.lam, omega, n.Dh, terms.s1)
+    k = kernel(2 * n.lam, omega, n.Dh, terms.s1)
     return Zetas(zeta1=terms.weight1 * k, zeta2=terms.weight2 * k, zeta3=terms.third / omega)
 
 
 @quiet
 def prediction_error(hs: T, s1: T, q: T) -> T:
     """Dxt = sqrt(2 (1+r_H) Dh s1/q + ((1+r_H) Dh)^2): |xhat - x| <= Dxt/sqrt(Gamma), for P = I."""
-    return sqrt(2.0 * hs * s1 / q + hs**2)
+    return sqrt(2 * hs * s1 / q + hs**2)
 
 
 @quiet
 def filter_error(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, p: Predictor[T]) -> T:
     """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt."""
-    gain = n.DBpx * terms.speed + (float(problem.filter_factor) * omega + p.norm) * n.DBp
+    gain = n.DBpx * terms.speed + (problem.filter_factor * omega + p.norm) * n.DBp
     return gain * prediction_error(terms.hs, terms.s1, p.q)

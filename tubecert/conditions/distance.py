@@ -122,7 +122,7 @@ def _is_valid(
 
 
 def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -> Interval:
-    return (1.0 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
+    return (1 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
 
 
 @quiet
@@ -140,21 +140,21 @@ def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     def errors(Y: Interval) -> tuple[Interval, Interval]:
         S = uncertainty(n, Y, omega).sanitised()
         e = (filter_error(n, Y, omega, p) / root).sanitised()
-        return Interval(np.maximum(S.lo, 0.0)), Interval(np.maximum(e.lo, 0.0))
+        return Interval.exact(np.maximum(S.lo, 0.0)), Interval.exact(np.maximum(e.lo, 0.0))
 
     Y = least_from_below(lambda Y: speed_needed(n, *errors(Y)))
     S, e = errors(Y)
-    return float((1.0 - distance_bound(n, omega, S, e).supremum() / reach(n)).sanitised().hi)
+    return float((1 - distance_bound(n, omega, S, e).supremum() / reach(n)).sanitised().hi)
 
 
 def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
     """A lower bound of every Y >= needed(Y), for a nondecreasing `needed`: iterates from 0, rounded down."""
-    Y = Interval(0.0)
+    Y = Interval.exact(0.0)
     for _ in range(_RISES):
         raised: Array = np.maximum(Y.lo, needed(Y).sanitised().lo)
         if raised <= Y.lo * (1 + 1e-13):
             break
-        Y = Interval(raised)
+        Y = Interval.exact(raised)
     return Y
 
 

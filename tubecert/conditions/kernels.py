@@ -55,8 +55,8 @@ def tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
     |h| <= s0 at the start and |dh/dt| <= s1 afterwards. Nondecreasing in s0 and s1, decreasing in w.
     """
     if isinstance(s0, Interval):
-        below = _tight_kernel(c, w, Interval(s0.lo), Interval(s1.lo))
-        above = _tight_kernel(c, w, Interval(s0.hi), Interval(s1.hi))
+        below = _tight_kernel(c, w, Interval.exact(s0.lo), Interval.exact(s1.lo))
+        above = _tight_kernel(c, w, Interval.exact(s0.hi), Interval.exact(s1.hi))
         return Interval(below.lo, above.hi).sanitised()
     return _tight_kernel(c, w, s0, s1)
 
@@ -69,7 +69,7 @@ def _tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
     # q (q/p)^(c/(w-c)) is q times a number below 1 if c < w, and q (p/q)^(c/(c-w)) <= p otherwise. These limit the
     # damage where the sign of q is undecided.
     room = minimum(c, w) * s0 - s1
-    peak = confined(peak, slow, slow + minimum(s0 * kappa(c, w), maximum(number(0.0, slow), room) / (c * w)))
+    peak = confined(peak, slow, slow + minimum(s0 * kappa(c, w), maximum(number(0, slow), room) / (c * w)))
     return choose(room, peak, slow)
 
 
@@ -107,7 +107,7 @@ class DistanceBound(Generic[T]):
 def _end(D: DistanceBound[Any], side: str) -> DistanceBound[Interval]:
     """The same with every size at its lower ("lo") or upper ("hi") end; lam and omega stay enclosures."""
     sizes = ("d0", "beta", "H0", "S", "e", "delta")
-    return replace(D, **{name: Interval(getattr(getattr(D, name), side)) for name in sizes})
+    return replace(D, **{name: Interval.exact(getattr(getattr(D, name), side)) for name in sizes})
 
 
 def _at(D: DistanceBound[T], t: T) -> T:
@@ -122,7 +122,7 @@ def _supremum(D: DistanceBound[T]) -> T:
     A1 = D.ultimate()
     C1 = D.beta * (D.H0 - D.S)
     D1 = D.omega - D.lam
-    zero = number(0.0, A1)
+    zero = number(0, A1)
     z = (D.d0 - A1) / C1
     t1 = log1p_ratio(D1 / D.lam) / D.lam - z * log1p_ratio(z * D1)
     last = A1
@@ -137,5 +137,5 @@ def _supremum(D: DistanceBound[T]) -> T:
     peak = confined(maximum(ends, peak), ends, weak)
     # D rises from d0 to an interior maximum iff C1 > max(0, lam (d0 - A1)) and 1 + z D1 > 0
     rises = C1 - maximum(zero, D.lam * (D.d0 - A1))
-    interior = choose(rises, 1.0 + z * D1, -absolute(rises))
+    interior = choose(rises, 1 + z * D1, -absolute(rises))
     return choose(interior, peak, ends)

@@ -30,14 +30,14 @@ def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
 def _residual(n: Numbers[Interval]) -> Interval:
     """What a plan defect alone leads to: delta/lambda, or what of it the horizon allows."""
     still = DistanceBound(
-        d0=0.0 * n.d0,
+        d0=0 * n.d0,
         beta=n.beta,
-        H0=0.0 * n.H0,
-        S=0.0 * n.H0,
-        e=0.0 * n.H0,
+        H0=0 * n.H0,
+        S=0 * n.H0,
+        e=0 * n.H0,
         delta=n.delta,
         lam=n.lam,
-        omega=2.0 * n.lam,
+        omega=2 * n.lam,
         horizon=n.horizon,
     )
     return still.supremum()
@@ -47,7 +47,7 @@ def _obstacle(
     claim: str, allowed: tuple[Interval, Interval], needed: tuple[Interval, Interval]
 ) -> Shortfall | None:
     """The reason, unless allowed > needed is proven; both on the safe side first, then enclosed."""
-    low, high = (1.0 - x / y for x, y in zip(needed, allowed, strict=True))
+    low, high = (1 - x / y for x, y in zip(needed, allowed, strict=True))
     if low.lo > 0:
         return None
     margin = Interval(low.lo, np.maximum(low.lo, high.hi))

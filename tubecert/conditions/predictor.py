@@ -52,7 +52,7 @@ class Predictor(Generic[T]):
     @staticmethod
     def of_gain(g: T, omega: T) -> Predictor[T]:
         """A_m = -g I."""
-        return Predictor(norm=g, shifted=absolute(omega - g), q=2.0 * g)
+        return Predictor(norm=g, shifted=absolute(omega - g), q=2 * g)
 
 
 @quiet

@@ -24,8 +24,6 @@ from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 
-Exact = Fraction | float  # a float means its binary value
-
 _ROUNDING = 1 + Fraction(1, 10**9)  # what a caller who rounds rho may miss; `proven` corrects for it
 _LEAST_RADIUS = 1e-12  # of R_H where h vanishes: keeps every quotient defined
 RADIUS_DIGITS = 6  # of R_H: more than for the gains, because every digit dropped makes every constant larger
@@ -100,9 +98,9 @@ class TubeProblem:
     rate: Fraction
     epsilon: Fraction
     rho_a: Fraction
-    rho_r: Interval | Exact
-    rho: Exact
-    initial_offset: Interval | Exact = 0.0
+    rho_r: Interval | Fraction
+    rho: Fraction
+    initial_offset: Interval | Fraction = Fraction(0)
     horizon: Fraction | None = None
     states: int = 1
     A_m: Matrix | None = None
@@ -175,9 +173,9 @@ class TubeProblem:
 
     def proven(self, R_H: Fraction | None = None) -> Numbers[Interval]:
         """The safe side: the theorems hold with these numbers, because each bounds its constant."""
-        safe = self._numbers(lambda name, c: Interval(c.below if name in _INFIMA else c.above), R_H)
+        safe = self._numbers(lambda name, c: Interval.exact(c.below if name in _INFIMA else c.above), R_H)
         rho_r = np.minimum(safe.rho_r.lo, (safe.rho - safe.rho_a).lo)  # the proof needs rho_r + rho_a <= rho
-        return replace(safe, rho_r=Interval(rho_r), offset=Interval(safe.offset.hi))
+        return replace(safe, rho_r=Interval.exact(rho_r), offset=Interval.exact(safe.offset.hi))
 
     def enclosed(self, R_H: Fraction | None = None) -> Numbers[Interval]:
         """Enclosures of the constants themselves, for what cannot be excluded."""
@@ -207,5 +205,5 @@ _NOT_DAMPED = Finding(
 )
 
 
-def _interval(value: Interval | Exact) -> Interval:
-    return value if isinstance(value, Interval) else Interval.of(value)
+def _interval(value: Interval | Fraction) -> Interval:
+    return Interval.of(value)

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant
-from tubecert.conditions.arithmetic import Array, T, choose, number, quiet, sqrt, vector
+from tubecert.conditions.arithmetic import Array, T, choose, nothing, quiet, sqrt, vector
 from tubecert.conditions.derived import (
     RateTerms,
     filter_error,
@@ -62,10 +62,10 @@ def rate_margins(problem: TubeProblem, n: Numbers[T], omega: T, Gamma: T, g: T |
     """The three margins in one arithmetic; (26c) is -inf where (26b) leaves nothing to divide by."""
     terms = rate_terms(problem, n)
     z = zetas(problem, n, terms, omega)
-    first = 1.0 - (terms.E0 / n.a + z.zeta1 + terms.zeta_p) / n.rho_r**2
+    first = 1 - (terms.E0 / n.a + z.zeta1 + terms.zeta_p) / n.rho_r**2
     rest = n.a - z.zeta2 - z.zeta3
     needed = theta(problem, n, terms, omega, g) / (n.rho_a * rest)
-    third = choose(rest, 1.0 - needed / sqrt(Gamma), number(-np.inf, rest))
+    third = choose(rest, 1 - needed / sqrt(Gamma), nothing(rest))
     return {"26a": _known(first), "26b": _known(rest / n.a), "26c": _known(third)}
 
 
@@ -127,7 +127,7 @@ def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     for n in (problem.proven(), problem.enclosed()):
         terms = rate_terms(problem, n)
         needed.append(terms.E0 / n.a + terms.zeta_p)
-        margins.append(1.0 - needed[-1] / n.rho_r**2)
+        margins.append(1 - needed[-1] / n.rho_r**2)
     low, high = margins
     if low.lo > 0:
         return ()

@@ -60,16 +60,16 @@ class Ages(Generic[T]):
 def ages(Ts: T, omega: T, g: T) -> Ages[T]:
     """Mean age m = 1/g - Ts/(e^(g Ts) - 1) in [0, Ts/2], and the filter's share w."""
     y = g * Ts
-    line = 0.5 - y / 12.0
-    mean = 1.0 / y - 1.0 / expm1(y)
+    line = number(Fraction(1, 2), y) - y / 12
+    mean = 1 / y - 1 / expm1(y)
     if isinstance(mean, Interval) and isinstance(line, Interval):
         # the series 1/2 - y/12 + y^3/720 - ... envelopes the mean: free of the cancellation at small y
         mean = confined(
-            mean, maximum(line, number(0.0, line)), minimum(line + y**3 / 720.0, number(0.5, line))
+            mean, maximum(line, number(0, line)), minimum(line + y**3 / 720, number(Fraction(1, 2), line))
         )
     else:
         mean = np.where(y < 1e-3, line, mean)
-    return Ages(m=Ts * mean, w=1.0 / (omega * decay_mean(omega * Ts)))
+    return Ages(m=Ts * mean, w=1 / (omega * decay_mean(omega * Ts)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +129,7 @@ def _bound(n: Numbers[T], omega: T, s: SampledState[T]) -> DistanceBound[T]:
         beta=n.beta,
         H0=s.H1,
         S=s.S_T,
-        e=number(0.0, n.d0),
+        e=number(0, n.d0),
         delta=n.delta,
         lam=n.lam,
         omega=omega,
@@ -155,7 +155,7 @@ def margin_sampled_along(problem: TubeProblem, recipes: Sequence[SampledRecipe])
 def _margin(
     n: Numbers[Interval], Ts: Interval, omega: Interval, age: Ages[Interval], Y: Interval
 ) -> Interval:
-    return (1.0 - sampled_supremum(n, Ts, omega, age, Y) / reach(n)).sanitised()
+    return (1 - sampled_supremum(n, Ts, omega, age, Y) / reach(n)).sanitised()
 
 
 @quiet

@@ -54,18 +54,32 @@ class Interval:
     # numpy must not take over `array + interval`
     __array_ufunc__ = None
 
-    def __init__(self, lo: ArrayLike, hi: ArrayLike | None = None) -> None:
+    def __init__(self, lo: ArrayLike, hi: ArrayLike) -> None:
         self.lo: Array = np.asarray(lo, dtype=np.float64)
-        self.hi: Array = self.lo if hi is None else np.asarray(hi, dtype=np.float64)
+        self.hi: Array = np.asarray(hi, dtype=np.float64)
 
     @staticmethod
-    def of(value: Interval | Fraction | ArrayLike) -> Interval:
-        """The tightest interval that contains `value` (floats are exact, fractions rounded outward)."""
+    def exact(value: ArrayLike) -> Interval:
+        """The floats themselves, for what a float is by definition: a constant, a bound, a point or a corner of a box.
+
+        What is computed in floats, measured or sampled is no such thing: it is near a number, and no enclosure of it.
+        """
+        found = Interval.__new__(Interval)
+        found.lo = found.hi = np.asarray(value, dtype=np.float64)
+        return found
+
+    @staticmethod
+    def of(value: Interval | Fraction | int) -> Interval:
+        """The tightest interval that contains an exact number, rounded outward; raises `TypeError` for a float."""
         if isinstance(value, Interval):
             return value
-        if isinstance(value, (Fraction, int)):
-            return Interval(*fraction_bounds(Fraction(value)))
-        return Interval(value)
+        if not isinstance(value, (Fraction, int)):
+            raise TypeError(
+                f"{type(value).__name__} says nothing of its error: Interval.exact if it has none"
+            )
+        if isinstance(value, int) and abs(value) < 2**53:
+            return Interval.exact(value)
+        return Interval(*fraction_bounds(Fraction(value)))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -116,20 +130,20 @@ class Interval:
     def __neg__(self) -> Interval:
         return Interval(-self.hi, -self.lo)
 
-    def __add__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __add__(self, other: Interval | Fraction | int) -> Interval:
         b = Interval.of(other)
         return Interval(down(self.lo + b.lo), up(self.hi + b.hi))
 
     __radd__ = __add__
 
-    def __sub__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __sub__(self, other: Interval | Fraction | int) -> Interval:
         b = Interval.of(other)
         return Interval(down(self.lo - b.hi), up(self.hi - b.lo))
 
-    def __rsub__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __rsub__(self, other: Interval | Fraction | int) -> Interval:
         return Interval.of(other) - self
 
-    def __mul__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __mul__(self, other: Interval | Fraction | int) -> Interval:
         b = Interval.of(other)
         if self.lo is self.hi and b.lo is b.hi:
             product = self.lo * b.lo
@@ -142,7 +156,7 @@ class Interval:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __truediv__(self, other: Interval | Fraction | int) -> Interval:
         b = Interval.of(other)
         through_zero = ~((b.lo > 0) | (b.hi < 0))
         p, q, r, s = self.lo / b.lo, self.lo / b.hi, self.hi / b.lo, self.hi / b.hi
@@ -150,14 +164,14 @@ class Interval:
         hi = up(np.maximum(np.maximum(p, q), np.maximum(r, s)))
         return Interval(np.where(through_zero, np.nan, lo), np.where(through_zero, np.nan, hi))
 
-    def __rtruediv__(self, other: Interval | Fraction | ArrayLike) -> Interval:
+    def __rtruediv__(self, other: Interval | Fraction | int) -> Interval:
         return Interval.of(other) / self
 
     def __pow__(self, n: int) -> Interval:
         if n < 0:
-            return 1.0 / self ** (-n)
+            return 1 / self ** (-n)
         if n == 0:
-            return Interval(np.ones(self.shape))
+            return Interval.exact(np.ones(self.shape))
         if n % 2:
             return Interval(_power(self.lo, n, upward=False), _power(self.hi, n, upward=True))
         big, small = self.magnitude, self.mignitude

@@ -37,7 +37,7 @@ class MetricNorm:
         spread = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
         least = _least(t, W, spread[1])
         length = spectral_norm_midrad(*product((t, np.zeros_like(t)), (v, spread[0]))).hi
-        value = (Interval(length) / sqrt(Interval(least))).hi
+        value = (Interval.exact(length) / sqrt(Interval.exact(least))).hi
         value = np.where(np.isnan(value), np.inf, value)
         best = np.argmax(value, axis=1)
         signs = e.signs[best]
@@ -52,7 +52,7 @@ class MetricNorm:
         t = whitening(W[0])
         most = eigenvalues_midrad(*congruence(t, *W)).hi[..., -1]
         length = spectral_norm_midrad(*product((t, np.zeros_like(t)), v)).lo
-        value = (Interval(length) / sqrt(Interval(most))).lo
+        value = (Interval.exact(length) / sqrt(Interval.exact(most))).lo
         return np.where(np.isnan(value), -np.inf, np.maximum(value, 0.0))
 
 

@@ -125,12 +125,15 @@ class LeastInputGain:
         t = whitening(mid)
         scaled = eigenvalues_midrad(*congruence(t, mid, rad))
         n = t.shape[-1]
-        image = [sum((b[:, j] * t[:, i, j, None] for j in range(n)), start=Interval(0.0)) for i in range(n)]
+        image = [
+            sum((b[:, j] * Interval.exact(t[:, i, j, None]) for j in range(n)), start=Interval.exact(0.0))
+            for i in range(n)
+        ]
         gram_lo = np.empty((len(lo), b.shape[-1], b.shape[-1]))
         gram_hi = gram_lo.copy()
         for p in range(b.shape[-1]):
             for q in range(b.shape[-1]):
-                entry = sum((row[:, p] * row[:, q] for row in image), start=Interval(0.0))
+                entry = sum((row[:, p] * row[:, q] for row in image), start=Interval.exact(0.0))
                 gram_lo[:, p, q], gram_hi[:, p, q] = entry.lo, entry.hi
         least = eigenvalues(Interval(gram_lo, gram_hi))[..., 0]
         positive = Interval(np.where(scaled.lo[:, 0] > 0, scaled.lo[:, 0], np.nan), scaled.hi[:, -1])

@@ -87,7 +87,7 @@ class Tape:
         return Interval(lo, hi).sanitised()
 
 
-_NOTHING = Interval(np.nan)
+_NOTHING = Interval.exact(np.nan)
 
 
 @cache

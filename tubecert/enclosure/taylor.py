@@ -76,7 +76,7 @@ class MatrixFunction:
     def _of(points: Array, lo: Array, hi: Array, fixed: list[int]) -> Interval:
         """The points, with the whole range of the fixed variables."""
         if not fixed:
-            return Interval(points)
+            return Interval.exact(points)
         low, high = points.copy(), points.copy()
         low[:, fixed], high[:, fixed] = lo[:, fixed], hi[:, fixed]
         return Interval(low, high)
@@ -230,7 +230,7 @@ class _Table:
 
     def run(self, x: Interval) -> Interval:
         """Enclosures at N boxes (N, d): shape (outputs, N)."""
-        columns = [x[:, i] if x.lo is not x.hi else Interval(x.lo[:, i]) for i in range(x.lo.shape[1])]
+        columns = [x[:, i] if x.lo is not x.hi else Interval.exact(x.lo[:, i]) for i in range(x.lo.shape[1])]
         return self._tape.run(columns, (x.lo.shape[0],))[self._index]
 
     def run_floats(self, x: Array) -> Array:

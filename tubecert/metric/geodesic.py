@@ -75,8 +75,8 @@ def unique_geodesics(model: ControlAffineModel, tube: Domain, rho: float, effort
             value=Constant(below=G.below * rho * (1 - _SLACK), above=np.inf), symbols=G, slope=None
         )
     L = _bounded(SymbolNorm(model, order=1), tube, 8 * _FINE / rho**2, effort)
-    radius = Interval(rho)
-    value = Interval(G.below, G.above) * radius + Interval(L.below, L.above) * radius**2 / 8.0
+    radius = Interval.exact(rho)
+    value = Interval(G.below, G.above) * radius + Interval(L.below, L.above) * radius**2 / 8
     return GeodesicTest(
         value=Constant(below=float(value.lo), above=float(value.sanitised().hi)), symbols=G, slope=L
     )

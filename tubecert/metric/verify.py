@@ -80,7 +80,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     fine = Effort(gap=min(effort.gap, 1e-4), budget=effort.budget, progress=effort.progress)
     largest = supremum(Pencil(model.W, eye), domain, fine)
     upper = supremum(Pencil(eye, model.W), domain, fine)
-    inverse = (Interval(1.0) / Interval(largest.below, largest.above)).sanitised()
+    inverse = (Interval.exact(1.0) / Interval(largest.below, largest.above)).sanitised()
     proof = MetricProof(
         model=model,
         safe_set=safe_set,

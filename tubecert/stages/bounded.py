@@ -164,10 +164,10 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
 def _half_widths(enclosed: Enclosed) -> dict[str, float]:
     """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho."""
     tube = enclosed.tube
-    reach = sqrt(Interval(tube.lower.below)) * Interval.of(tube.rho)
+    reach = sqrt(Interval.exact(tube.lower.below)) * Interval.of(tube.rho)
     most = fraction_bounds(tube.rho)[1]
     return {
-        name: printable_above(min(float((Interval(width.above) * reach).hi), most))
+        name: printable_above(min(float((Interval.exact(width.above) * reach).hi), most))
         for name, width in zip(tube.question.spec.states, enclosed.suprema.half_widths(), strict=True)
     }
 

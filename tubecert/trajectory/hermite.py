@@ -74,12 +74,12 @@ class Pieces:
         left, right = np.clip(tau.lo, 0.0, most), np.clip(tau.hi, 0.0, most)
         middle = np.clip(0.5 * left + 0.5 * right, left, right)
         r = np.nextafter(np.maximum(right - middle, middle - left), np.inf)[:, None]
-        c, swing = Interval(middle[:, None]), Interval(-r, r)
+        c, swing = Interval.exact(middle[:, None]), Interval(-r, r)
         a, b = self.x[piece], self.u[piece]
         # the cubic about the middle, exactly: q(c + d) = q(c) + q'(c) d + (a2 + 3 a3 c) d^2 + a3 d^3
         value = a[..., 0] + c * (a[..., 1] + c * (a[..., 2] + c * a[..., 3]))
-        slope = a[..., 1] + c * (2.0 * a[..., 2] + 3.0 * (c * a[..., 3]))
-        bend = a[..., 2] + 3.0 * (c * a[..., 3])
+        slope = a[..., 1] + c * (2 * a[..., 2] + 3 * (c * a[..., 3]))
+        bend = a[..., 2] + 3 * (c * a[..., 3])
         square = Interval(np.zeros_like(r), np.nextafter(r * r, np.inf))
         x = value + slope * swing + bend * square + a[..., 3] * swing**3
         u = b[..., 0] + b[..., 1] * Interval(left[:, None], right[:, None])
@@ -127,8 +127,8 @@ def pieces(model: ControlAffineModel, knots: Knots, horizon: Fraction) -> Pieces
     rate = _Drift(model)
     m0 = rate(x[:-1], intervals_of_rows(u_left))
     m1 = rate(x[1:], intervals_of_rows(u_right))
-    a2 = (3.0 * secant - 2.0 * m0 - m1) / h
-    a3 = (m0 + m1 - 2.0 * secant) / (h * h)
+    a2 = (3 * secant - 2 * m0 - m1) / h
+    a3 = (m0 + m1 - 2 * secant) / (h * h)
     ramp = intervals_of_rows(
         [
             [(q - p) / step for p, q in zip(a, b, strict=True)]

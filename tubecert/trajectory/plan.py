@@ -115,7 +115,7 @@ class Plan:
         middle = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
         reach = np.nextafter(np.maximum(hi - middle, middle - lo), np.inf)
         steep = slopes.run([window], lo.shape) * Interval(-reach, reach)
-        centred = (values.run([Interval(middle)], lo.shape) + steep).sanitised()
+        centred = (values.run([Interval.exact(middle)], lo.shape) + steep).sanitised()
         both = Interval(np.maximum(natural.lo, centred.lo).T, np.minimum(natural.hi, centred.hi).T)
         n = len(self.x)
         return both[:, :n], both[:, n:]
