@@ -34,7 +34,7 @@ def kernel():
                 return function().decode()
 
 def digest(path):
-    return hashlib.sha256(dump(pipeline.certify(load(path), pipeline.Options())).encode()).hexdigest()
+    return hashlib.sha256(dump(pipeline.certify(load(path), pipeline.Options()).to_json()).encode()).hexdigest()
 
 print(json.dumps([kernel(), [digest(path) for path in sys.argv[1:]]]))
 """

@@ -50,7 +50,7 @@ def largest_uncertainty(n: Numbers[T]) -> T:
 
 
 def _margin(n: Numbers[Interval]) -> Interval:
-    return (1.0 - supremum(n) / reach(n)).sanitised()
+    return (1 - supremum(n) / reach(n)).sanitised()
 
 
 def margin_alone(problem: TubeProblem, recipes: Sequence[NoGains]) -> Interval:
