@@ -53,9 +53,10 @@ CERTIFY = """
 import ctypes, os, sys, time
 import certificates
 from tubecert import pipeline
-def certify(*arguments):
+from tubecert.certificate.result import Result
+def certify(*arguments, **options):
     {body}
-    return certificates.certified()
+    return Result.from_json(certificates.certified())
 pipeline.certify = certify
 """
 

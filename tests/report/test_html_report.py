@@ -556,7 +556,7 @@ def folder(tmp_path, monkeypatch):
 def proven(monkeypatch):
     calls = []
 
-    def answer(spec, options, progress=None):
+    def answer(spec, options, progress=None, **_):
         calls.append(spec)
         return Result.from_json(certificates.certified())
 
