@@ -11,6 +11,7 @@ from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rechecked
 from flint import arb
@@ -28,7 +29,7 @@ from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.pencils import GainBelow
 from tubecert.recheck.run import recheck
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
-from tubecert.recheck.terms import number
+from tubecert.recheck.terms import number, slopes
 
 NAMES = ["a", "b", "c", "d", "e", "f", "g", "x", "y"]
 LITTLE = Fraction(1, 10**6)
@@ -226,6 +227,7 @@ def test_nothing_rests_on_a_constant_without_a_bound():
 # -- terms with kinks
 
 # h in x and y on [-1, 1], the exact supremum of |h|, and its Lipschitz constant
+ROOT_TWO = Fraction(1414213562373095, 10**15)
 KINKED = {
     "one": ("abs(x)", Fraction(1), Fraction(1)),
     "two": ("3*abs(x) + 4*abs(y)", Fraction(7), Fraction(5)),
@@ -233,6 +235,11 @@ KINKED = {
     "nested": ("abs(3*x - 4*abs(y))", Fraction(7), Fraction(5)),
     "a difference": ("abs(x) - x", Fraction(2), Fraction(2)),
     "a curve": ("abs(x**2 - 0.25)", Fraction(3, 4), Fraction(2)),
+    "in a norm": ("norm(x, abs(y))", ROOT_TWO, Fraction(1)),
+    "beside a norm": ("norm(x, abs(y)) + abs(x - y)", 2 + ROOT_TWO, 1 + ROOT_TWO),
+    "of a norm": ("abs(norm(x, y) - 0.5)", ROOT_TWO - Fraction(1, 2), Fraction(1)),
+    "a norm squared": ("norm(x, y)**2", Fraction(2), 2 * ROOT_TWO),
+    "a norm times": ("norm(x, y)*abs(x)", ROOT_TWO, Fraction(2236067977499790, 10**15)),
 }
 
 
@@ -246,3 +253,34 @@ def test_every_branch_of_a_kink_counts(name):
         assert prove(norms_below([h], top * (1 + more)), domain, 3_000).holds is holds
         lipschitz = LipschitzBelow([h[0][0]], ["x", "y"], slope * (1 + more))
         assert prove(lipschitz, domain, 3_000).holds is holds
+
+
+NORMS = [
+    "norm(x, y)",
+    "norm(x, abs(y))",
+    "x*norm(x - y, 2*y)",
+    "abs(norm(x, y) - 0.3)*y",
+    "sin(norm(x, y, x*y))",
+]
+
+
+@pytest.mark.parametrize("text", NORMS)
+def test_a_norm_is_smooth_where_it_is_not_zero(text):
+    """On boxes that hold a kink, touch one or lie apart, every sampled value and slope is enclosed."""
+    generator = np.random.default_rng(5)
+    e = term(text)
+    field = Field([e, *slopes([e], "x"), *slopes([e], "y")])
+    for corner in [*generator.uniform(-1, 1, (30, 2)), (0.0, 0.0), (0.0, -0.2), (-0.1, 0.0), (-0.05, -0.1)]:
+        box = [(float(lo), float(lo) + 0.2) for lo in corner]
+        found = field.hull(box)
+        for at in generator.uniform(*zip(*box, strict=True), (20, 2)):
+            exact = field.at([arb(float(v)) for v in at])
+            assert all(value.overlaps(ball) for value, ball in zip(exact, found, strict=True)), (box, at)
+
+
+def test_apart_from_its_kink_a_norm_is_expanded_to_second_order():
+    """The largest vertex is off by the third power of the width; by slopes alone it is off by the second."""
+    for width in (0.1, 0.05, 0.025):
+        (e,), _, _ = Field([term("norm(x, y)")]).expand([(0.3, 0.3 + width), (0.4, 0.4 + width)])
+        top = max(float(corner[0, 0].upper()) for corner in e.corners()) + float(e.rest[0].upper())
+        assert 0 <= top - math.hypot(0.3 + width, 0.4 + width) < 2 * width**3

@@ -3,8 +3,8 @@
 On a box with centre c and radii r, d = x - c: G(x) = G(c) + sum d_i G_i(c) + 1/2 sum d_i d_j G_ij(c) + rest with
 |rest| <= 1/6 sum r_i r_j r_k sup|G_ijk|, or 1/2 sum r_i r_j sup|G_ij - G_ij(c)| where third derivatives are too many.
 The polynomial is examined at its vertices (`expansion`); where those are too many, s_i = d_i^2 is r_i^2/2 +- r_i^2/2.
-Variables in which every entry is affine are replaced by their ends, exactly. Terms with kinks: mean value form, then
-natural extension.
+Variables in which every entry is affine are replaced by their ends, exactly. A norm is smooth where it is not 0; on
+a box on which it may be: mean value form, then natural extension.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tubecert.recheck.balls import Ball, between, magnitude
 from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
-from tubecert.recheck.terms import NOUGHT, Term, in_order, names, slopes
+from tubecert.recheck.terms import NOUGHT, Term, function, in_order, names, slopes
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]
@@ -57,13 +57,19 @@ class Test(Protocol):
 class Field:
     """Terms as functions on boxes; `values` are numbers for the names that are no variables."""
 
-    def __init__(self, entries: Sequence[Term], values: Values | None = None) -> None:
+    def __init__(
+        self, entries: Sequence[Term], values: Values | None = None, *, kinked: bool = False
+    ) -> None:
+        """`kinked`: for boxes on which a norm may be 0, where only slopes, or only values, are known."""
         self.values = dict(values or {})
         self._entries = list(entries)
         self.variables = tuple(sorted(names(entries) - self.values.keys()))
         inputs = (*self.variables, *self.values)
-        ops = {term.op for term in in_order(entries)}
-        self._order = 0 if "direction" in ops else 1 if "norm" in ops else 2
+        kinks = [term for term in in_order(entries) if term.op in ("norm", "direction")]
+        rough = any(term.op == "direction" for term in kinks)
+        self._order = 2 if not kinked else 0 if rough else 1
+        self._kinked = Field(entries, values, kinked=True) if kinks and not kinked else None
+        self._sizes = Program([function("norm", *term.args) for term in kinks], inputs)
         first = {v: slopes(entries, v) for v in self.variables} if self._order else {}
         pure = [v for v in self.variables if self._order == 2 and _all_nought(slopes(first[v], v))]
         self._affine = [self.variables.index(v) for v in pure[:_CORNERS]]
@@ -93,6 +99,7 @@ class Field:
         other = Field.__new__(Field)
         other.__dict__.update(self.__dict__)
         other.values = {name: values[name] for name in self.values}
+        other._kinked = None if self._kinked is None else self._kinked.with_values(values)
         return other
 
     def at(self, point: Sequence[Ball]) -> list[Ball]:
@@ -103,6 +110,8 @@ class Field:
         """Enclosures over a box."""
         whole = [between(lo, hi) for lo, hi in box]
         plain = self.at(whole)
+        if self._kinked is not None and not self._is_smooth(whole):
+            return self._kinked.hull(box)
         if not self._order:
             return plain
         found: list[Ball] | None = None
@@ -112,12 +121,18 @@ class Field:
         assert found is not None
         return [x.intersection(y) if x.overlaps(y) else x for x, y in zip(found, plain, strict=True)]
 
+    def _is_smooth(self, whole: Sequence[Ball]) -> bool:
+        """Whether no norm is 0 on a box."""
+        return all(size > 0 for size in self._sizes.run([*whole, *self.values.values()]))
+
     def expand(self, box: Box) -> tuple[list[Expansion], list[float], list[float]]:
         """One expansion for every choice of ends of the affine variables; what each variable causes and varies."""
         d = len(self.variables)
         centre = [min(max(0.5 * lo + 0.5 * hi, lo), hi) for lo, hi in box]
         mid = [arb(c) for c in centre]
         whole = [between(lo, hi) for lo, hi in box]
+        if self._kinked is not None and not self._is_smooth(whole):
+            return self._kinked.expand(box)
         radius = [
             larger.upper()
             for (lo, hi), c in zip(box, mid, strict=True)

@@ -7,16 +7,16 @@ branch, so a bound for all branches is a Lipschitz constant.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball
-from tubecert.recheck.boxes import Box, Field, Found, Test
+from tubecert.recheck.boxes import Box, Field, Found, Test, Values
 from tubecert.recheck.statements import NormsBelow
-from tubecert.recheck.terms import Matrix, Rows, Term, in_order, matrix_slopes, names, remade, variable
+from tubecert.recheck.terms import Matrix, Rows, Term, in_order, matrix_slopes, remade, variable
 
 _MOST = 6  # signs
 
@@ -36,46 +36,74 @@ def apart(roots: Sequence[Term]) -> tuple[list[Term], dict[str, Term]] | None:
     return ([plain[e] for e in roots], signs) if 0 < len(signs) <= _MOST else None
 
 
-def matrices_apart(matrices: Sequence[Rows]) -> tuple[list[Matrix], dict[str, Term]] | None:
-    """The same for matrices."""
-    found = apart([e for rows in matrices for row in rows for e in row])
-    if found is None:
-        return None
-    flat = iter(found[0])
-    return [[[next(flat) for _ in row] for row in rows] for rows in matrices], found[1]
+class Signs:
+    """Terms with a sign for every absolute value: `entries` are smooth wherever no norm is 0."""
+
+    def __init__(self, roots: Sequence[Term]) -> None:
+        found = apart(roots)
+        self.entries, signs = (list(roots), {}) if found is None else found
+        self.names = tuple(signs)
+        self._inner = Field(list(signs.values()))
+        self.variables = self._inner.variables
+
+    def values(self, chosen: Sequence[int]) -> Values:
+        """A choice of signs."""
+        return dict(zip(self.names, map(arb, chosen), strict=True))
+
+    def over(self, box: Box) -> Iterator[Values]:
+        """Every choice that there is on a box in `variables`."""
+        inside = self._inner.hull(box) if self.names else []
+        return map(self.values, product(*map(_possible, inside)))
+
+    def at(self, point: Sequence[Ball]) -> Values | None:
+        """The one at a point; None if a sign is not known."""
+        choices = [_possible(e) for e in self._inner.at(point)] if self.names else []
+        if any(len(signs) > 1 for signs in choices):
+            return None
+        return self.values([signs[0] for signs in choices])
+
+
+def _entries(matrices: Sequence[Rows]) -> list[Term]:
+    return [e for rows in matrices for row in rows for e in row]
+
+
+def _like(matrices: Sequence[Rows], entries: Sequence[Term]) -> list[Matrix]:
+    flat = iter(entries)
+    return [[[next(flat) for _ in row] for row in rows] for rows in matrices]
 
 
 def norms_below(matrices: Sequence[Rows], limit: Fraction) -> Test:
     """sum_k |G_k(x)| <= limit, branch by branch where there are absolute values."""
-    found = matrices_apart(matrices)
-    return NormsBelow(matrices, limit) if found is None else BranchesBelow(found[0], found[1], limit)
+    signs = Signs(_entries(matrices))
+    return (
+        BranchesBelow(_like(matrices, signs.entries), signs, limit)
+        if signs.names
+        else NormsBelow(matrices, limit)
+    )
 
 
 def slopes_below(h: Rows, name: str, limit: Fraction) -> Test:
-    """|dh/d(name)| <= limit almost everywhere, branch by branch where there are absolute values only."""
-    found = matrices_apart([h])
-    if found is None or any(e.op == "norm" for row in found[0][0] for e in in_order(row)):
-        return NormsBelow([matrix_slopes(h, name)], limit)
-    return BranchesBelow([matrix_slopes(found[0][0], name)], found[1], limit)
+    """|dh/d(name)| <= limit almost everywhere, branch by branch where there are absolute values."""
+    signs = Signs(_entries([h]))
+    slopes = matrix_slopes(_like([h], signs.entries)[0], name)
+    return BranchesBelow([slopes], signs, limit) if signs.names else NormsBelow([slopes], limit)
 
 
 class BranchesBelow:
     """sum_k |G_k(x)| <= limit for every choice of signs that the box admits."""
 
-    def __init__(self, matrices: Sequence[Rows], signs: dict[str, Term], limit: Fraction) -> None:
-        self._signs = list(signs)
-        self._test = NormsBelow(matrices, limit, dict.fromkeys(self._signs, arb(1)))
-        self._inner = Field(list(signs.values()))
-        self.variables = tuple(sorted({*self._test.variables, *names(signs.values())}))
+    def __init__(self, matrices: Sequence[Rows], signs: Signs, limit: Fraction) -> None:
+        self._signs = signs
+        self._test = NormsBelow(matrices, limit, signs.values((1,) * len(signs.names)))
+        self.variables = tuple(sorted({*self._test.variables, *signs.variables}))
         self._columns = [self.variables.index(v) for v in self._test.variables]
-        self._inner_columns = [self.variables.index(v) for v in self._inner.variables]
+        self._signed = [self.variables.index(v) for v in signs.variables]
 
     def over(self, box: Box) -> Found:
         """Every branch that there is on the box."""
-        inside = self._inner.hull([box[i] for i in self._inner_columns])
         own = [box[i] for i in self._columns]
-        for chosen in product(*map(_possible, inside)):
-            found = self._branch(chosen).over(own)
+        for values in self._signs.over([box[i] for i in self._signed]):
+            found = self._test.with_values(values).over(own)
             if not found.proven:
                 wide = [hi - lo for lo, hi in box]
                 caused, spread = list(wide), list(wide)
@@ -86,13 +114,8 @@ class BranchesBelow:
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """The branch at a point, where all signs are known."""
-        choices = [_possible(e) for e in self._inner.at([point[i] for i in self._inner_columns])]
-        if any(len(signs) > 1 for signs in choices):
-            return False
-        return self._branch([signs[0] for signs in choices]).broken([point[i] for i in self._columns])
-
-    def _branch(self, chosen: Sequence[int]) -> NormsBelow:
-        return self._test.with_values(dict(zip(self._signs, map(arb, chosen), strict=True)))
+        values = self._signs.at([point[i] for i in self._signed])
+        return values is not None and self._test.with_values(values).broken([point[i] for i in self._columns])
 
 
 def _possible(e: Ball) -> tuple[int, ...]:

@@ -1,6 +1,6 @@
 """A Lipschitz constant of h in x, for an h that may have kinks (norms, absolute values).
 
-With absolute values only: the Jacobians of all branches. Else two bounds, and the smaller one counts on each box: the
+Absolute values have a sign in each branch, in which there are two bounds, and the smaller one counts on each box: the
 generalised Jacobian; and, since a norm is 1-Lipschitz in its arguments, |J_0| + sum_k |dh/dn_k| L_k with J_0 the
 Jacobian while the norms n_k are kept fixed and L_k that of n_k's arguments. Implements: Dhx of theory (2.3).
 """
@@ -13,8 +13,8 @@ from fractions import Fraction
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.boxes import Box, Found
-from tubecert.recheck.branches import BranchesBelow, apart
+from tubecert.recheck.boxes import Box, Found, Values
+from tubecert.recheck.branches import Signs
 from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import (
     Matrix,
@@ -36,72 +36,89 @@ _ANY = Fraction(0)
 class _Bound:
     """An upper bound of the spectral norm of a matrix on boxes in more variables than it has."""
 
-    def __init__(self, rows: Rows, variables: Sequence[str]) -> None:
-        self._test = None if all_zero(rows) else NormsBelow([rows], _ANY)
+    def __init__(self, rows: Rows, variables: Sequence[str], signs: Values) -> None:
+        self._test = None if all_zero(rows) else NormsBelow([rows], _ANY, signs)
         self._columns = [variables.index(v) for v in self._test.variables] if self._test else []
 
-    def over(self, box: Box) -> Ball:
-        """The bound."""
-        return self._test.bound([box[i] for i in self._columns]) if self._test else arb(0)
+    def over(self, box: Box, signs: Values) -> Ball:
+        """The bound for a choice of signs."""
+        if self._test is None:
+            return arb(0)
+        return self._test.with_values(signs).bound([box[i] for i in self._columns])
 
 
 class LipschitzBelow:
-    """|h(t, x) - h(t, y)| <= limit |x - y|."""
+    """|h(t, x) - h(t, y)| <= limit |x - y|, branch by branch where there are absolute values."""
 
     def __init__(self, h: Sequence[Term], states: Sequence[str], limit: Fraction) -> None:
         self._limit = exact(limit)
-        plain, norms = _apart(h)
-        back = {name: variable(name) for name in norms}
-        for name, (whole, _) in norms.items():
-            back[name] = whole
-        smooth = apart(h)
-        self._branches = None
-        if smooth is not None and not any(e.op == "norm" for e in in_order(smooth[0])):
-            self._branches = BranchesBelow([_jacobian(smooth[0], states)], smooth[1], limit)
-        direct = _jacobian(h, states)
-        levels: list[tuple[Matrix, list[Matrix]]] = []
-        earlier: list[str] = []
-        for entries in [*(args for _, args in norms.values()), plain]:
-            gains = [matrix_replaced(matrix_slopes([[e] for e in entries], name), back) for name in earlier]
-            levels.append((matrix_replaced(_jacobian(entries, states), back), gains))
-            if len(earlier) < len(norms):
-                earlier.append(list(norms)[len(earlier)])
+        self._signs = Signs(h)
+        ones = self._signs.values((1,) * len(self._signs.names))
+        entries = self._signs.entries
+        direct = _jacobian(entries, states)
+        levels = _levels(entries, states)
         every = [direct, *(m for own, gains in levels for m in (own, *gains))]
-        more = () if self._branches is None else self._branches.variables
-        self.variables = tuple(sorted({*names(e for m in every for row in m for e in row), *more}))
-        self._direct = _Bound(direct, self.variables)
+        found = names(e for m in every for row in m for e in row) - ones.keys()
+        self.variables = tuple(sorted({*found, *self._signs.variables}))
         self._levels = [
-            (_Bound(own, self.variables), [_Bound(gain, self.variables) for gain in gains])
-            for own, gains in levels
+            (_Bound(own, self.variables, ones), [_Bound(gain, self.variables, ones) for gain in gains])
+            for own, gains in (levels if len(levels) > 1 else ())  # one alone is the direct bound
         ]
-        self._smooth = NormsBelow([direct], limit) if not norms and not all_zero(direct) else None
+        self._direct = NormsBelow([direct], limit, ones)
+        self._columns = [self.variables.index(v) for v in self._direct.variables]
+        self._signed = [self.variables.index(v) for v in self._signs.variables]
 
     def over(self, box: Box) -> Found:
-        """The smaller of the two bounds."""
-        if self._smooth is not None:
-            return self._smooth.over(box)
-        wide = [hi - lo for lo, hi in box]
-        if self._branches is not None:
-            columns = [self.variables.index(v) for v in self._branches.variables]
-            found = self._branches.over([box[i] for i in columns])
-            if not found.proven:
-                for c, i in enumerate(columns):
-                    wide[i] = max(wide[i], found.caused[c])
-            return Found(found.proven, wide, wide)
+        """Every branch that there is on the box: the smaller of the two bounds."""
+        own = [box[i] for i in self._columns]
+        for signs in self._signs.over([box[i] for i in self._signed]):
+            found = self._direct.with_values(signs).over(own)
+            if not found.proven and not self._by_levels(box, signs):
+                return self._widened(found, box)
+        return Found(True)
+
+    def _by_levels(self, box: Box, signs: Values) -> bool:
         total = arb(0)
         lengths: list[Ball] = []
         for own, gains in self._levels:
-            total = own.over(box) + sum(
-                (g.over(box) * c for g, c in zip(gains, lengths, strict=False)), start=arb(0)
+            total = own.over(box, signs) + sum(
+                (g.over(box, signs) * c for g, c in zip(gains, lengths, strict=False)), start=arb(0)
             )
             lengths.append(total)
-        return Found(bool(total <= self._limit or self._direct.over(box) <= self._limit), wide, wide)
+        return bool(self._levels) and bool(total <= self._limit)
+
+    def _widened(self, found: Found, box: Box) -> Found:
+        """What to split: where there are kinks, whatever is wide; else what causes the width."""
+        kinked = bool(self._levels or self._signs.names)
+        caused = [hi - lo if kinked else 0.0 for lo, hi in box]
+        spread = list(caused)
+        for c, i in enumerate(self._columns):
+            caused[i] = max(caused[i], found.caused[c])
+            spread[i] = max(spread[i], found.spread[c])
+        return Found(False, caused, spread)
 
     def broken(self, point: Sequence[Ball]) -> bool:
-        """Known for smooth h and its branches: the Jacobian is too large at a point."""
-        if self._branches is not None:
-            return self._branches.broken([point[self.variables.index(v)] for v in self._branches.variables])
-        return self._smooth is not None and self._smooth.broken(point)
+        """The Jacobian is too large at a point at which h is smooth."""
+        signs = self._signs.at([point[i] for i in self._signed])
+        if signs is None:
+            return False
+        return not self._levels and self._direct.with_values(signs).broken([point[i] for i in self._columns])
+
+
+def _levels(entries: Sequence[Term], states: Sequence[str]) -> list[tuple[Matrix, list[Matrix]]]:
+    """For every norm, then for `entries`: the Jacobian with inner norms kept fixed, and the slopes along these."""
+    plain, norms = _apart(entries)
+    back = {name: variable(name) for name in norms}
+    for name, (whole, _) in norms.items():
+        back[name] = whole
+    found: list[tuple[Matrix, list[Matrix]]] = []
+    earlier: list[str] = []
+    for own in [*(args for _, args in norms.values()), plain]:
+        gains = [matrix_replaced(matrix_slopes([[e] for e in own], name), back) for name in earlier]
+        found.append((matrix_replaced(_jacobian(own, states), back), gains))
+        if len(earlier) < len(norms):
+            earlier.append(list(norms)[len(earlier)])
+    return found
 
 
 def _apart(h: Sequence[Term]) -> tuple[list[Term], dict[str, tuple[Term, list[Term]]]]:

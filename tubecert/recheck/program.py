@@ -54,6 +54,8 @@ class Program:
 
 
 def _direction(args: list[Ball], index: int) -> Ball:
+    if len(args) == 1 and (args[0] > 0 or args[0] < 0):
+        return arb(1) if args[0] > 0 else arb(-1)
     size = length(args)
     if not size > 0:
         return between(-1, 1)

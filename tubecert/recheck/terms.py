@@ -175,6 +175,14 @@ def _leg(u: Term) -> Term:
     return function("sqrt", UNIT - u.raised(2))
 
 
+def _turning(e: Term, i: int) -> Term:
+    """d(a_k/|a|)/da_i = (delta_ik - a_i a_k/|a|^2)/|a|; the sign of one argument does not turn."""
+    if len(e.args) == 1:
+        return NOUGHT
+    other = function("direction", *e.args, value=i)
+    return ((UNIT if e.value == i else NOUGHT) - e * other) / function("norm", *e.args)
+
+
 _PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
     "add": lambda e, i: UNIT,
     "mul": lambda e, i: e.args[1 - i],
@@ -193,8 +201,12 @@ _PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
     "exp": lambda e, i: e,
     "log": lambda e, i: UNIT / e.args[0],
     "norm": lambda e, i: function("direction", *e.args, value=i),
+    "direction": _turning,
 }
-"""The derivative of an operation by its i-th argument (of a norm: an element of its generalised gradient)."""
+"""The derivative of an operation by its i-th argument; of a norm and its directions where the norm is not 0.
+
+Where it is 0, a direction stands for any element of the generalised gradient, and has no derivative.
+"""
 
 
 def slopes(roots: Sequence[Term], name: str) -> list[Term]:
