@@ -36,7 +36,7 @@ from tubecert.expression.graph import (
     tan,
     topological,
 )
-from tubecert.expression.number import Side, parse_constant, parse_number
+from tubecert.expression.number import Side, parse_constant, parse_number, root_above
 from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse
 from tubecert.expression.scan import (
@@ -87,6 +87,7 @@ __all__ = [
     "parse_number",
     "power",
     "rebuild",
+    "root_above",
     "sin",
     "sqrt",
     "substitute",

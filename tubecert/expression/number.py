@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isqrt
 from typing import Final, Literal
 
 from tubecert.expression import graph
@@ -158,6 +159,16 @@ def _power(a: _Range, n: int) -> _Range:
     for _ in range(abs(n)):
         result = _times(result, base)
     return result
+
+
+def root_above(square: Fraction) -> Fraction:
+    """The square root of a number that is not negative: exact if rational, else the next decimal of `DIGITS` digits."""
+    top, bottom = isqrt(square.numerator), isqrt(square.denominator)
+    if (top * top, bottom * bottom) == square.as_integer_ratio():
+        return Fraction(top, bottom)
+    places = DIGITS - (square.numerator.bit_length() - square.denominator.bit_length()) * 15051 // 100000
+    scaled = square * Fraction(100) ** places
+    return Fraction(isqrt(scaled.numerator // scaled.denominator) + 1) / Fraction(10) ** places
 
 
 def _rounded(value: _Range, side: Side) -> Fraction:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import to_text
+from tubecert.expression import root_above, to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
 from tubecert.spec.document import MappingNode
@@ -63,8 +63,11 @@ def read_uncertainty(field: Field, names: Names) -> Uncertainty | None:
 
 def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None:
     """Declared bounds; all three of them if there is no expression to derive the others from."""
-    keys = ("h", "h_x", "h_t")
-    entries = field.mapping(required=keys if complete else (), optional=() if complete else keys)
+    if isinstance(field.node, MappingNode) and any(
+        isinstance(node, MappingNode) for _, node in field.node.pairs
+    ):
+        return _combined(field, names, complete=complete)
+    entries = field.mapping(required=() if not complete else _BOUNDS, optional=() if complete else _BOUNDS)
     if entries is None:
         return None
     values = {key: entry.number(names.values, least=0, side="above") for key, entry in entries.items()}
@@ -73,6 +76,30 @@ def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None
     return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))
 
 
+def _combined(field: Field, names: Names, *, complete: bool) -> Bounds | None:
+    """Bounds of the components of h, input by input: h is bounded by the root of the sum of their squares.
+
+    So are |dh/dt|, and |h(t, x) - h(t, y)| <= sqrt(sum L_i^2)|x - y|. Bounds of one kind are given for all or none.
+    """
+    entries = field.mapping(required=names.inputs)
+    if entries is None or len(entries) < len(names.inputs):
+        return None
+    found = [_read_bounds(entries[name], names, complete=complete) for name in names.inputs]
+    parts = [part for part in found if part is not None]
+    if len(parts) < len(found):
+        return None
+    total: dict[str, Fraction | None] = {}
+    for key in _BOUNDS:
+        known = [value for part in parts for value in [getattr(part, key)] if value is not None]
+        if known and len(known) < len(parts):
+            message = f"{field.path} bounds {key} of some inputs only"
+            field.fail(codes.MISSING_KEY, message, f"bound {key} of every input, or of none")
+            return None
+        total[key] = root_above(sum((q * q for q in known), start=Fraction(0))) if known else None
+    return Bounds(**total)
+
+
+_BOUNDS: Final = ("h", "h_x", "h_t")
 METRIC_KEYS: Final = ("dual_metric", "rate", "bounds")
 
 
