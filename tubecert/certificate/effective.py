@@ -124,7 +124,10 @@ class Asked:
     data: Mapping[str, Tree] = field(repr=False)
 
 
-_ASKED, _MAY_ASK = ("objective", "degree", "variables", "route", "solver"), ("rate", "condition_number")
+_ASKED, _MAY_ASK = (
+    ("objective", "degree", "variables", "route", "solver"),
+    ("rate", "condition_number", "coordinates"),
+)
 
 
 def _read_asked(data: Json, path: str) -> Asked:

@@ -98,7 +98,7 @@ def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -
     }
     if given["solver"] is not None:
         changes["solver"] = _solver(given["solver"])
-    for name in ("degree", "route", "objective"):
+    for name in ("degree", "route", "objective", "coordinates"):
         if given[name] is not None:
             changes[name] = given[name] if name == "degree" else str(given[name])
     if given["variables"] is not None:

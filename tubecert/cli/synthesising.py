@@ -42,6 +42,13 @@ class Route(StrEnum):
     CEGIS = "cegis"
 
 
+class Scaling(StrEnum):
+    """In what coordinates condition numbers are meant."""
+
+    AUTO = "auto"
+    IDENTITY = "identity"
+
+
 def register(app: typer.Typer) -> None:
     """Adds the command to the app."""
     app.command(epilog=_AFTER, short_help="Find a metric and prove it.")(synth)
@@ -69,6 +76,10 @@ def synth(
     ] = None,
     condition_number: Annotated[
         str | None, number_option("--condition-number", "Not to be exceeded on the safe set.")
+    ] = None,
+    coordinates: Annotated[
+        Scaling | None,
+        typer.Option(help="In which the condition number counts; auto: half-widths of the safe set.  [auto]"),
     ] = None,
     route: Annotated[Route | None, typer.Option(help="How metrics are found.  [auto]")] = None,
     solver: Annotated[

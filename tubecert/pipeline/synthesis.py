@@ -111,6 +111,7 @@ class SynthesisRun:
                 variables=wanted.variables,
                 limit=self.limit,
                 solver=wanted.solver,
+                coordinates=wanted.coordinates,
                 effort=self.effort,
                 progress=self._tell,
             )

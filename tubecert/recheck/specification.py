@@ -369,7 +369,8 @@ def _metric(node: Node, plant: Plant) -> Metric | Wanted:
 def read_wanted(node: Node) -> Wanted:
     """What a metric that is to be synthesised must be; how it is searched for is idle."""
     keys = ("objective", "degree", "variables", "route", "solver")
-    own = node.closed(*keys, optional=("rate", "condition_number"))
+    own = node.closed(*keys, optional=("rate", "condition_number", "coordinates"))
+    own.get("coordinates", Node.text)
     for key in ("objective", "degree", "route", "solver"):
         own[key].text()
     if own["variables"].value != "auto":

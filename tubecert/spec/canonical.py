@@ -116,6 +116,7 @@ def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
         "objective": wanted.objective,
         "degree": "auto" if wanted.degree is None else str(wanted.degree),
         "variables": "auto" if wanted.variables is None else list(wanted.variables),
+        "coordinates": wanted.coordinates,
         "route": wanted.route,
         "solver": wanted.solver,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Final
+from typing import Final, Literal
 
 from tubecert.expression import suggestion
 from tubecert.spec import codes
@@ -12,8 +12,18 @@ from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.types import Synthesis
 
-KEYS: Final = ("rate", "objective", "degree", "variables", "condition_number", "route", "solver")
+KEYS: Final = (
+    "rate",
+    "objective",
+    "degree",
+    "variables",
+    "condition_number",
+    "coordinates",
+    "route",
+    "solver",
+)
 OBJECTIVES: Final = ("condition", "margin", "rate", "adaptation", "tube")
+COORDINATES: Final[tuple[Literal["auto", "identity"], ...]] = ("auto", "identity")
 ROUTES: Final = ("auto", "sos", "cegis")
 SOLVERS: Final = ("clarabel", "scs")
 _THROUGH_CVXPY: Final = re.compile(r"cvxpy:[A-Za-z][A-Za-z0-9_]{0,31}")
@@ -36,6 +46,7 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
         degree=_degree(_unless_auto(entries.get("degree")), names),
         variables=_variables(_unless_auto(entries.get("variables")), names),
         condition_number=limit.number(names.values, least=1) if limit else None,
+        coordinates=_coordinates(entries.get("coordinates")),
         route=entries["route"].word(ROUTES) or "auto" if "route" in entries else "auto",
         solver=_solver(entries["solver"]) or "clarabel" if "solver" in entries else "clarabel",
     )
@@ -46,6 +57,11 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
 def _unless_auto(field: Field | None) -> Field | None:
     automatic = field is not None and isinstance(field.node, Scalar) and field.node.text == _SEARCHED
     return None if automatic else field
+
+
+def _coordinates(field: Field | None) -> Literal["auto", "identity"]:
+    word = field.word(COORDINATES) if field else None
+    return "identity" if word == "identity" else "auto"
 
 
 def solver_name(text: str) -> str | None:

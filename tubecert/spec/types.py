@@ -136,7 +136,8 @@ class Synthesis:
 
     `rate` in 1/s, None if it is searched for; `objective`: least condition number, greatest margin (in C2), greatest
     rate, least adaptation rate of the distance form, smallest tube; `degree` and `variables` of W, None: chosen
-    automatically; `condition_number`: not to be exceeded; `solver`: clarabel, scs or cvxpy:NAME.
+    automatically; `condition_number`: not to be exceeded; `coordinates`: those in
+    which it is least, auto: half-widths of the safe set; `solver`: clarabel, scs or cvxpy:NAME.
     """
 
     rate: Fraction | None = None
@@ -144,6 +145,7 @@ class Synthesis:
     degree: int | None = None
     variables: tuple[str, ...] | None = None
     condition_number: Fraction | None = None
+    coordinates: Literal["auto", "identity"] = "auto"
     route: str = "auto"
     solver: str = "clarabel"
 

@@ -63,7 +63,7 @@ class _Synthesis:
     def __init__(self, problem: SynthesisProblem) -> None:
         self.began = time.perf_counter()
         self.problem = problem
-        self.forms = FormsTape(problem.model, problem.family)
+        self.forms = FormsTape(problem.model, problem.family, problem.scaled)
         lo, hi = floats(problem.safe_set)
         self.symmetries, free = invariant_entries(
             problem.model, problem.family, np.stack([lo, hi], axis=1), self.forms

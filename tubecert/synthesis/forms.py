@@ -19,6 +19,7 @@ from tubecert.expression import Expression, free_symbols
 from tubecert.expression.matrix import along, combine, multiply
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.conic import triangle
+from tubecert.synthesis.coordinates import Coordinates
 from tubecert.synthesis.family import MetricFamily
 
 
@@ -100,9 +101,13 @@ class Unknowns:
 
 
 class FormsTape:
-    """Evaluates `PointForms` of a model and a family at points (N, n)."""
+    """Evaluates `PointForms` of a model and a family at points (N, n), in coordinates z of x = S z."""
 
-    def __init__(self, model: ControlAffineModel, family: MetricFamily) -> None:
+    def __init__(
+        self, model: ControlAffineModel, family: MetricFamily, scaled: Coordinates | None = None
+    ) -> None:
+        ones = np.ones(len(model.states))
+        self._scaled = Coordinates(ones, ones) if scaled is None else scaled
         self.states, self.inputs, self.functions = model.states, len(model.inputs), len(family.functions)
         E, g = family.frame, (family.functions,)
         A = combine(1, multiply(model.f_x, E), -1, along(E, model.f, model.states))
@@ -130,17 +135,23 @@ class FormsTape:
             self._basis = self._basis @ np.linalg.inv(r)
 
     def coefficients(self, inner: Array) -> Array:
-        """The V_k of the family (K, n, n) from those of the changed functions."""
-        return np.asarray(np.einsum("kj,jab->kab", self._basis, inner))
+        """The V_k of the family (K, n, n) from those of the changed functions and coordinates."""
+        return np.asarray(np.einsum("kj,jab->kab", self._basis, inner)) * self._scaled.entries
+
+    def inner(self, coefficients: Array) -> Array:
+        """What coefficients of the family are in these coordinates, before any change of functions."""
+        return np.asarray(coefficients / self._scaled.entries)
 
     def __call__(self, points: Array, annihilator: Array | None = None) -> PointForms:
-        """The forms at points (N, n), with the given N (N, n, r) if there is one."""
+        """The forms at points (N, n), with the given N (N, n, r) of the states' own coordinates if there is one."""
         n, m, count = len(self.states), self.inputs, len(points)
         flat = self._tape.run_floats(list(points.T), (count,))[self._index].T
         sizes = np.cumsum([n * n, n * n, self.functions, self.functions])
         E, A, g, rates, B = np.split(flat, sizes, axis=1)
-        E, A, B = E.reshape(-1, n, n), A.reshape(-1, n, n), B.reshape(-1, n, m)
-        N = null_bases(B) if annihilator is None else annihilator
+        rows, columns = self._scaled.states[:, None], self._scaled.columns
+        E, A = (part.reshape(-1, n, n) * columns / rows for part in (E, A))
+        B = B.reshape(-1, n, m) / rows
+        N = null_bases(B) if annihilator is None else annihilator * rows
         return PointForms(
             frame=E,
             input=B @ _t(B),
@@ -154,7 +165,7 @@ class FormsTape:
         """N at points, (N, n, r)."""
         flat = self._tape.run_floats(list(points.T), (len(points),))[self._index].T
         n, m = len(self.states), self.inputs
-        return null_bases(flat[:, -n * m :].reshape(-1, n, m))
+        return null_bases(flat[:, -n * m :].reshape(-1, n, m) / self._scaled.states[:, None])
 
     def projectors(self, points: Array) -> Array:
         """N N', (N, n, n)."""
@@ -174,8 +185,9 @@ class FormsTape:
             ends = [base.copy() for _ in range(3)]
             for place, weight in zip(ends, (0.0, 0.5, 1.0), strict=True):
                 place[:, i] = lo[i] + weight * (hi[i] - lo[i])
+            given = N / self._scaled.states[:, None]
             if all(_close(self.projectors(place), N @ _t(N)) for place in ends) and _is_affine(
-                *(_flat(self(place, N)) for place in ends)
+                *(_flat(self(place, given)) for place in ends)
             ):
                 found.append(i)
         return tuple(found)

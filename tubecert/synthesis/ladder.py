@@ -15,6 +15,7 @@ from math import floor, inf, isfinite, log10, sqrt
 from tubecert.claims import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
+from tubecert.synthesis.coordinates import Choice
 from tubecert.synthesis.family import MetricFamily, metric_family
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
@@ -49,6 +50,7 @@ class Request:
     variables: tuple[str, ...] | None = None
     limit: float | None = None
     solver: str = "clarabel"
+    coordinates: Choice = "identity"
     thorough: bool = True
     rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
@@ -253,14 +255,18 @@ class Ladder:
 
     def _problem(self, rate: Fraction, floor: Floor, degree: int, back_off: float) -> SynthesisProblem:
         request = self.request
+        plain = (
+            floor == "identity" and request.coordinates == "identity"
+        )  # then kappa is the condition number
         return SynthesisProblem(
             model=request.model,
             safe_set=request.safe_set,
             family=self._family(degree),
             rate=float(rate) * (1 + back_off),
             floor=floor,
-            limit=None if request.limit is None or floor != "identity" else 1.05 * request.limit,
+            limit=1.05 * request.limit if request.limit is not None and plain else None,
             solver=request.solver,
+            coordinates=request.coordinates,
             rounds=None if request.rounds is None else request.rounds - self.rounds,
             progress=request.progress,
         )
@@ -294,7 +300,8 @@ def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:
 
 def _kappa(metric: VerifiedMetric) -> float:
     """What a problem minimises, as it came out."""
-    return metric.condition_number.above if metric.floor == "identity" else metric.proposal.kappa
+    plain = metric.floor == "identity" and metric.coordinates == "identity"
+    return metric.condition_number.above if plain else metric.proposal.kappa
 
 
 def _guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:

@@ -69,7 +69,7 @@ def polynomial_conditions(
     box = np.array([[float(lo), float(hi)] for lo, hi in problem.safe_set])
     N = _annihilator(model)
     charts = _charts(problem, N)
-    forms = FormsTape(model, family)
+    forms = FormsTape(model, family, problem.scaled)
     symmetries, mask = invariant_entries(model, family, box, forms)
     if not symmetric:
         symmetries, mask = (
@@ -86,7 +86,9 @@ def polynomial_conditions(
         found += _placed(name, charts[0], values * weight[:, None, None], own, model=model, pieces=pieces)
     if N[0]:
         points, weight = _points(charts[1], model, box)
-        rows = forms(points, _values(N, model, points)).contraction_rows(unknowns, problem.rate)
+        basis = _values(N, model, points)
+        basis = basis / _lengthened(basis, problem.scaled.states)
+        rows = forms(points, basis).contraction_rows(unknowns, problem.rate)
         values = np.concatenate([rows, np.zeros((*rows.shape[:2], 2))], axis=2)
         kept = [(sign, q) for sign in symmetries if (q := _row_signs(N, model, box, sign)) is not None]
         found += _placed(
@@ -185,6 +187,14 @@ def _values(N: Matrix, model: ControlAffineModel, points: Array) -> Array:
     """N at points, (N, n, r)."""
     values = Tape([e for row in N for e in row], model.states).run_floats(list(points.T), (len(points),))
     return np.asarray(values.reshape(len(N), -1, len(points)).transpose(2, 0, 1))
+
+
+def _lengthened(basis: Array, scale: Array) -> Array:
+    """How much longer the columns of N (N, n, r) become in coordinates, (r,): rows of a condition should be alike."""
+    before, after = (
+        np.sqrt(np.mean((basis * s[:, None]) ** 2, axis=(0, 1))) for s in (np.ones_like(scale), scale)
+    )
+    return np.where(before > 0, after / np.where(before > 0, before, 1.0), 1.0)
 
 
 def _row_signs(N: Matrix, model: ControlAffineModel, box: Array, sign: Array) -> Array | None:

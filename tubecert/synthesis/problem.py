@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
+from tubecert.synthesis.coordinates import Choice, Coordinates, coordinates
 from tubecert.synthesis.family import MetricFamily
 
 Floor = Literal["identity", "input"]
@@ -23,7 +24,7 @@ class SynthesisProblem:
       `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well);
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
-    W and the rate of `model` are not used. Above `limit` the answer is of no use, and
+    I is meant in the `coordinates`. W and the rate of `model` are not used. Above `limit` the answer is of no use, and
     after so many `rounds` none is asked for. `progress` is told a route's steps.
     """
 
@@ -34,8 +35,14 @@ class SynthesisProblem:
     floor: Floor = "identity"
     limit: float | None = None
     solver: str = "clarabel"
+    coordinates: Choice = "identity"
     rounds: int | None = None
     progress: Callable[[str], None] | None = field(default=None, repr=False)
+
+    @property
+    def scaled(self) -> Coordinates:
+        """The coordinates in which I is meant."""
+        return coordinates(self.coordinates, self.family, self.safe_set)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

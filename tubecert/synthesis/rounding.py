@@ -20,6 +20,7 @@ from tubecert.expression.matrix import Matrix
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.attack import Attack, Attacker
+from tubecert.synthesis.coordinates import Choice
 from tubecert.synthesis.family import MetricFamily
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
@@ -40,6 +41,7 @@ class VerifiedMetric:
 
     rate: Fraction
     floor: Floor
+    coordinates: Choice
     dual_metric: Matrix = field(repr=False)
     proof: MetricProof = field(repr=False)
     condition_number: Constant
@@ -83,12 +85,14 @@ def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction) -> 
 
     As good: by sampling in floats, rounding costs next to nothing of kappa, and at most half of what C2 has to spare.
     """
-    forms = FormsTape(problem.model, problem.family)
+    forms = FormsTape(problem.model, problem.family, problem.scaled)
+    scaled = problem.scaled
     nothing = np.ones((1, len(problem.model.states)))
     attacker = Attacker.of(replace(problem, rate=float(rate)), forms, nothing, np.random.default_rng(5))
 
     def sampled(digits: int) -> Attack:
-        return attacker.attack(np.array(rounded(values, digits), dtype=float), np.inf)
+        short = np.array(rounded(values, digits, scaled.entries), dtype=float)
+        return attacker.attack(forms.inner(short), np.inf)
 
     most = _DIGITS[-1]
     with np.errstate(all="ignore"):
@@ -100,13 +104,22 @@ def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction) -> 
     return [most]
 
 
-def rounded(values: Array, digits: int) -> Coefficients:
-    """Symmetric rational matrices: every entry a multiple of one power of ten, `digits` digits for the largest."""
+def rounded(values: Array, digits: int, sizes: Array | None = None) -> Coefficients:
+    """Symmetric rational matrices with `digits` digits for the largest entry.
+
+    Every entry is a multiple of one power of ten; with `sizes` (n, n), of what entries are measured in, of its own.
+    """
     symmetric = 0.5 * (values + np.swapaxes(values, -1, -2))
-    exponent = digits - 1 - floor(log10(float(np.abs(symmetric).max())))
-    unit = Fraction(10) ** -exponent
+    scale = np.ones(symmetric.shape[1:]) if sizes is None else sizes
+    largest = float(np.abs(symmetric / scale).max())
+    units = [
+        [Fraction(10) ** (floor(log10(largest * s)) - digits + 1) for s in row] for row in scale.tolist()
+    ]
     return tuple(
-        tuple(tuple(round(Fraction(float(v)) / unit) * unit for v in row) for row in block)
+        tuple(
+            tuple(round(Fraction(float(v)) / unit) * unit for v, unit in zip(row, own, strict=True))
+            for row, own in zip(block, units, strict=True)
+        )
         for block in symmetric
     )
 
@@ -115,7 +128,7 @@ def _proven(
     problem: SynthesisProblem, proposal: Proposal, digits: int, rate: Fraction, effort: Effort
 ) -> VerifiedMetric | Rejected:
     assert proposal.coefficients is not None
-    dual = problem.family.dual_metric(rounded(proposal.coefficients, digits))
+    dual = problem.family.dual_metric(rounded(proposal.coefficients, digits, problem.scaled.entries))
     proof = verify_metric(with_metric(problem.model, dual, rate), problem.safe_set, effort)
     if proof.failed is not None:
         failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
@@ -126,6 +139,7 @@ def _proven(
     return VerifiedMetric(
         rate=rate,
         floor=problem.floor,
+        coordinates=problem.coordinates,
         dual_metric=dual,
         proof=proof,
         condition_number=condition,

@@ -91,7 +91,8 @@ def _proposal(
     coefficients = None
     if conditions is not None and y is not None:
         count = conditions.unknowns.count
-        coefficients, kappa = conditions.unknowns.matrices(y[:count]), float(y[count])
+        inner = conditions.unknowns.matrices(y[:count])
+        coefficients, kappa = inner * problem.scaled.entries, float(y[count])
     if problem.limit is not None and feasible and kappa > problem.limit:
         feasible, status = False, f"{status}, with kappa {kappa:.6g} above the limit {problem.limit:.6g}"
     return Proposal(

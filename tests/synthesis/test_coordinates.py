@@ -1,0 +1,119 @@
+"""Metrics do not depend on the units of the states."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tubecert import pipeline
+from tubecert.enclosure.tape import Tape
+from tubecert.model import build
+from tubecert.pipeline import Options
+from tubecert.spec import Synthesis, load_text
+from tubecert.spec.canonical import synthesis_data
+from tubecert.synthesis.coordinates import coordinates
+from tubecert.synthesis.family import metric_family
+from tubecert.synthesis.rounding import rounded
+from tubecert.verdict import Verdict
+
+JOINT = """
+tubecert: 1
+name: joint
+system:
+  states: [q, w, th, om]
+  inputs: [u]
+  parameters: {{a: {a}, b: {b}, c: {c}, d: {d}}}  # how many of the new units are one of the old
+  f: [a*w/b, "b*(-2*sin(q/a) - 10*(q/a - th/c) - 0.2*w/b)", c*om/d, "d*10*(q/a - th/c)"]
+  B: [[0], [0], [0], [d]]
+safe_set: {{q: [-a, a], w: [-3*b, 3*b], th: [-c, c], om: [-3*d, 3*d]}}
+uncertainty: {{h: [0]}}
+trajectory: {{kind: equilibrium, at: [0, 0, 0, 0], input: [0]}}
+"""
+# the input moves both of the last states, and the direction turns
+TURNING = """
+tubecert: 1
+name: turning
+system:
+  states: [x, y, z]
+  inputs: [u]
+  parameters: {{a: {a}, b: {b}, c: {c}}}
+  f: [a*y/b, "b*(z/c - x/a)", "-c*y/b"]
+  B: [[0], ["0.1*b*x/a"], ["c*(1 + 0.1*x/a)"]]
+safe_set: {{x: [-a/4, a/4], y: [-b/4, b/4], z: [-c/4, c/4]}}
+uncertainty: {{h: [0]}}
+trajectory: {{kind: equilibrium, at: [0, 0, 0], input: [0]}}
+"""
+
+
+def scaled_condition(text, units, **wanted):
+    """The condition number in half-widths, by sampling."""
+    spec = load_text(text.format(**units))
+    found = pipeline.synthesise(spec, Synthesis(objective="condition", **wanted), Options())
+    assert found.verdict is Verdict.CERTIFIED, found.reason
+    model = build(found.spec)
+    half = np.array([float(high) for _, high in spec.safe_set])
+    n = len(half)
+    points = np.random.default_rng(2).uniform(-1, 1, (4000, n)) * half
+    tape = Tape([e for row in model.W for e in row], model.states)
+    W = np.moveaxis(tape.run_floats(list(points.T), (len(points),)), 0, -1).reshape(-1, n, n)
+    values = np.linalg.eigvalsh(W / half[:, None] / half)
+    return values[:, -1].max() / values[:, 0].min()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("route", ["auto", "sos"])
+@pytest.mark.parametrize(
+    "units",
+    [
+        {"a": 1, "b": 8, "c": 1, "d": 8},
+        {"a": 1, "b": "1/16", "c": 1, "d": 2},
+        {"a": 1, "b": 1000, "c": 57, "d": 100},
+    ],
+)
+def test_another_unit_gives_the_same_metric(units, route):
+    wanted = {"rate": Fraction(1), "route": route}
+    reference = scaled_condition(JOINT, dict.fromkeys("abcd", 1), **wanted)
+    assert scaled_condition(JOINT, units, **wanted) == pytest.approx(reference, rel=0.01)
+
+
+@pytest.mark.slow
+def test_also_where_the_direction_of_the_input_turns():
+    wanted = {"rate": Fraction(1, 4), "degree": 0}
+    reference = scaled_condition(TURNING, dict.fromkeys("abc", 1), **wanted)
+    units = {"a": 100, "b": "1/8", "c": 3}
+    assert scaled_condition(TURNING, units, **wanted) == pytest.approx(reference, rel=0.01)
+
+
+def test_in_the_states_own_units_it_does():
+    wanted = {"rate": Fraction(1), "degree": 0, "coordinates": "identity"}
+    one, eight = (dict.fromkeys("ac", 1) | dict.fromkeys("bd", s) for s in (1, 8))
+    reference = scaled_condition(JOINT, one, **wanted)
+    assert scaled_condition(JOINT, eight, **wanted) != pytest.approx(reference, rel=0.03)
+
+
+def test_a_cube_is_what_it_was():
+    spec = load_text(TURNING.format(a=1, b=1, c=1))
+    family = metric_family(build(spec), degree=0, safe_set=spec.safe_set)
+    cube = [(Fraction(-3), Fraction(3))] * 3
+    for choice in ("auto", "identity"):
+        found = coordinates(choice, family, cube)
+        assert found.states.tolist() == [1, 1, 1]
+        assert found.columns.tolist() == [1, 1, 1]
+
+
+def test_the_default_is_free_of_units():
+    assert synthesis_data(Synthesis(rate=Fraction(1)))["coordinates"] == "auto"
+    assert synthesis_data(Synthesis(coordinates="identity"))["coordinates"] == "identity"
+
+
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.integers(2, 7), st.integers(-5, 5))
+@settings(deadline=None)
+def test_digits_are_those_of_the_entry(entries, digits, power):
+    """An entry of a small unit is not rounded away beside one of a large unit."""
+    size = np.array([[1.0, 10.0**power], [10.0**power, 10.0 ** (2 * power)]])
+    a, b, c = entries
+    values = np.array([[[4, b], [b, c]]]) + a * 0
+    found = np.array(rounded(values * size, digits, size), dtype=float)[0] / size
+    assert np.abs(found - values[0]).max() <= 0.5 * 10.0 ** (1 - digits) * (1 + 1e-9)

@@ -1,0 +1,60 @@
+"""In what coordinates the condition number of a metric is meant.
+
+In the states' own units a condition number depends on the units: a speed in mm/s makes another metric the best. With
+x = S z, S = diag(half-widths of the safe set), the metric in z is S^-1 W S^-1, and what is best there is best in
+every unit. The columns of a frame are scaled as well, so that all unknowns are of one size.
+Untrusted: W is proven in the states' own coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.synthesis.family import MetricFamily
+
+Choice = Literal["auto", "identity"]
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """`states` (n,): the diagonal of S; `columns` (n,): by what the columns of the frame are multiplied."""
+
+    states: Array
+    columns: Array
+
+    @property
+    def entries(self) -> Array:
+        """What an unknown of V stands for, (n, n)."""
+        return np.asarray(self.columns[:, None] * self.columns)
+
+
+def coordinates(
+    choice: Choice, family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]
+) -> Coordinates:
+    """S for a safe set: half-widths as shares of the largest one, so that cubes stay as they are; or ones."""
+    n = len(safe_set)
+    if choice == "identity":
+        return Coordinates(np.ones(n), np.ones(n))
+    half = [(high - low) / 2 for low, high in safe_set]
+    states = np.array([float(width / max(half)) for width in half])
+    if family.flat or (states == 1).all():
+        return Coordinates(states, states)
+    return Coordinates(states, 1 / np.linalg.norm(_frame(family, safe_set) / states[:, None], axis=0))
+
+
+def _frame(family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]) -> Array:
+    """The frame at the centre of the safe set, (n, n); the identity where it cannot be evaluated."""
+    n = len(safe_set)
+    centre = np.array([[float((low + high) / 2)] for low, high in safe_set])
+    with np.errstate(all="ignore"):
+        tape = Tape([e for row in family.frame for e in row], family.states)
+        values = np.asarray(tape.run_floats(list(centre), (1,)), dtype=float).reshape(n, n)
+    usable = np.isfinite(values).all() and (np.abs(values).max(axis=0) > 0).all()
+    return values if usable else np.eye(n)
