@@ -109,20 +109,28 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     return replace(proof, verdict=Verdict.UNDECIDED, failed=slow)
 
 
+def supported_rate(model: ControlAffineModel, safe_set: Box, effort: Effort) -> Constant:
+    """The supremum of the rates for which C2 holds on the safe set, enclosed to the gap of the effort.
+
+    For a W that is positive definite there; whether it satisfies C3 is another question. Infinite where C2 is void. The
+    rate of the model is not used.
+    """
+    if len(model.inputs) == len(model.states):
+        return Constant(below=np.inf, above=np.inf)
+    domain = BoxDomain(dict(zip(model.states, safe_set, strict=True)))
+    found = supremum(_rates(model, domain, effort), domain, effort)
+    middle = zip(model.states, safe_set, strict=True)
+    at = Witness(x=tuple(found.at.get(name, float((lo + hi) / 2)) for name, (lo, hi) in middle))
+    return Constant(below=-found.above / 2, above=-found.below / 2, at=at)
+
+
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
     """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the sign of the margin is known, and its size.
 
     Where that is costly, half of the margin is known well enough: metrics of least condition number nearly attain C2 in
     many places, and each further digit would be paid for in all of them.
     """
-    basis = model.annihilator if model.constant_input else _moving_annihilator(model, domain, effort)
-    objective: Objective
-    if basis is not None:
-        objective = Pencil(_restrict(model.drift_form, basis), _restrict(model.W, basis))
-    else:
-        objective = ProjectedPencil(
-            model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
-        )
+    objective = _rates(model, domain, effort)
     rate = float(model.rate)
     # a first look, to see how sharp the next must be
     precision, budget = 1e-2, min(effort.cheap, effort.budget)
@@ -143,6 +151,14 @@ def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) 
         else:
             precision = min(precision / 10, abs(margin[1]) / rate)
         precision = max(precision, _FINEST)
+
+
+def _rates(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Objective:
+    """-2 times the largest rate that C2 supports at a point."""
+    basis = model.annihilator if model.constant_input else _moving_annihilator(model, domain, effort)
+    if basis is not None:
+        return Pencil(_restrict(model.drift_form, basis), _restrict(model.W, basis))
+    return ProjectedPencil(model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs))
 
 
 def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Matrix | None:

@@ -10,7 +10,7 @@ from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
-from tubecert.spec.plan import completed, read_initial_state, read_trajectory
+from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import (
     read_adaptation,
@@ -27,7 +27,8 @@ from tubecert.spec.types import Metric, Places, Spec, Synthesis
 
 VERSION: Final = 1
 
-_REQUIRED = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory")
+_SYSTEM = ("tubecert", "name", "system", "safe_set")
+_REQUIRED = (*_SYSTEM, "uncertainty", "trajectory")
 _FORMATS = (
     ("tubecert-certificate/", "a certificate", "tubecert recheck and tubecert report read certificates"),
     (
@@ -57,20 +58,28 @@ def load(path: str) -> Spec:
     return load_source(read_source(path))
 
 
+def load_system(path: str) -> Spec:
+    """The same of a file of which only system, safe set and metric matter: it may lack all else, which is not read.
+
+    The specification is that of rest in the middle of the safe set without uncertainty. Raises as `load` does.
+    """
+    return load_source(read_source(path), alone=True)
+
+
 def load_text(text: str, file: str = "<text>") -> Spec:
     """The specification in a text; `file` is what findings call it."""
     return load_source(Source.of(file, text))
 
 
-def load_source(source: Source) -> Spec:
-    """The specification in a source."""
+def load_source(source: Source, *, alone: bool = False) -> Spec:
+    """The specification in a source; see `load_system` for a system `alone`."""
     check_limits(source)
     node, findings = compose(source)
     reader = Reader(source)
     reader.findings.extend(findings)
     spec = None
     if not any(finding.code in (codes.YAML_SYNTAX, codes.LIMIT) for finding in findings):
-        spec = _read(root_field(reader, node))
+        spec = _read(root_field(reader, node), alone=alone)
     if reader.findings or spec is None:
         raise SpecError(_ordered(reader.findings))
     return spec
@@ -83,15 +92,21 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
     return capped(sorted(findings, key=position), codes.LIMIT)
 
 
-def _read(root: Field) -> Spec | None:
+def _read(root: Field, *, alone: bool) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
     if _is_another_file(root):
         return None
-    entries = root.mapping(required=_REQUIRED, optional=_OPTIONAL)
+    entries = (
+        root.mapping(required=_SYSTEM, optional=(*_REQUIRED, *_OPTIONAL))
+        if alone
+        else root.mapping(required=_REQUIRED, optional=_OPTIONAL)
+    )
     if entries is None:
         return None
+    if alone:
+        entries = {key: entries[key] for key in (*_SYSTEM, "metric") if key in entries}
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
@@ -128,6 +143,9 @@ def _read_named(
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
     x0, within = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    if box is not None and not entries.keys() & {"uncertainty", "trajectory"}:  # as `load_system` leaves it
+        plan, uncertainty = at_rest(entries["safe_set"], box, len(names.inputs))
+        x0 = tuple((low + high) / 2 for low, high in box)
     plan = completed(plan, x0) if plan else None
     metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)

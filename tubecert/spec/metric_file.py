@@ -7,10 +7,12 @@ problem with its place. Only `rate` and `dual_metric` are used; what else the fi
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import Final
 
 from tubecert.errors import SpecError
 from tubecert.spec import codes
+from tubecert.spec.coefficients import is_of_coefficients, metric_text
 from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader, root_field
@@ -27,11 +29,13 @@ _REMEDY: Final = (
 )
 
 
-def with_metric(spec: Spec, path: str) -> Spec:
-    """The specification with the metric of a file in place of its own.
+def with_metric(spec: Spec, path: str, rate: Fraction | None = None) -> Spec:
+    """The specification with the metric of a file in place of its own; for coefficients, `rate` stands in for theirs.
 
     Raises `TargetError` if the file cannot be read, `SpecError` with every problem in it.
     """
+    if is_of_coefficients(path):
+        return with_metric_text(spec, metric_text(path, spec, rate), path)
     return _with(spec, read_source(path, METRIC))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Final
@@ -12,7 +13,7 @@ from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.table import read_table
-from tubecert.spec.types import Interpolation, Matrix, Task, Term, Trajectory, Vector
+from tubecert.spec.types import Interpolation, Matrix, Task, Term, Trajectory, Uncertainty, Vector
 
 KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr")
 MAX_KNOTS: Final = 2_001
@@ -25,6 +26,15 @@ def read_trajectory(field: Field, names: Names) -> Trajectory | None:
     readers = {"equilibrium": _equilibrium, "expressions": _expressions, "csv": _csv, "ilqr": _ilqr}
     kind = _kind(field)
     return readers[kind](field, names) if kind else None
+
+
+def at_rest(
+    field: Field, box: Sequence[tuple[Fraction, Fraction]], inputs: int
+) -> tuple[Trajectory, Uncertainty]:
+    """Rest in the middle of a box, and no uncertainty: where a plan is of no account. `field` is what it is about."""
+    x = tuple(_constant_term(field, (low + high) / 2) for low, high in box)
+    none = tuple(_constant_term(field, Fraction(0)) for _ in range(inputs))
+    return Trajectory(kind="equilibrium", x=x, u=none, horizon=None), Uncertainty(h=none, bounds=None)
 
 
 def _kind(field: Field) -> str | None:

@@ -1,0 +1,256 @@
+"""`verify`: metrics alone, from specifications, metric files and coefficients of other tools."""
+
+import io
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from typer.testing import CliRunner
+
+from tubecert.cli.app import app
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.errors import SpecError
+from tubecert.model import build
+from tubecert.pipeline.verification import verify
+from tubecert.spec.load import load_system
+from tubecert.spec.metric_file import with_metric
+from tubecert.verdict import Verdict
+
+SYSTEM = """
+tubecert: 1
+name: oblique
+system: {states: [x1, x2], inputs: [u], f: ["-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2"], B: [["0.5"], [-2]]}
+safe_set: {x1: [-5, 5], x2: [-5, 5]}
+"""
+OWN = 'metric: {rate: 1.74, dual_metric: [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]}\n'
+W = [[4.25828, -0.93423], [-0.93423, 3.76692]]
+# x' = -x + y, y' = u: W = [[1 + x**2/4 ...]] with a monomial in x, which no input moves
+BENT = """
+tubecert: 1
+name: bent
+system: {states: [x, y], inputs: [u], parameters: {k: 0.5}, f: ["-x + y", "0"], B: [[0], [1]]}
+safe_set: {x: [-0.5, 0.5], y: [-0.5, 0.5]}
+"""
+ONE, SQUARE = [[1, -0.5], [-0.5, 2]], [[0.25, 0], [0, 0.125]]
+
+
+def run(*arguments):
+    arguments = ["verify", "--no-progress", *map(str, arguments)]
+    return CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "system.yaml").write_text(SYSTEM)
+    (tmp_path / "own.yaml").write_text(SYSTEM + OWN)
+    (tmp_path / "bent.yaml").write_text(BENT)
+    return tmp_path
+
+
+# -- verdicts
+
+
+def test_a_metric_without_plan_uncertainty_or_tube(folder):
+    """The largest rate is that of the closed form: one direction is left, at the worst x2 of a box."""
+    done = run(folder / "own.yaml", "--json")
+    assert done.exit_code == 0
+    (found,) = json.loads(done.stdout)
+    assert found["verdict"] == "certified"
+    low, high = found["largest_rate"]
+    v = np.array([2.0, 0.5])  # B'v = 0
+    slopes = [np.array([[-1, 2], [-3, 4 - 0.75 * s]]) for s in np.linspace(0, 25, 2001)]
+    true = min(-(v @ A @ np.array(W) @ v) / (v @ np.array(W) @ v) for A in slopes)
+    assert low <= true <= high
+    assert high - low <= 1e-3 * high
+    eigenvalues = np.linalg.eigvalsh(W)
+    assert found["condition_number"][0] <= eigenvalues[1] / eigenvalues[0] <= found["condition_number"][1]
+
+
+def test_many_files_and_the_worst_exit_code(folder):
+    (folder / "fast.yaml").write_text(SYSTEM + OWN.replace("1.74", "1.9"))
+    done = run(folder / "own.yaml", folder / "fast.yaml")
+    assert done.exit_code == 1
+    words = " ".join(done.stdout.split())
+    assert "the largest rate that this metric supports is 1.74" in words
+    assert "2 metrics: 1 certified, 1 refuted" in words
+    assert run(folder / "fast.yaml", "--rate", "1.7").exit_code == 0
+
+
+def test_what_cannot_be_decided_is_undecided(folder):
+    edge = run(folder / "bent.yaml", _json(folder, {"coefficients": ONE, "rate": 1}), "--rate", "1.5")
+    assert edge.exit_code == 4  # v = (1, 0): -1 - 0.5 = -1.5 exactly
+    assert "undecided" in edge.stdout
+
+
+def test_a_metric_that_is_not_positive_or_depends_on_the_wrong_state(folder):
+    done = run(folder / "bent.yaml", _json(folder, {"coefficients": [[1, 2], [2, 1]], "rate": 1}))
+    assert done.exit_code == 1
+    assert "not positive definite" in done.stdout
+    moved = {"coefficients": [ONE, SQUARE], "monomials": ["1", "y**2"], "rate": 1}
+    done = run(folder / "bent.yaml", _json(folder, moved), "--json")
+    assert done.exit_code == 1
+    (found,) = json.loads(done.stdout)
+    assert found["reason"]["claim"] == "metric_killing"
+    assert found["largest_rate"][0] > 1.4  # of C2, which is decided all the same
+
+
+def test_a_rank_that_is_lost_is_said(folder):
+    (folder / "own.yaml").write_text((SYSTEM + OWN).replace('[["0.5"], [-2]]', '[["x1"], ["x1*x2"]]'))
+    done = run(folder / "own.yaml")
+    assert done.exit_code == 1
+    assert "rank" in done.stdout
+
+
+def test_a_certified_metric_is_written_and_read_again(folder):
+    target = folder / "m.json"
+    given = _json(folder, {"coefficients": W, "rate": 1.74})
+    assert run(folder / "system.yaml", given, "-o", target).exit_code == 0
+    content = json.loads(target.read_text())
+    assert content["dual_metric"] == [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]
+    assert run(folder / "system.yaml", target).exit_code == 0
+    target.unlink()
+    assert run(folder / "system.yaml", given, "--rate", "1.9", "-o", target).exit_code == 1
+    assert not target.exists()
+    assert run(folder / "own.yaml", folder / "own.yaml", "-o", target).exit_code == 2
+    assert run(folder / "own.yaml", "-o", folder / "own.yaml").exit_code == 2
+
+
+def test_what_is_missing_is_said(folder):
+    assert run(folder / "system.yaml").exit_code == 2
+    assert run(_json(folder, {"coefficients": W, "rate": 1})).exit_code == 2
+    (folder / "own.yaml").write_text(OWN)
+    assert run(folder / "own.yaml").exit_code == 2
+
+
+# -- coefficients of other tools
+
+
+def _json(folder, content, name="given.json"):
+    (folder / name).write_text(json.dumps(content))
+    return folder / name
+
+
+def _csv(folder, matrices, monomials):
+    lines = ["monomial,row,column,value"]
+    for matrix, monomial in zip(matrices, monomials, strict=True):
+        lines += [f"{monomial},{i + 1},{j + 1},{matrix[i][j]}" for i in range(2) for j in range(i, 2)]
+    (folder / "given.csv").write_text("\n".join(lines) + "\n")
+    return folder / "given.csv"
+
+
+def _npz(folder, **arrays):
+    np.savez(folder / "given.npz", **arrays)
+    return folder / "given.npz"
+
+
+def _mat(folder, **arrays):
+    savemat(folder / "given.mat", arrays)
+    return folder / "given.mat"
+
+
+WRITERS = {
+    "json": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "monomials": ["1", "x**2"], "rate": "1"}),
+    "json powers": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "powers": [[0, 0], [2, 0]], "rate": 1}),
+    "csv": lambda f: _csv(f, [ONE, SQUARE], ["1", "x**2"]),
+    "npz": lambda f: _npz(
+        f, coefficients=np.array([ONE, SQUARE]), monomials=np.array(["1", "x**2"]), rate=1.0
+    ),
+    "npz powers": lambda f: _npz(f, coefficients=np.array([ONE, SQUARE]), powers=np.array([[0, 0], [2, 0]])),
+    "mat": lambda f: _mat(
+        f,
+        coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1),
+        monomials=np.array(["1", "x**2"], dtype=object),
+        rate=1.0,
+    ),
+    "mat powers": lambda f: _mat(
+        f, coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1), powers=[[0, 0], [2, 0]]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_every_format_is_the_same_metric(folder, name):
+    spec = load_system(str(folder / "bent.yaml"))
+    written = {
+        "format": "tubecert-metric/1",
+        "rate": 1,
+        "dual_metric": [["1 + 0.25*x**2", "-0.5"], ["-0.5", "2 + 0.125*x**2"]],
+    }
+    reference = with_metric(spec, str(_json(folder, written, "reference.json")))
+    path = WRITERS[name](folder)
+    found = with_metric(spec, str(path), None if "rate" in path.read_text("latin-1") else 1)
+    assert build(found).W == build(reference).W
+    assert found.metric.rate == 1
+    assert verify(found, Effort()).verdict is Verdict.CERTIFIED
+
+
+def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
+    spec = load_system(str(folder / "bent.yaml"))
+    third = _json(folder, {"coefficients": [["1/3", "0"], ["0", 1]], "rate": 0.1})
+    metric = with_metric(spec, str(third)).metric
+    assert str(metric.dual_metric[0][0].expression.fraction) == "1/3"
+    array = _npz(folder, coefficients=np.array([[0.1, 0.0], [0.0, 1.0]]), rate=0.1)
+    assert str(with_metric(spec, str(array)).metric.dual_metric[0][0].expression.fraction) == "1/10"
+
+
+def test_an_asymmetry_of_rounding_is_mended_and_no_other(folder):
+    spec = load_system(str(folder / "bent.yaml"))
+    array = np.array([[1.0, -0.5], [-0.5 + 1e-15, 2.0]])
+    W = with_metric(spec, str(_npz(folder, coefficients=array, rate=1.0))).metric.dual_metric
+    assert W[0][1].expression is W[1][0].expression
+    with pytest.raises(SpecError, match="not symmetric"):
+        with_metric(spec, str(_npz(folder, coefficients=array + np.array([[0, 0], [1e-6, 0]]), rate=1.0)))
+
+
+class Bomb:
+    def __reduce__(self):
+        return (print, ("run",))
+
+
+def _bad(folder):
+    good = {"coefficients": W, "rate": 1}
+    yield "no rate", _json(folder, {"coefficients": W}, "a.json")
+    yield "unknown key", _json(folder, good | {"lambda": 1}, "b.json")
+    yield "shape", _json(folder, good | {"coefficients": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "c.json")
+    yield "ragged", _json(folder, good | {"coefficients": [[1, 0], [0]]}, "d.json")
+    yield "no number", _json(folder, good | {"coefficients": [[1, None], [None, 1]]}, "e.json")
+    yield "nan", _npz(folder, coefficients=np.array([[np.nan, 0], [0, 1]]), rate=1.0)
+    yield "huge", _json(folder, good | {"coefficients": [["1e999999999", 0], [0, 1]]}, "f.json")
+    yield "monomials", _json(folder, good | {"coefficients": [W, W], "monomials": ["1"]}, "g.json")
+    yield "both", _json(folder, good | {"monomials": ["1"], "powers": [[0, 0]]}, "h.json")
+    yield "half power", _json(folder, good | {"powers": [[0.5, 0]]}, "i.json")
+    yield "negative power", _json(folder, good | {"powers": [[-1, 0]]}, "j.json")
+    yield "two in one", _json(folder, good | {"monomials": ["1) + (x1"]}, "k.json")
+    yield "stranger", _json(folder, good | {"monomials": ["z"]}, "l.json")
+    yield "negative rate", _json(folder, good | {"rate": -1}, "m.json")
+    yield "deep", _text(folder, "n.json", '{"coefficients": ' + "[" * 5000)
+    yield "csv header", _text(folder, "o.csv", "a,b\n1,2\n")
+    yield "csv row", _text(folder, "p.csv", "monomial,row,column,value\n1,1,3,2\n")
+    yield "csv twice", _text(folder, "q.csv", "monomial,row,column,value\n1,1,1,2\n1,1,1,2\n")
+    yield "csv cell", _text(folder, "r.csv", "monomial,row,column,value\n1,1,1,x\n")
+    yield "no zip", _text(folder, "s.npz", "PK")
+    yield "no mat", _text(folder, "t.mat", "MATLAB 5.0 MAT-file" + " " * 200)
+    yield "hdf5", _text(folder, "u.mat", "MATLAB 7.3 MAT-file".ljust(124) + "\x00\x02IM" + " " * 200)
+    pickled = np.array([Bomb()], dtype=object)
+    np.savez(folder / "v.npz", coefficients=pickled)
+    yield "pickle", folder / "v.npz"
+    with zipfile.ZipFile(folder / "w.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        big = io.BytesIO()
+        np.save(big, np.zeros((2000, 1000)))
+        archive.writestr("coefficients.npy", big.getvalue())
+    yield "bomb", folder / "w.npz"
+
+
+def _text(folder, name, text):
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def test_what_is_no_such_file_is_one_located_error(folder):
+    for why, path in _bad(folder):
+        done = run(folder / "system.yaml", path)
+        assert done.exit_code == 2, (why, done.output)
+        assert path.name in done.output, why
+        assert done.stdout == "", why

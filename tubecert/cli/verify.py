@@ -1,0 +1,118 @@
+"""`verify`: metrics in; for each of them a verdict, the largest rate it supports, and its condition number out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tubecert import certificate
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.options import Numbers, Output
+from tubecert.cli.presenting import present
+from tubecert.cli.targets import refused, spare
+from tubecert.errors import ExitCode, SpecError, TubecertError
+from tubecert.findings import Finding, Location
+from tubecert.report.terminal import Terminal
+
+if TYPE_CHECKING:
+    from tubecert.pipeline.verification import Verified
+    from tubecert.spec import Spec
+
+_METRICS = (".json", ".csv", ".npz", ".mat")
+_BUDGET = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A metric that is decided: the file that it stands in, and the specification with it."""
+
+    file: str
+    spec: Spec
+
+
+def run(given: Mapping[str, Any], output: Output) -> ExitCode:
+    """Verify every metric; `given` holds the options by the names of their parameters."""
+    numbers = Numbers()
+    rate = numbers.positive("--rate", given["rate"])
+    gap = numbers.positive("--gap", given["gap"], below=1)
+    budget = numbers.count("--budget", given["budget"])
+    numbers.check()
+    cases = list(_cases(given["files"], rate))
+    target = given["output"]
+    if target is not None:
+        if len(cases) != 1:
+            raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
+        certificate.check_target(target)
+        spare(target, {"input": cases[0].file, "specification": cases[0].spec.path})
+    from tubecert.enclosure.branch_and_bound import Effort
+    from tubecert.pipeline.verification import verify
+    from tubecert.report import progress
+
+    assert gap is not None
+    effort = Effort(gap=float(gap), budget=budget or _BUDGET)
+    terminal = Terminal.stderr(color=output.color)
+    found: list[tuple[str, Verified]] = []
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
+        for case in cases:
+            found.append((case.file, verify(case.spec, effort, show)))
+    if target is not None and found[0][1].file is not None:
+        certificate.write(target, found[0][1].file.to_json())
+    _show(found, target, output)
+    return _code([verified for _, verified in found])
+
+
+def _cases(files: Sequence[str], rate: Fraction | None) -> Iterator[Case]:
+    """What is to be decided, read before any work is done; raises `TubecertError`."""
+    from tubecert.spec.load import load_system
+    from tubecert.spec.metric_file import with_metric
+
+    pending: tuple[str, Spec] | None = None
+    system: Spec | None = None
+    for file in files:
+        if Path(file).suffix.lower() in _METRICS:
+            if system is None:
+                raise _error(file, "a metric needs a system", "give a specification before it")
+            pending = None
+            yield _case(file, with_metric(system, file, rate), rate)
+        else:
+            if pending is not None:
+                yield _case(*pending, rate)
+            system = load_system(file)
+            pending = file, system
+    if pending is not None:
+        yield _case(*pending, rate)
+
+
+def _case(file: str, spec: Spec, rate: Fraction | None) -> Case:
+    if spec.metric is None:
+        remedy = "give metric.dual_metric and metric.rate, or a metric file after the specification"
+        raise _error(file, "there is no metric to verify", remedy)
+    return Case(
+        file=file, spec=spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
+    )
+
+
+def _error(file: str, message: str, help: str) -> TubecertError:
+    place = Location(file=file, line=1, column=1)
+    return SpecError([Finding(code="TC105", message=message, location=place, help=help)])
+
+
+def _code(found: Sequence[Verified]) -> ExitCode:
+    """The worst: refuted, then undecided."""
+    codes = [verified.verdict.exit_code for verified in found]
+    return next((c for c in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED) if c in codes), ExitCode.CERTIFIED)
+
+
+def _show(found: Sequence[tuple[str, Verified]], target: str | None, output: Output) -> None:
+    from rich.text import Text
+
+    from tubecert.report import verification
+
+    if output.json:
+        write_stdout(verification.as_json(found))
+        return
+    lines = Text("\n").join(verification.line(file, verified) for file, verified in found)
+    present(output, lines, lambda: verification.report(found, target))

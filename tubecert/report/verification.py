@@ -1,0 +1,93 @@
+"""What `verify` found: a line for each metric, in words or as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from rich.text import Text
+
+from tubecert.claims import MetricKilling
+from tubecert.printable import printable_json, visible
+from tubecert.records import to_json
+from tubecert.report.layout import indented
+from tubecert.report.numbers import down, exact, up
+from tubecert.report.sections import VERDICTS, place
+from tubecert.words.claims import sentence
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from tubecert.pipeline.verification import Verified
+
+
+def line(file: str, found: Verified) -> Text:
+    """The verdict, and what is known of the metric."""
+    shown = Text.assemble(
+        (str(found.verdict), f"bold {VERDICTS[found.verdict]}"), (f" {visible(file)}: ", "bold")
+    )
+    if found.reason is not None:
+        return shown.append(sentence(found.reason))
+    parts = [f"rate {exact(found.rate)} 1/s", _supports(found), _condition(found)]
+    return shown.append(", ".join(part for part in parts if part))
+
+
+def report(found: Sequence[tuple[str, Verified]], target: str | None) -> list[RenderableType]:
+    """A few lines for each metric, and how many there are of each verdict."""
+    parts: list[RenderableType] = []
+    for file, verified in found:
+        parts.append(line(file, verified))
+        parts += [indented(Text(text)) for text in _details(verified)]
+    if len(found) > 1:
+        verdicts = [verified.verdict for _, verified in found]
+        counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+        parts += [Text(), Text(f"{len(found)} metrics: {counts}")]
+    if target is not None and found[0][1].file is not None:
+        parts += [Text(), Text(f"Metric: {visible(target)}")]
+    return parts
+
+
+def _details(found: Verified) -> list[str]:
+    sides = ", ".join(f"{name} in [{exact(lo)}, {exact(hi)}]" for name, (lo, hi) in found.safe_set.items())
+    if found.reason is None:
+        return [f"C1-C3 hold on {sides}"]
+    known = [part for part in (_supports(found), _condition(found)) if part]
+    at = [] if found.reason.at is None else [f"at {place(found.states, found.reason.at)}"]
+    alone = "C2 alone: " if isinstance(found.reason.claim, MetricKilling) else ""
+    return [*at, *([alone + ", ".join(known)] if known else []), f"on {sides}"]
+
+
+def _supports(found: Verified) -> str:
+    rate = found.largest_rate
+    if rate is None:
+        return ""
+    if not isfinite(rate.below):
+        return "" if rate.above < 0 else "C2 is void: there are as many inputs as states"
+    return (
+        f"supports rates up to {down(rate.below, 7)} 1/s" if rate.below > 0 else "supports no positive rate"
+    )
+
+
+def _condition(found: Verified) -> str:
+    return "" if found.condition_number is None else f"condition number {up(found.condition_number.above)}"
+
+
+def as_json(found: Sequence[tuple[str, Verified]]) -> str:
+    """A list of objects, one for each metric."""
+    return printable_json(json.dumps([_data(*each) for each in found], indent=1, ensure_ascii=False)) + "\n"
+
+
+def _data(file: str, found: Verified) -> dict[str, Any]:
+    numbers = ("largest_rate", "condition_number", "lower", "upper")
+    known = {key: getattr(found, key) for key in numbers}
+    return {
+        "file": file,
+        "name": found.name,
+        "verdict": str(found.verdict),
+        "rate": to_json(found.rate),
+        "safe_set": to_json(dict(found.safe_set)),
+        **{key: [v.below, v.above] for key, v in known.items() if v is not None and isfinite(v.below)},
+        **({} if found.reason is None else {"reason": to_json(found.reason)}),
+    }
