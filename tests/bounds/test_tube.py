@@ -17,7 +17,7 @@ from tubecert.enclosure.pencil import scalar
 from tubecert.expression import PI, Expression, constant, parse, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.trajectory import Plan, constant_plan
-from tubecert.tube import Tube, containment
+from tubecert.tube import Ball, Tube, containment
 
 t, x, y, z, u = (symbol(name) for name in "txyzu")
 STATES = ("x", "y", "z")
@@ -315,11 +315,11 @@ def test_a_cut_of_one_per_cent_too_much_is_noticed(monkeypatch):
     honest = Tube.contract
 
     def contract(self, variables, lo, hi):
-        self._rho, rho = 0.99 * self._rho, self._rho
+        self._section, section = Ball(0.99 * 0.5), self._section
         try:
             return honest(self, variables, lo, hi)
         finally:
-            self._rho = rho
+            self._section = section
 
     monkeypatch.setattr(Tube, "contract", contract)
     _, _, alive = tube_of("rest", 0.5).contract(

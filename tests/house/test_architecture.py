@@ -30,6 +30,7 @@ ROOMS = [
     "enclosure",
     "claims",
     "model",
+    "coordinates",
     "metric",
     "synthesis",
     "trajectory",

@@ -23,6 +23,7 @@ TRUSTED_ROOMS = {
     "spec",
     "enclosure",
     "model",
+    "coordinates",
     "metric",
     "trajectory",
     "tube",
@@ -39,7 +40,7 @@ ALSO_SAY = {  # of one claim each, no gains
     "enclosure/branch_and_bound.py": "an objective stays below a threshold",
     "model.py": "the rank of a B with a minor that is a constant",
     "metric/verify.py": "C1-C3",
-    "tube.py": "the tube lies in the safe set",
+    "tube/containment.py": "the tube lies in the safe set",
 }
 
 
@@ -113,7 +114,11 @@ def test_proofs_are_made_by_the_kernel_alone(path):
     }
     assert "Proof" not in called or name_of(path) == SAYS_CERTIFIED
     assert "MetricProof" not in called or name_of(path) == "metric/verify.py"
-    assert "Containment" not in called or name_of(path) in {"tube.py", "bounds/compute.py"}
+    assert "Containment" not in called or name_of(path) in {
+        "tube/containment.py",
+        "bounds/compute.py",
+        "bounds/level.py",
+    }
 
 
 _BOUND = "the safe side of a constant, which is a float by definition"
@@ -121,6 +126,7 @@ _ENDS = "ends of an interval, put in for a variable that a formula is monotone i
 _POINT = "a point that was chosen: it need not be near anything"
 TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant, and not near it
     "bounds/compute.py": _BOUND,
+    "bounds/level.py": _BOUND,
     "bounds/start.py": f"{_BOUND}; 0; the congruence T, any will do",
     "bounds/suprema.py": "1",
     "conditions/arithmetic.py": f"{_ENDS}; -inf",
@@ -136,9 +142,10 @@ TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant,
     "metric/verify.py": "1",
     "model.py": "0 and 1",
     "stages/bounded.py": _BOUND,
+    "stages/tube.py": _BOUND,
     "trajectory/hermite.py": _POINT,
     "trajectory/plan.py": _POINT,
-    "tube.py": _POINT,
+    "tube/sections.py": _POINT,
 }
 
 

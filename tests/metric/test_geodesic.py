@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from problems import W_CONSTANT, W_LINEAR, W_SQUARE
 
+from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import as_expression, constant, cos, sin, symbol
-from tubecert.metric import geodesic
 from tubecert.metric.geodesic import SymbolNorm, unique_geodesics
 from tubecert.model import ControlAffineModel, build
 from tubecert.pipeline import Options, certify
@@ -45,7 +45,7 @@ def ball(system, centre, rho):
 
 
 def bounded(system, centre, rho, **effort):
-    return unique_geodesics(system, ball(system, centre, rho), rho, Effort(**effort))
+    return unique_geodesics(Fields(system, None), ball(system, centre, rho), rho, Effort(**effort))
 
 
 def christoffel(W, x, step=1e-3):
@@ -124,7 +124,7 @@ def test_symbols_and_slopes_agree_with_differences(system, W):
     for _ in range(6):
         x = rng.uniform(-0.4, 0.4, 3)
         for order, reference in ((0, christoffel(W, x)), (1, slopes(W, x))):
-            norm = SymbolNorm(system, order=order)
+            norm = SymbolNorm(Fields(system, None), order=order)
             point = np.array([[x[system.states.index(name)] for name in norm.variables]])
             mid, rad = norm.tensor(point, point)
             moving = [i for i, name in enumerate(system.states) if name in norm.variables]
@@ -136,7 +136,7 @@ def test_symbols_and_slopes_agree_with_differences(system, W):
 def test_tensors_over_boxes_contain_the_tensors_at_points():
     rng = np.random.default_rng(2)
     for order, size in ((0, 3), (1, 4)):
-        norm = SymbolNorm(CURVED, order=order)
+        norm = SymbolNorm(Fields(CURVED, None), order=order)
         lo = rng.uniform(-0.5, 0.3, (20, 3))
         hi = lo + 10.0 ** rng.uniform(-6, -1, (20, 1))
         mid, rad = norm.tensor(lo, hi)
@@ -246,10 +246,11 @@ def test_the_verdict_rests_on_the_bound_from_above():
 
 def test_a_wrong_derivative_would_be_noticed(monkeypatch):
     """The comparison above has teeth: without the second derivatives of W it fails."""
-    monkeypatch.setattr(
-        geodesic, "differentiate", lambda w, _: tuple(tuple(constant(0) for _ in row) for row in w)
-    )
-    norm = SymbolNorm(CURVED, order=1)
+    fields = Fields(CURVED, None)
+    assert fields.W_x  # kept, unlike their derivatives
+    nothing = tuple(tuple(constant(0) for _ in row) for row in CURVED.W)
+    monkeypatch.setattr(Fields, "slopes", lambda self, w: [nothing] * 3)
+    norm = SymbolNorm(fields, order=1)
     mid, _ = norm.tensor(np.full((1, 3), 0.2), np.full((1, 3), 0.2))
     assert np.abs(mid[0] - slopes(curved, np.full(3, 0.2))).max() > 1e-2
 

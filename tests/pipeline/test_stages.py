@@ -100,6 +100,7 @@ def test_a_tube_that_leaves_the_safe_set_is_no_stage(judged):
             lower=tube.lower,
             upper=tube.upper,
             contained=end.partial.contained,
+            radii=tube.radii,
         )
 
 

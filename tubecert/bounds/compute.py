@@ -31,7 +31,8 @@ class Radius:
     """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, an exact decimal.
 
     `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused. `obstacle`
-    says why the fixed point was not found, if it was not (see `claims.TubeRadius`).
+    says why the fixed point was not found, if it was not (see `claims.TubeRadius`). `sides`: what |x_i - x_i*| is at
+    most, where the tube has coordinates of its own.
     """
 
     rho: Fraction
@@ -39,6 +40,7 @@ class Radius:
     upper: Constant | None
     contained: Containment
     obstacle: Obstacle | None = None
+    sides: tuple[Fraction, ...] | None = None
 
 
 def least_radius(
@@ -68,7 +70,7 @@ def least_radius(
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
     beyond: Obstacle = "out_of_range"
-    nowhere = Containment(verdict=Verdict.UNDECIDED)
+    nowhere = Containment()
     if declared is not None:
         given = needed(*declared)
         if given is None:
@@ -100,28 +102,28 @@ def bound_constants(
     metric: tuple[Constant, Constant],
     declared: Mapping[str, Constant],
 ) -> BoundConstants:
-    """Every constant over O(rho).
+    """Every constant over the tube, in its coordinates.
 
     `metric` is (a, A) over the tube; `declared` may hold h, h_x, h_t, which then take the place of derived bounds.
     """
-    model = suprema.model
+    fields = suprema.fields
     if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
         declared = {**declared, "h_initial": declared["h"]}
     derived: dict[str, Constant] = {}
-    if model.h is not None:
+    if suprema.model.h is not None:
         derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
         derived["h_initial"] = start.uncertainty(suprema)
     delta_p, delta = suprema.plan_defect()
     constants = BoundConstants(
         lower=metric[0],
         upper=metric[1],
-        f=suprema.norms("f", [tuple((e,) for e in model.f)]),
-        f_x=suprema.norms("f_x", [model.f_x]),
-        B=suprema.norms("B", [model.B]),
-        B_x=suprema.norms("B_x", model.B_x),
-        b_x=suprema.norms("b_x", model.b_x),
-        B_pinv=suprema.norms("B_pinv", [model.B_pinv]),
-        B_pinv_x=suprema.norms("B_pinv_x", model.B_pinv_x),
+        f=suprema.norms("f", [fields.f]),
+        f_x=suprema.norms("f_x", [fields.f_x]),
+        B=suprema.norms("B", [fields.B]),
+        B_x=suprema.norms("B_x", fields.B_x),
+        b_x=suprema.norms("b_x", fields.b_x),
+        B_pinv=suprema.norms("B_pinv", [fields.B_pinv]),
+        B_pinv_x=suprema.norms("B_pinv_x", fields.B_pinv_x),
         M_x=suprema.metric_slope(),
         u_star=suprema.input_on_plan(),
         **{**derived, **declared},

@@ -35,7 +35,7 @@ class InitialState(Protocol):
     """What the certificates need to know about x(0)."""
 
     def offset(self, suprema: Suprema) -> Interval:
-        """|x*(0) - x(0)|, at most its upper end."""
+        """|x*(0) - x(0)| in the coordinates of the tube, at most its upper end."""
         ...
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
@@ -58,10 +58,12 @@ class KnownStart:
         delta = self._delta(suprema.plan.start)
         if all(d is ZERO for d in delta):
             return Interval.exact(0.0)
-        found = supremum(SumOfNorms([column(delta)]), BoxDomain({}), suprema.effort)
+        across = suprema.fields.vector(delta)
+        found = supremum(SumOfNorms([across]), BoxDomain({}), suprema.effort)
         if np.isfinite(found.above):
             return Interval(found.below, found.above)
-        parts = Tape(delta, ()).run([], ())  # squares overflow: the sum of magnitudes is larger than the norm
+        # squares overflow: the sum of magnitudes is larger than the norm
+        parts = Tape([row[0] for row in across], ()).run([], ())
         return Interval(0.0, np.nextafter(parts.magnitude.sum() * (1 + 1e-13), np.inf))
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
@@ -103,18 +105,23 @@ class KnownStart:
 
 @dataclass(frozen=True, slots=True)
 class StartWithin:
-    """x(0) is any point with |x*(0) - x(0)| <= `radius`."""
+    """x(0) is any point with |x*(0) - x(0)| <= `radius`, in x whatever the coordinates of the tube."""
 
     radius: Fraction
 
     def offset(self, suprema: Suprema) -> Interval:
-        """The radius."""
-        del suprema
-        return Interval.of(self.radius)
+        """The radius; times |S| in z = S x."""
+        if suprema.coordinates is None:
+            return Interval.of(self.radius)
+        found = supremum(SumOfNorms([suprema.coordinates.S]), BoxDomain({}), suprema.effort)
+        return Interval(found.below, found.above) * Interval.of(self.radius)
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
-        """sqrt(A) times the radius: the segment lies in the tube."""
-        del suprema
+        """sqrt(A) times the radius, A of M in x: the segment lies in the tube, or d0 is no smaller than dbar."""
+        if suprema.coordinates is not None:
+            stretch = suprema.greatest_stretch()
+            reach = Interval(stretch.below, stretch.above) * Interval.of(self.radius)
+            return Constant(below=float(reach.lo), above=float(reach.hi))
         a, A = metric
         least = sqrt(Interval.exact(a.below)) * Interval.of(self.radius)
         most = sqrt(Interval.exact(A.above)) * Interval.of(self.radius)
@@ -124,7 +131,8 @@ class StartWithin:
         """sup |h(0, x)| over the ball of starts."""
         still = Plan(tuple(suprema.plan.start), tuple(ZERO for _ in suprema.model.inputs), None)
         radius = fraction_bounds(self.radius)[1]
-        ball = replace(suprema, plan=still, rho=radius, time=(Fraction(0), Fraction(0)))
+        instant = (Fraction(0), Fraction(0))
+        ball = replace(suprema, plan=still, rho=radius, time=instant, coordinates=None, sides=None)
         return ball.norms("h_initial", [column(suprema.h)])
 
 

@@ -1,18 +1,20 @@
-"""Each constant as a supremum over O(rho): the objective that defines it, and its enclosure.
+"""Each constant as a supremum over the tube: the objective that defines it, and its enclosure.
 
 `Suprema` fixes a model, a plan, a radius and an effort; every method returns one enclosed constant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
+from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
@@ -29,11 +31,11 @@ from tubecert.expression import (
     symbol,
     topological,
 )
-from tubecert.expression.matrix import Matrix, column, identity, jacobian, multiply
+from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
-from tubecert.tube import Tube
+from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
 Report = Callable[[str, int, float, float], None]
@@ -43,6 +45,8 @@ Report = Callable[[str, int, float, float], None]
 class Suprema:
     """The suprema of a model over the tube of radius `rho` around a plan.
 
+    With `coordinates` S, the constants are those of the fields in z = S x, and the tube is the ellipsoid |S (x - x*)|
+    <= rho cut to `sides` (n,), what |x_i - x*_i| is at most; without, they are those in x and the tube is a ball.
     `time` is the range of t for h (the horizon, or one period of h); the plan brings its own.
     """
 
@@ -52,31 +56,63 @@ class Suprema:
     time: Range | None
     effort: Effort
     report: Report | None = None
+    coordinates: Coordinates | None = None
+    sides: tuple[float, ...] | None = None
 
-    def with_radius(self, rho: Fraction) -> Suprema:
+    def with_radius(self, rho: Fraction, sides: Sequence[Fraction] | None = None) -> Suprema:
         """The same over another tube."""
-        return replace(self, rho=fraction_bounds(rho)[1])
+        ends = None if sides is None else tuple(fraction_bounds(side)[1] for side in sides)
+        return replace(self, rho=fraction_bounds(rho)[1], sides=ends)
+
+    @cached_property
+    def fields(self) -> Fields:
+        """The fields of the model in the coordinates of the tube."""
+        return Fields(self.model, self.coordinates)
+
+    @property
+    def section(self) -> Section:
+        """The tube at one time."""
+        if self.coordinates is None:
+            return Ball(self.rho)
+        return Ellipsoid(self.coordinates, self.rho, self.sides or (np.inf,) * len(self.model.states))
 
     # -- metric ------------------------------------------------------------------------------------------------
 
     def metric_bounds(self) -> tuple[Constant, Constant]:
         """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1."""
-        fine = replace(self.effort, gap=min(self.effort.gap, 1e-4))  # they enter every condition
-        eye = identity(len(self.model.states))
-        largest = self._over_tube("lower", Pencil(self.model.W, eye), fine)
-        upper = self._over_tube("upper", Pencil(eye, self.model.W), fine)
+        fine = self._fine
+        unit = self._unit
+        largest = self._over_tube("lower", Pencil(self.model.W, unit), fine)
+        upper = self._over_tube("upper", Pencil(unit, self.model.W), fine)
         inverse = (Interval.exact(1.0) / Interval(largest.below, largest.above)).sanitised()
         lower = Constant(below=float(inverse.lo), above=float(inverse.hi), at=self._witness(largest))
         return lower, self._constant(upper)
 
+    @property
+    def _unit(self) -> Matrix:
+        """What the dual metric is where it is the identity in z: S^-1 S^-T."""
+        if self.coordinates is None:
+            return identity(len(self.model.states))
+        return constants(self.coordinates.spread)
+
+    def greatest_stretch(self) -> Constant:
+        """sup sqrt(lmax(M)) with M in x: the metric length of a vector over its length in x."""
+        return self._root(
+            self._over_tube("upper", Pencil(identity(len(self.model.states)), self.model.W), self._fine)
+        )
+
+    @property
+    def _fine(self) -> Effort:
+        """For what enters every condition."""
+        return replace(self.effort, gap=min(self.effort.gap, 1e-4))
+
     def metric_slope(self) -> Constant:
         """DMx = sup sum_i |dM/dx_i|, dM/dx_i = -M W_i M: eigenvalues of the pencils (W_i, W^2)."""
-        slopes = [w for w in self.model.W_x if any(e is not ZERO for row in w for e in row)]
+        W = self.fields.W
+        slopes = [w for w in self.fields.W_x if any(e is not ZERO for row in w for e in row)]
         if not slopes:
             return Constant.exactly(0.0)
-        return self._constant(
-            self._over_tube("M_x", SumOfPencils(slopes, multiply(self.model.W, self.model.W)))
-        )
+        return self._constant(self._over_tube("M_x", SumOfPencils(slopes, multiply(W, W))))
 
     # -- dynamics ----------------------------------------------------------------------------------------------
 
@@ -89,7 +125,7 @@ class Suprema:
 
     def drift_on_plan(self) -> Constant:
         """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
-        drift = self.model.drift_on_plan()
+        drift = self.fields.drift_on_plan()
         if self.plan.is_constant:
             drift = substituted(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
         return self.norms("drift_on_plan", [drift])
@@ -100,15 +136,17 @@ class Suprema:
 
     # -- uncertainty -------------------------------------------------------------------------------------------
 
-    def uncertainty(self) -> tuple[Constant, Constant, Constant]:
-        """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks."""
+    def uncertainty(self, fields: Fields | None = None) -> tuple[Constant, Constant, Constant]:
+        """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks.
+
+        It is one in the coordinates of the tube, or in those of other `fields`.
+        """
         h = self.h
         by_time = derivatives(h, TIME)
-        states = set(self.model.states)
-        if not free_symbols(h) & states:
+        if not free_symbols(h) & set(self.model.states):
             lipschitz = Constant.exactly(0.0)
         else:
-            lipschitz = self._constant(self._over_tube("h_x", _lipschitz(h, self.model.states)))
+            lipschitz = self._constant(self._over_tube("h_x", _lipschitz(h, fields or self.fields)))
         return self.norms("h", [column(h)]), lipschitz, self.norms("h_t", [column(by_time)])
 
     @property
@@ -164,7 +202,8 @@ class Suprema:
 
     def plan_defect(self) -> tuple[Constant, Constant]:
         """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
-        defect = replace(Defect.of(self.plan, self.model, self.rho, self.effort), search=self._run)
+        found = Defect.of(self.plan, self.model, self.rho, self.effort, self.coordinates)
+        defect = replace(found, search=self._run)
         if defect.vanishes:
             return Constant.exactly(0.0), Constant.exactly(0.0)
         return self._constant(defect.in_state()), self._constant(defect.in_metric())
@@ -174,7 +213,8 @@ class Suprema:
         found = []
         for i, name in enumerate(self.model.states):
             entry = Pencil([[self.model.W[i][i]]], [[ONE]])
-            found.append(self._root(self._over_tube(f"half width of {name}", entry)))
+            effort = None if self.coordinates is None else self._fine  # it is no part of a ball
+            found.append(self._root(self._over_tube(f"half width of {name}", entry, effort)))
         return tuple(found)
 
     # -- searches ----------------------------------------------------------------------------------------------
@@ -189,7 +229,7 @@ class Suprema:
         time = self.plan.time.get(TIME, self.time)
         tube = Tube(
             self.plan,
-            self.rho,
+            self.section,
             states=self.model.states,
             inputs=self.model.inputs,
             time=time,
@@ -225,8 +265,15 @@ class Suprema:
             t = 0.0
         moment = np.array([0.0 if t is None else t])
         centre, _ = self.plan.enclose(moment, moment)
-        x = tuple(float(found.at.get(name, centre.mid[0, i])) for i, name in enumerate(self.model.states))
-        return Witness(t=t, x=x)
+        x = np.array([found.at.get(name, centre.mid[0, i]) for i, name in enumerate(self.model.states)])
+        if isinstance(self.section, Ellipsoid):  # the others are such that the point lies in it
+            which = [i for i, name in enumerate(self.model.states) if name in found.at]
+            x = (
+                centre.mid[0]
+                if not which
+                else centre.mid[0] + self.section.completed(which, x[None, which] - centre.mid[0, which])[0]
+            )
+        return Witness(t=t, x=tuple(map(float, x)))
 
 
 def substituted(rows: Matrix, values: dict[str, Expression]) -> Matrix:
@@ -236,8 +283,9 @@ def substituted(rows: Matrix, values: dict[str, Expression]) -> Matrix:
     return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
 
 
-def _lipschitz(h: tuple[Expression, ...], states: tuple[str, ...]) -> Lipschitz:
+def _lipschitz(h: tuple[Expression, ...], fields: Fields) -> Lipschitz:
     """The objective |h_x|, with every norm in h taken apart into a level of its own."""
+    states = fields.states
     plain: dict[Expression, Expression] = {}  # each node with placeholders for the norms below it
     back: dict[str, Expression] = {}  # placeholder -> the norm it stands for
     arguments: list[tuple[Expression, ...]] = []
@@ -253,5 +301,5 @@ def _lipschitz(h: tuple[Expression, ...], states: tuple[str, ...]) -> Lipschitz:
     levels = []
     for depth, entries in enumerate([*arguments, tuple(plain[e] for e in h)]):
         gains = [substituted(column(derivatives(entries, name)), back) for name in names[:depth]]
-        levels.append((substituted(jacobian(entries, states), back), gains))
-    return Lipschitz(jacobian(h, states), levels)
+        levels.append((fields.by_state(substituted(jacobian(entries, states), back)), gains))
+    return Lipschitz(fields.by_state(jacobian(h, states)), levels)

@@ -141,13 +141,18 @@ class MetricData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TubeData:
-    """The radii; `rho_r` and the half-widths, by state, once the tube is proven to lie in the safe set."""
+    """The radii; `rho_r` and the half-widths, by state, once the tube is proven to lie in the safe set.
+
+    `coordinates` S, by rows, exact: then the radii are lengths in z = S x, and the tube is |S (x - x*)| <= rho cut to
+    the half-widths.
+    """
 
     epsilon: Fraction
     rho_a: Fraction
     rho: Fraction
     rho_r: Fraction | None = None
     half_widths: Mapping[str, float] | None = None
+    coordinates: tuple[tuple[str, ...], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
@@ -35,8 +36,6 @@ from tubecert.enclosure.linalg import (
 from tubecert.enclosure.objective import Estimate
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO
-from tubecert.expression.matrix import differentiate
-from tubecert.model import ControlAffineModel
 
 Ball = tuple[Array, Array]  # midpoints and radii
 
@@ -63,18 +62,21 @@ class GeodesicTest:
         return self.value.above < 1
 
 
-def unique_geodesics(model: ControlAffineModel, tube: Domain, rho: float, effort: Effort) -> GeodesicTest:
-    """Evaluate the test over a tube of radius `rho`; a constant metric passes with the value 0."""
-    if not _moving(model):
+def unique_geodesics(fields: Fields, tube: Domain, rho: float, effort: Effort) -> GeodesicTest:
+    """Evaluate the test over a tube of radius `rho`, both in the coordinates of the fields; a constant metric passes.
+
+    Its value is 0 then.
+    """
+    if not _moving(fields):
         nothing = Constant.exactly(0.0)
         return GeodesicTest(value=nothing, symbols=nothing, slope=nothing)
     # what matters is the sum against 1: a five-hundredth of that for either part is fine enough
-    G = _bounded(SymbolNorm(model, order=0), tube, _FINE / rho, effort)
+    G = _bounded(SymbolNorm(fields, order=0), tube, _FINE / rho, effort)
     if G.below * rho * (1 - _SLACK) >= 1:
         return GeodesicTest(
             value=Constant(below=G.below * rho * (1 - _SLACK), above=np.inf), symbols=G, slope=None
         )
-    L = _bounded(SymbolNorm(model, order=1), tube, 8 * _FINE / rho**2, effort)
+    L = _bounded(SymbolNorm(fields, order=1), tube, 8 * _FINE / rho**2, effort)
     radius = Interval.exact(rho)
     value = Interval(G.below, G.above) * radius + Interval(L.below, L.above) * radius**2 / 8
     return GeodesicTest(
@@ -94,9 +96,9 @@ def _bounded(objective: SymbolNorm, tube: Domain, absolute: float, effort: Effor
     return Constant(below=min(objective.attained(found), found.above), above=found.above)
 
 
-def _moving(model: ControlAffineModel) -> list[int]:
-    """The states on which the metric depends."""
-    return [i for i, w in enumerate(model.W_x) if any(e is not ZERO for row in w for e in row)]
+def _moving(fields: Fields) -> list[int]:
+    """The components of z on which the metric depends."""
+    return [i for i, w in enumerate(fields.W_x) if any(e is not ZERO for row in w for e in row)]
 
 
 class SymbolNorm:
@@ -105,14 +107,16 @@ class SymbolNorm:
     It is at most a power of sqrt(n) above the norm itself; `attained` tells what the norm itself reaches.
     """
 
-    def __init__(self, model: ControlAffineModel, *, order: int) -> None:
-        self._n, self._order = len(model.states), order
-        self._moving = _moving(model)
-        first = [model.W_x[i] for i in self._moving]
-        second = [differentiate(w, model.states[m]) for m in self._moving for w in first] if order else []
-        self._function = MatrixFunction([model.W, *first, *second], order=0)
+    def __init__(self, fields: Fields, *, order: int) -> None:
+        self._n, self._order = len(fields.states), order
+        self._moving = _moving(fields)
+        first = [fields.W_x[i] for i in self._moving]
+        slopes = [fields.slopes(w) for w in first] if order else []
+        second = [slope[m] for m in self._moving for slope in slopes]
+        self._function = MatrixFunction([fields.W, *first, *second], order=0)
         self.variables = self._function.variables
-        self._slope = None if order else SymbolNorm(model, order=1)
+        self._lengths = fields.lengths(self.variables)
+        self._slope = None if order else SymbolNorm(fields, order=1)
 
     def tensor(self, lo: Array, hi: Array) -> Ball:
         """Gamma, shape (N, n, n, n) for k, i, j; or dGamma with a fourth axis over the moving states."""
@@ -170,7 +174,8 @@ class SymbolNorm:
         value = self._unfolded(lo, hi).hi
         if self._slope is not None:
             reach = np.nextafter(np.maximum(hi - centre, centre - lo), np.inf)
-            length = np.sqrt(np.sum(reach * reach, axis=1)) * (1 + _SLACK)
+            across = reach @ self._lengths  # |S y| by components, for every |y_i| <= reach_i
+            length = np.sqrt(np.sum(across * across, axis=1)) * (1 + _SLACK)
             steep = length * self._slope._unfolded(lo, hi).hi
             value = np.fmin(value, (self._unfolded(centre, centre).hi + steep) * (1 + _SLACK))
         return Estimate(np.where(np.isnan(value), np.inf, value), centre, width, width)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from fractions import Fraction
 from math import isfinite, sqrt
 from typing import Any
+
+import numpy as np
 
 from tubecert.certificate.result import Result
 from tubecert.claims import MendPlan, Reason
@@ -16,6 +19,7 @@ from tubecert.kinds.kind import Section
 from tubecert.kinds.table import KINDS
 from tubecert.pipeline.reasons import reasons
 from tubecert.planner.propose import course_of, knots_of
+from tubecert.search.coordinates import Wish, propose
 from tubecert.search.proposers import LEAST, PROPOSERS
 from tubecert.spec import canonical
 from tubecert.stages.bounded import Bounded, bound, enclose
@@ -24,7 +28,7 @@ from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.options import Step
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Explanation, Stage, result_of
-from tubecert.stages.tube import Planned, find_tube, lay, room_of
+from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tube, lay, radii, room_of
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
 
@@ -36,7 +40,7 @@ def answer(question: Question) -> Stage | Stopped:
     steps: tuple[Callable[[Any], Stage | Stopped], ...] = (
         prove_metric,
         plan,
-        find_tube,
+        tube,
         enclose,
         bound,
         judge,
@@ -71,6 +75,24 @@ def plan(metric: ProvenMetric) -> Planned:
     depends_on = {key: whole[key] for key in ("system", "trajectory")}
     course = question.memory.recall("plan", depends_on, lambda: course_of(spec, task, model, report))
     return lay(metric, knots_of(spec, course, model, room_of(metric), report))
+
+
+def tube(planned: Planned) -> TubeFound | Stopped:
+    """The tube, in coordinates that a search proposes where the specification asks for some."""
+    question = planned.question
+    spec = question.spec
+    if not spec.tube.auto:
+        return find_tube(planned)
+    centre = np.array([float(value) for value in planned.plan.enclose(np.zeros(1), np.zeros(1))[0].mid[0]])
+    asked = asked_half_widths(question)
+    wish = Wish(
+        asked=asked,
+        width=0.0 if asked is not None else float(sum(radii(question), Fraction(0))),
+        apart=np.zeros(len(centre)) if spec.within is not None else np.array(spec.x0, dtype=float) - centre,
+        within=float(spec.within or 0),
+        box=np.array(spec.safe_set, dtype=float),
+    )
+    return find_tube(planned, propose(question.model, planned.plan, wish))
 
 
 def judge(bounded: Bounded) -> Judged:

@@ -48,13 +48,24 @@ def missing_parts(spec: Spec) -> list[Finding]:
 
 
 def missing_radii(spec: Spec) -> list[Finding]:
-    """The radii of the tube, if they are not given."""
+    """The radii of the tube, if neither they nor half-widths are given."""
     found = []
+    if spec.tube.half_widths:
+        return [_beside_half_widths(spec)] if spec.tube.epsilon is not None else []
     if spec.tube.epsilon is None:
         found.append(_missing(spec, "tube.epsilon", "give tube.epsilon, or --epsilon E"))
     if spec.tube.rho_a is None:
         found.append(_missing(spec, "tube.rho_a", "give tube.rho_a, or --rho-a R"))
     return found
+
+
+def _beside_half_widths(spec: Spec) -> Finding:
+    return Finding(
+        code="TC112",
+        message="--epsilon beside tube.half_widths, which fix the whole tube",
+        location=spec.location("tube.half_widths"),
+        help="leave out --epsilon, or give tube.epsilon instead of half_widths",
+    )
 
 
 def _missing(spec: Spec, key: str, remedy: str) -> Finding:

@@ -146,7 +146,9 @@ def simulate(
         drawn=tuple(drawn),
         attacks=tuple(attacks),
         plan_clearance=of_curve(setting.spec, first.t, first.x_plan),
-        tube_clearance=of_tube(setting.spec, first.t, first.x_plan, setting.rho, setting.half_widths),
+        tube_clearance=of_tube(
+            setting.spec, first.t, first.x_plan, setting.greatest_radius, setting.half_widths
+        ),
         count=count,
         seed=seed,
         interrupted=interrupted,

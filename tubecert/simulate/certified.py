@@ -9,12 +9,16 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from fractions import Fraction
 from typing import Any, Final
+
+import numpy as np
 
 from tubecert.certificate.belonging import compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
 from tubecert.conditions.theorem import Recipe
+from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.kinds.data import SectionData
@@ -52,8 +56,9 @@ class Section:
 class Certified:
     """What simulation reads of a certificate, as numbers: nothing else in this room reads its JSON.
 
-    `reach` is dbar = sqrt(a) rho; `rate` lambda in 1/s; `upper` the bound A of lmax(M), where there is one;
-    `constants` the safe sides, by their names in the certificate; `sections` by the names in `proof`.
+    `S` (n, n): the tube and the loop are designed in z = S x. `reach` is dbar = sqrt(a) rho; `rate` lambda in 1/s;
+    `upper` the bound A of lmax(M), where there is one; `constants` the safe sides, by their names in the certificate;
+    `sections` by the names in `proof`.
     """
 
     rho: float
@@ -61,6 +66,7 @@ class Certified:
     rate: float
     upper: float | None
     half_widths: tuple[float, ...]
+    S: Array
     constants: Values
     sections: Mapping[str, Section]
 
@@ -128,12 +134,17 @@ def read_numbers(result: Result) -> Certified:
     if tube is None or tube.half_widths is None or metric is None or metric.lower is None:
         raise incomplete("that is simulated", "it has no tube")
     rho, upper = float(tube.rho), None if metric.upper is None else metric.upper.above
+    widths = tuple(tube.half_widths[name] for name in result.spec.effective.system.states)
+    rows = tube.coordinates
     return Certified(
         rho=rho,
         reach=math.sqrt(metric.lower.below) * rho,
         rate=float(metric.rate),
         upper=upper if upper is None or math.isfinite(upper) else None,
-        half_widths=tuple(tube.half_widths[name] for name in result.spec.effective.system.states),
+        half_widths=widths,
+        S=np.eye(len(widths))
+        if rows is None
+        else np.array([[float(Fraction(q)) for q in row] for row in rows]),
         constants=Values(
             {name: item.above for name, item in result.constants.items() if item.above is not None}
         ),

@@ -76,9 +76,9 @@ class Comparison:
 
 def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison:
     """The comparison of runs with the tube, and with a promise if there is one."""
-    usable = runs.error <= USABLE * setting.rho
+    usable = runs.error <= USABLE * setting.least_radius
     stopped = {item.lane for item in runs.failures}
-    slack = 1 + _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
+    slack = 1 + _EXACT + np.where(usable, runs.error, 0.0) / setting.least_radius
     bounds = {"distance": setting.reach, "deviation": setting.rho}
     bounds |= dict(promise.bounds) if promise else {}
     uses = {name: _use(runs, name, bounds.get(name), usable) for name in SHOWN} if usable.any() else {}
@@ -93,8 +93,8 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
         outside=tuple(sorted(lanes)),
         unreliable=tuple(unreliable),
         error=float(np.max(runs.error[usable], initial=0.0)),
-        settled=_settled(runs, promise, usable),
-        final=float(np.max(_deviation(runs)[usable, -1])) if usable.any() else None,
+        settled=_settled(setting, runs, promise, usable),
+        final=float(np.max(_deviation(setting, runs)[usable, -1])) if usable.any() else None,
         failures=tuple((item.lane, item.t, item.reason) for item in runs.failures),
         first_exit=_first_exit(setting, runs, sorted(lanes)),
         unresolved=tuple((lane, float(runs.unresolved[lane])) for lane in unreliable),
@@ -107,9 +107,9 @@ def _use(runs: Runs, name: str, bound: float | None, usable: NDArray[np.bool_]) 
     return Use(value=float(peak.value[lane]), bound=bound, lane=lane, time=float(peak.time[lane]))
 
 
-def _deviation(runs: Runs) -> Array:
-    """|x - x*|, (N, K)."""
-    return np.asarray(np.linalg.norm(runs.x - runs.x_plan, axis=2))
+def _deviation(setting: Setting, runs: Runs) -> Array:
+    """|S (x - x*)|, (N, K)."""
+    return np.asarray(np.linalg.norm((runs.x - runs.x_plan) @ setting.S.T, axis=2))
 
 
 def _left_before(setting: Setting, runs: Runs) -> set[int]:
@@ -122,7 +122,7 @@ def _first_exit(setting: Setting, runs: Runs, lanes: Sequence[int]) -> tuple[int
     if not lanes:
         return None
     rows = list(lanes)
-    beyond = (_deviation(runs)[rows] > setting.rho) | (runs.distance[rows] > setting.reach)
+    beyond = (_deviation(setting, runs)[rows] > setting.rho) | (runs.distance[rows] > setting.reach)
     first = np.where(beyond.any(axis=1), runs.t[np.argmax(beyond, axis=1)], runs.worst.deviation.time[rows])
     earliest = int(np.argmin(first))
     return lanes[earliest], float(first[earliest])
@@ -174,11 +174,13 @@ def _broken(name: str, excess: Array, values: Array, bounds: Array, times: Array
     ]
 
 
-def _settled(runs: Runs, promise: Promise | None, usable: NDArray[np.bool_]) -> float | None:
+def _settled(
+    setting: Setting, runs: Runs, promise: Promise | None, usable: NDArray[np.bool_]
+) -> float | None:
     """From when on every run stays within the ultimate radius; None if one does not, or if there is none."""
     if promise is None or promise.ultimate is None or not usable.any():
         return None
-    beyond = (_deviation(runs)[usable] > promise.ultimate).any(axis=0)
+    beyond = (_deviation(setting, runs)[usable] > promise.ultimate).any(axis=0)
     if not beyond.any():
         return 0.0
     last = int(np.flatnonzero(beyond)[-1])
@@ -201,7 +203,7 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
         sizes = {
             "h": np.linalg.norm(values[0], axis=0),
             "h_t": np.linalg.norm(values[1], axis=0),
-            "h_x": np.linalg.norm(np.nan_to_num(slopes), ord=2, axis=(2, 3)),
+            "h_x": np.linalg.norm(np.nan_to_num(slopes @ np.linalg.inv(setting.S)), ord=2, axis=(2, 3)),
         }
     sizes["h_initial"] = np.where(runs.t == 0, sizes["h"], 0.0)
     words = {"h": "|h|", "h_t": "|dh/dt|", "h_x": "|dh/dx|", "h_initial": "|h| at the start"}

@@ -4,6 +4,7 @@ Adaptation of C at t = i Ts (4.5): s_hat = -g/(e^{g Ts} - 1) xtilde, sigma_hat =
 the ball. Controller at a rate: u = u* + k + u_a is held; the filter is exact for a held sigma_hat; the predictor is
 stepped by Euler, xhat+ = xhat + dt (f + B(u + sigma_hat) + A_m xtilde), and then sigma_hat+ = clip(sigma_hat + dt
 Gamma Proj(-B'xtilde)) uses the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2 (`held` computes it exactly).
+In coordinates z = S x of the tube, B'P stands for B' and B_z^+ S = (B'PB)^-1 B'P for B^+, with P = S'S.
 
 It knows the state as it is measured, and the model there (`Moment.measured`, `Point.seen`).
 """
@@ -37,7 +38,7 @@ class Computer(NamedTuple):
 class Registers(NamedTuple):
     """What a computer keeps between its samples: the input u (m,) and the predicted state xhat (n,).
 
-    `gram` (m, m) is room for B'B.
+    `gram` (m, m) is room for B'PB.
     """
 
     u: Array
@@ -65,11 +66,13 @@ def _adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
     for j in range(m):
         sigma[j] = 0.0
         for i in range(fast.at.n):
-            sigma[j] += B[i, j] * own.s_hat[i]
+            sigma[j] += B[i, j] * dot(fast.P[i], own.s_hat)
         for k in range(m):
-            gram[j, k] = dot(B[:, j], B[:, k])
+            gram[j, k] = 0.0
+            for i in range(fast.at.n):
+                gram[j, k] += B[i, j] * dot(fast.P[i], B[:, k])
     if factor(gram, gram):
-        solve(gram, sigma, sigma)  # B^+ s_hat = (B'B)^-1 B's_hat
+        solve(gram, sigma, sigma)  # (B'PB)^-1 B'P s_hat
     else:
         sigma[:] = np.nan  # B has lost rank
     for j in range(m):
@@ -113,11 +116,15 @@ def _integrate(fast: Any, dt: float, B: Any, y: Any) -> None:
     square = dot(sigma, sigma)
     outward = 0.0
     for j in range(fast.at.m):
-        outward -= sigma[j] * dot(B[:, j], own.xtilde)
+        for i in range(fast.at.n):
+            outward -= sigma[j] * B[i, j] * dot(fast.P[i], own.xtilde)
     share = 0.0
     if fast.layer > 0.0 and square > 0.0 and outward > 0.0:
         limit = fast.radius * fast.radius
         share = max(0.0, ((1.0 + fast.layer) * square - limit) / (fast.layer * limit)) * outward / square
     for j in range(fast.at.m):
-        sigma[j] -= dt * fast.Gamma * (dot(B[:, j], own.xtilde) + share * sigma[j])
+        pushed = 0.0
+        for i in range(fast.at.n):
+            pushed += B[i, j] * dot(fast.P[i], own.xtilde)
+        sigma[j] -= dt * fast.Gamma * (pushed + share * sigma[j])
     clip(sigma, fast.radius)

@@ -31,12 +31,14 @@ class Fast(NamedTuple):
 
     `exact` says that B is constant: then `flow` (2 Q, Y, Y) and `forced` (2 Q, 3, Y, m) are the exact flows over half
     and whole steps of Q lengths, for y and for the coefficients of h. `turn` is the angle in rad that RK4 may step
-    over. `A` (n, n) is A_m in 1/s, `omega` in rad/s.
+    over. `A` (n, n) is A_m in 1/s, `omega` in rad/s; `P` (n, n) is S'S in the tube's coordinates z = S x, where the
+    law of (0.7) has its identity.
     """
 
     terms: Terms
     at: Layout
     A: Array
+    P: Array
     Gamma: float
     omega: float
     radius: float
@@ -82,7 +84,7 @@ def generator(fast: Fast, B: Array) -> tuple[Array, Array]:
         L[y.xtilde, y.xtilde], E[y.xtilde] = fast.A, -B  # (0.6) - (0.1): xtilde' = A_m xtilde - B h ...
     if terms.adapts:
         L[y.xtilde, y.sigma_hat] = B  # (0.6) ... + B sigma_hat
-        L[y.sigma_hat, y.xtilde] = -fast.Gamma * B.T  # (0.7) sigma_hat' = -Gamma B'xtilde
+        L[y.sigma_hat, y.xtilde] = -fast.Gamma * B.T @ fast.P  # (0.7) sigma_hat' = -Gamma B'P xtilde
     if terms.samples:
         L[y.xtilde, y.s_hat] = np.eye(fast.at.n)  # (4.5) ... + s_hat
     return L, E
@@ -141,13 +143,13 @@ def _exact(flow: Any, forced: Any, y: Any, h: Any, first: int, v: int, out: Any)
 def _idle(fast: Any, y: Any, h: Any) -> bool:
     """Whether sigma_hat provably stays where the projection does nothing, up to the rounding.
 
-    While it is idle, |sigma_hat - h|^2 + Gamma |xtilde|^2 grows by the drift of h only: |sigma_hat| is at most the root
-    of that at the start, plus |h| and twice what h moves.
+    While it is idle, |sigma_hat - h|^2 + Gamma xtilde'P xtilde grows by the drift of h only: |sigma_hat| is at most the
+    root of that at the start, plus |h| and twice what h moves.
     """
     now = blocks(y, fast.at)
     amplitude, reach = 0.0, 0.0
     for i in range(fast.at.n):
-        amplitude += fast.Gamma * now.xtilde[i] * now.xtilde[i]
+        amplitude += fast.Gamma * now.xtilde[i] * dot(fast.P[i], now.xtilde)
     for j in range(fast.at.m):
         amplitude += (now.sigma_hat[j] - h[0, j]) ** 2
     for p in range(3):  # |h| and its drift
@@ -167,11 +169,11 @@ def _place(inner: Any, s: float) -> None:
 
 @compiled
 def _outward(fast: Any, y: Any, B: Any) -> float:
-    """-sigma_hat'B'xtilde: positive while the adaptation pushes sigma_hat outward."""
+    """-sigma_hat'B'P xtilde: positive while the adaptation pushes sigma_hat outward."""
     now = blocks(y, fast.at)
     total = 0.0
     for i in range(fast.at.n):
-        total -= now.xtilde[i] * dot(B[i], now.sigma_hat)
+        total -= dot(fast.P[i], now.xtilde) * dot(B[i], now.sigma_hat)
     return total
 
 
@@ -192,8 +194,9 @@ def _rate(fast: Any, sliding: bool, y: Any, h: Any, B: Any, dy: Any) -> None:
             rate.xtilde[i] += now.s_hat[i]  # (4.5) ... + s_hat
         if terms.adapts:
             rate.xtilde[i] += dot(B[i], now.sigma_hat)  # (0.6) ... + B sigma_hat
+            weighed = dot(fast.P[i], now.xtilde)
             for j in range(fast.at.m):
-                rate.sigma_hat[j] -= fast.Gamma * B[i, j] * now.xtilde[i]  # (0.7) -Gamma B'xtilde
+                rate.sigma_hat[j] -= fast.Gamma * B[i, j] * weighed  # (0.7) -Gamma B'P xtilde
     if terms.adapts:
         _project(fast, sliding, now.sigma_hat, rate.sigma_hat)
 
@@ -266,13 +269,14 @@ def _over(fast: Any, sliding: bool, inner: Any) -> bool:
 
 @compiled
 def _count(fast: Any, length: float, inner: Any) -> int:
-    """Steps such that none turns further than `turn`: the speeds are omega, |A_m| and sqrt(Gamma) |B|."""
+    """Steps such that none turns further than `turn`: the speeds are omega, |A_m| and sqrt(Gamma) |S B|."""
     largest = 0.0
     for k in range(3):  # B at both ends and in the middle
         _place(inner, 0.5 * k)
         square = 0.0
         for i in range(fast.at.n):
-            square += dot(inner.B[3, i], inner.B[3, i])
+            for k2 in range(fast.at.n):
+                square += fast.P[i, k2] * dot(inner.B[3, i], inner.B[3, k2])
         largest = max(largest, square)
     speed = fast.omega
     for i in range(fast.at.n):

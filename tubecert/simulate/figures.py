@@ -59,13 +59,16 @@ def _states(campaign: Campaign) -> Figure:
     figure = blank(7.0, 0.9 + 1.7 * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     ultimate = _ultimate(campaign)
+    own = None if np.array_equal(setting.S, np.eye(len(names))) else setting.S
     for i, (axis, name, width) in enumerate(zip(axes, names, setting.half_widths, strict=True)):
         plan = first.x_plan[:, i]
         axis.fill_between(first.t, plan - width, plan + width, color=TUBE, alpha=0.25, lw=0, label="tube")
-        if ultimate is not None and ultimate < width:
+        # |x_i - x_i*| <= sup sqrt(W_ii) d, as the half-widths, where they are what bounds the tube
+        rest = ultimate if ultimate is None or own is None else ultimate / setting.rho * width
+        if rest is not None and rest < width:
             for sign in (-1, 1):
                 label = "in the long run" if sign > 0 else None
-                axis.plot(first.t, plan + sign * ultimate, color=TUBE, lw=1.0, ls=(0, (5, 2)), label=label)
+                axis.plot(first.t, plan + sign * rest, color=TUBE, lw=1.0, ls=(0, (5, 2)), label=label)
         for item in campaign.drawn:
             axis.plot(item.runs.t, item.runs.x[0, :, i], **line(item))
         axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")

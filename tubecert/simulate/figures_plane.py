@@ -84,8 +84,8 @@ def _spread(curve: Array) -> Array:
 def _section(setting: Setting, i: int, j: int) -> Array:
     """The outline (K, 2) of the tube around a point of the plan, projected to the plane of two states.
 
-    For a constant metric that is the projection of the ellipsoid d < dbar; else the disc of radius rho, cut to the
-    half-widths.
+    For a constant metric that is the projection of the ellipsoid d < dbar; else that of |S (x - x*)| < rho, a disc
+    where z is x, cut to the half-widths.
     """
     angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -94,7 +94,8 @@ def _section(setting: Setting, i: int, j: int) -> Array:
         values = Tape([W[a][b] for a in (i, j) for b in (i, j)], ()).run_floats([], ()).reshape(2, 2)
         return np.asarray(setting.reach * circle @ np.linalg.cholesky(values).T)
     widths = setting.half_widths[[i, j]]
-    return np.clip(setting.rho * circle, -widths, widths)
+    spread = np.linalg.inv(setting.S.T @ setting.S)[np.ix_([i, j], [i, j])]
+    return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)
 
 
 def _obstacles(axis: Axes, setting: Setting, names: tuple[str, str]) -> None:

@@ -16,7 +16,10 @@ _DIGITS = 1e-3  # of the least rate
 
 
 def growth(A: Array, B: Array, Gamma: float, dt: float) -> float:
-    """The spectral radius of one period of dt s, for A (n, n) and B (n, m): above 1 the adaptation is unstable."""
+    """The spectral radius of one period of dt s, for A (n, n) and B (n, m): above 1 the adaptation is unstable.
+
+    A and B are those of the coordinates in which the adaptation is designed.
+    """
     n, m = B.shape
     predicted = np.hstack([np.eye(n) + dt * A, dt * B])
     adapted = np.hstack([np.zeros((m, n)), np.eye(m)]) - dt * Gamma * B.T @ predicted

@@ -54,11 +54,12 @@ def case(setting: Setting, seed: int, number: int) -> Case:
     """What run `number` of a seed does: half of the runs are random members, half are random adversaries."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(number,)))
     start = _random_start(setting, rng)
-    kind, centre = setting.uncertainty, setting.centre
+    kind, S = setting.uncertainty, setting.S
+    centre, begin = S @ setting.centre, S @ start  # the class is one of functions of z
     if rng.random() < 0.5:
-        member = random_member(kind, start, centre, rng)
+        member = random_member(kind, begin, centre, rng)
     else:
-        member = adversary(kind, rng.random(genes_of(kind)), start, centre, setting.layer)
+        member = adversary(kind, rng.random(genes_of(kind)), begin, centre, setting.layer)
     return Case(start=start, member=member)
 
 
@@ -75,7 +76,8 @@ def _random_start(setting: Setting, rng: np.random.Generator) -> Array:
 def disturbance_of(setting: Setting, cases: Sequence[Case]) -> Disturbance:
     """One lane for each case."""
     members = [item.member for item in cases]
-    return assembled(members, setting.uncertainty, setting.centre, setting.layer)
+    found = assembled(members, setting.uncertainty, setting.centre, setting.layer)
+    return replace(found, wave=found.wave @ setting.S)
 
 
 def monte_carlo(
@@ -163,5 +165,5 @@ def _bred(setting: Setting, genes: Array) -> Case:
         direction = 2 * genes[own:] - 1
         length = float(np.linalg.norm(direction)) or 1.0
         start = setting.centre + setting.within * direction / length
-    member = adversary(kind, genes[:own], start, setting.centre, setting.layer)
+    member = adversary(kind, genes[:own], setting.S @ start, setting.S @ setting.centre, setting.layer)
     return Case(start=start, member=member)

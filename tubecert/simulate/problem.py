@@ -63,7 +63,8 @@ class LoopProblem:
     system (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in
     Hz the whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing
     in [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A
-    lane is stopped where |x - x*| exceeds `limit`.
+    lane is stopped where |x - x*| exceeds `limit`. `P` (n, n) is S'S of the coordinates z = S x in which the adaptation
+    is designed, None for those of x; |xtilde| and |x - x*| are lengths in z.
     """
 
     model: ControlAffineModel
@@ -75,6 +76,7 @@ class LoopProblem:
     control_rate: float | None = None
     degree: int = 5
     limit: float = math.inf
+    P: Array | None = None
 
     def __post_init__(self) -> None:
         if self.controller not in CONTROLLERS:

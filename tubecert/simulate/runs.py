@@ -26,10 +26,10 @@ class Worst:
     """Peaks over *all* steps, not only over the output times; a sampled maximum, never a bound."""
 
     distance: Peak  # d(x*, x)
-    deviation: Peak  # |x - x*|
+    deviation: Peak  # |S (x - x*)|
     u: Peak  # |u* + k + u_a|
     k: Peak
-    xtilde: Peak
+    xtilde: Peak  # |S xtilde|
     sigma_error: Peak  # |sigma_hat - h|; for "sampled" |sigma_hat - h| of the held estimate
     h: Peak
 

@@ -31,8 +31,8 @@ from tubecert.trajectory import Plan
 
 TIMES: Final = 501  # output times of the loops that are drawn
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
-_TOLERANCE: Final = 1e-3  # of rho, asked of the integrator
-_LIMIT: Final = 100  # of rho: what is further away from the plan is not followed any more
+_TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
+_LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
 CHOSEN: Final = "chosen, not certified"
 
 
@@ -88,8 +88,23 @@ class Setting:
 
     @property
     def rho(self) -> float:
-        """The radius of the tube."""
+        """The radius of the tube, in z."""
         return self.certified.rho
+
+    @property
+    def S(self) -> Array:
+        """The coordinates z = S x of the tube, (n, n)."""
+        return self.certified.S
+
+    @property
+    def least_radius(self) -> float:
+        """|x - x*| below this is |S (x - x*)| <= rho."""
+        return self.rho / float(np.linalg.norm(self.S, 2))
+
+    @property
+    def greatest_radius(self) -> float:
+        """|x - x*| is at most this where |S (x - x*)| <= rho."""
+        return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
 
     @property
     def reach(self) -> float:
@@ -99,7 +114,7 @@ class Setting:
     @property
     def tolerance(self) -> float:
         """The error of |x| that the integrator is asked for."""
-        return _TOLERANCE * self.rho
+        return _TOLERANCE * self.least_radius
 
     @property
     def half_widths(self) -> Array:
@@ -171,7 +186,8 @@ def loop_of(
         times=setting.times,
         gains=tuning.gains,
         control_rate=None if control_rate is None else float(control_rate),
-        limit=_LIMIT * setting.rho,
+        limit=_LIMIT * setting.greatest_radius,
+        P=setting.S.T @ setting.S,
     )
     promised = promise(setting.certified, tuning.kind) if covered and tuning.kind else None
     return Loop(problem=problem, origin=tuning.words, promise=promised, caution=_caution(setting, problem))
@@ -190,7 +206,7 @@ def _caution(setting: Setting, problem: LoopProblem) -> str:
         .run_floats(at_start, ())
         .reshape(-1, len(model.inputs))
     )
-    own = gains.A_m(len(model.states)), B, gains.adaptation_rate
+    own = gains.A_m(len(model.states)), setting.S @ B, gains.adaptation_rate
     if growth(*own, 1 / rate) <= 1:
         return ""
     least = least_rate(*own, rate)

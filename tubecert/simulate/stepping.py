@@ -297,15 +297,23 @@ def _measure_sizes(fast: Any, now: Any, point: Any, y: Any, sizes: Any) -> None:
     own, k, h = blocks(y, fast.at), point.k, point.h
     deviation, u, error = 0.0, 0.0, 0.0
     for i in range(fast.at.n):
-        deviation += (now.x[i] - now.plan.x[i]) ** 2
+        for k2 in range(fast.at.n):
+            deviation += fast.P[i, k2] * (now.x[i] - now.plan.x[i]) * (now.x[k2] - now.plan.x[k2])
     for j in range(fast.at.m):
         acting = now.plan.u[j] + k[j] + own.u_a[j]
         u += acting * acting
         if fast.terms.predicts:
             error += (own.sigma_hat[j] - h[j]) ** 2
-    sizes[_DEVIATION], sizes[_U], sizes[_SIGMA_ERROR] = np.sqrt(deviation), np.sqrt(u), np.sqrt(error)
+    sizes[_DEVIATION], sizes[_U], sizes[_SIGMA_ERROR] = (
+        np.sqrt(max(deviation, 0.0)),
+        np.sqrt(u),
+        np.sqrt(error),
+    )
     sizes[_K], sizes[_H] = np.sqrt(dot(k, k)), np.sqrt(dot(h, h))
-    sizes[_XTILDE] = np.sqrt(dot(own.xtilde, own.xtilde))
+    square = 0.0
+    for i in range(fast.at.n):
+        square += own.xtilde[i] * dot(fast.P[i], own.xtilde)
+    sizes[_XTILDE] = np.sqrt(max(square, 0.0))
 
 
 @compiled

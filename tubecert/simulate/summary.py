@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from tubecert.enclosure.interval import Array
 from tubecert.simulate.campaign import Attack, Campaign, Drawn
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
@@ -49,7 +50,7 @@ def summary(campaign: Campaign, certificate: str) -> Data:
         "class": {name: getattr(setting.uncertainty, name) for name in ("h", "h_x", "h_t", "h_initial")},
         "seed": campaign.seed,
         "loops": [_drawn(item) for item in campaign.drawn],
-        "attacks": [_attack(item) for item in campaign.attacks],
+        "attacks": [_attack(item, setting.S) for item in campaign.attacks],
         "obstacles": {
             "plan": [_clearance(item) for item in campaign.plan_clearance],
             "tube": [_clearance(item) for item in campaign.tube_clearance],
@@ -84,7 +85,7 @@ def _drawn(item: Drawn) -> Data:
     }
 
 
-def _attack(item: Attack) -> Data:
+def _attack(item: Attack, S: Array) -> Data:
     data = _loop(item.loop) | {"largest_distance_over_dbar": _finite(item.use)}
     if item.sample is not None and item.comparison is not None:
         data["random"] = {"asked": item.sample.asked, **_comparison(item.comparison)}
@@ -96,7 +97,7 @@ def _attack(item: Attack) -> Data:
             "h": {
                 "amplitude": member.amplitude.tolist(),
                 "frequency": member.frequency.tolist(),
-                "wave": member.wave.tolist(),
+                "wave": (member.wave @ S).tolist(),
                 "phase": member.phase.tolist(),
                 "push": member.push,
             },

@@ -13,7 +13,7 @@ from typing import Any
 
 from tubecert.expression import full_text, number_text
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term
+from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term, Tube
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
         "uncertainty": _uncertainty(spec),
         "trajectory": _trajectory(spec),
         "initial_state": _given(within=spec.within) if spec.within is not None else {"at": _numbers(spec.x0)},
-        "tube": _given(epsilon=spec.tube.epsilon, rho_a=spec.tube.rho_a),
+        "tube": _tube(spec.tube),
         "adaptation": {
             "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),
             "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
@@ -121,6 +121,15 @@ def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
         "solver": wanted.solver,
     }
     return data | _given(rate=wanted.rate, condition_number=wanted.condition_number)
+
+
+def _tube(tube: Tube) -> dict[str, Any]:
+    data: dict[str, Any] = _given(epsilon=tube.epsilon, rho_a=tube.rho_a)
+    if tube.auto:
+        data["coordinates"] = "auto"
+    if tube.half_widths:
+        data["half_widths"] = _given(**dict(tube.half_widths))
+    return data
 
 
 def _obstacle(obstacle: Obstacle) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import (
+    check_predictor,
     read_adaptation,
     read_decides,
     read_expectation,
@@ -150,6 +151,7 @@ def _read_named(
     metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)
     adaptation = read_adaptation(entries.get("adaptation"), names)
+    check_predictor(reader, tube, adaptation)
     kernel, _ = read_kernel(entries.get("conditions"))
     expect = read_expectation(entries.get("expect"), names)
     obstacles = read_obstacles(entries.get("obstacles"), names)

@@ -12,7 +12,7 @@ from tubecert.spec import codes
 from tubecert.spec.algebra import is_positive_definite
 from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, Reader
 from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
@@ -33,14 +33,55 @@ def read_name(field: Field) -> str | None:
 
 
 def read_tube(field: Field | None, names: Names) -> Tube | None:
-    """The two radii, as far as they are given."""
-    entries = field.mapping(optional=("epsilon", "rho_a"), reserved=("weights",)) if field else {}
+    """The two radii or the half-widths, as far as they are given, and the coordinates they are measured in."""
+    keys = ("epsilon", "rho_a", "coordinates", "half_widths")
+    entries = field.mapping(optional=keys, reserved=("weights",)) if field else {}
     if entries is None:
         return None
-    values = {key: entry.number(names.values, above=0, side="below") for key, entry in entries.items()}
-    if None in values.values():
+    radii = {
+        key: entries[key].number(names.values, above=0, side="below") for key in keys[:2] if key in entries
+    }
+    widths = _read_half_widths(entries.get("half_widths"), names)
+    chosen = entries["coordinates"].word(("identity", "auto")) if "coordinates" in entries else None
+    if None in radii.values() or widths is None or (chosen is None and "coordinates" in entries):
         return None
-    return Tube(epsilon=values.get("epsilon"), rho_a=values.get("rho_a"))
+    if widths and "epsilon" in entries:
+        entries["epsilon"].fail(
+            codes.RANGE,
+            f"{entries['epsilon'].path} beside half_widths",
+            "they fix the whole tube: give one of the two",
+        )
+        return None
+    if widths and chosen == "identity":
+        entries["coordinates"].fail(
+            codes.RANGE, "half_widths with coordinates: identity", "write coordinates: auto, or leave it out"
+        )
+        return None
+    return Tube(
+        epsilon=radii.get("epsilon"),
+        rho_a=radii.get("rho_a"),
+        coordinates="auto" if chosen == "auto" else "identity" if chosen == "identity" else None,
+        half_widths=widths,
+    )
+
+
+def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fraction], ...] | None:
+    """Half-widths by state, in the order of the states; empty if there are none."""
+    if field is None:
+        return ()
+    entries = field.mapping(optional=names.states)
+    if entries is None:
+        return None
+    if not field.pairs():
+        field.fail(codes.RANGE, f"{field.path} is empty", f"write {{{names.states[0]}: 0.1}} or the like")
+        return None
+    found = {
+        name: entries[name].number(names.values, above=0, side="below")
+        for name in names.states
+        if name in entries
+    }
+    kept = tuple((name, width) for name, width in found.items() if width is not None)
+    return kept if len(kept) == len(found) else None
 
 
 def read_adaptation(field: Field | None, names: Names) -> Adaptation | None:
@@ -76,6 +117,20 @@ def _read_predictor(field: Field | None, n: int, names: Names) -> Literal["auto"
         "write a negative number, e.g. -1 for minus the identity, or auto",
     )
     return None
+
+
+def check_predictor(reader: Reader, tube: Tube | None, adaptation: Adaptation | None) -> None:
+    """In coordinates that are chosen later, only a multiple of the identity is known to suit P = I."""
+    if tube is None or adaptation is None or not tube.auto or adaptation.A_m == "auto":
+        return
+    A_m = adaptation.A_m
+    if any(A_m[i][j] != (A_m[0][0] if i == j else 0) for i in range(len(A_m)) for j in range(len(A_m))):
+        reader.report(
+            codes.STABILITY,
+            reader.places["adaptation.A_m"],
+            "in coordinates of the tube, A_m must be a multiple of the identity",
+            "write auto, a negative number, or tube.coordinates: identity",
+        )
 
 
 def dissipation(A_m: Matrix) -> Matrix:

@@ -152,10 +152,20 @@ class Synthesis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
-    """The tube's two radii; either may come from the command line instead."""
+    """The tube's two radii, or half-widths (name, w) of some states; the radii may come from the command line instead.
+
+    `coordinates` None: what was not said, `identity` unless there are half-widths.
+    """
 
     epsilon: Fraction | None = None
     rho_a: Fraction | None = None
+    coordinates: Literal["identity", "auto"] | None = None
+    half_widths: tuple[tuple[str, Fraction], ...] = ()
+
+    @property
+    def auto(self) -> bool:
+        """Whether the tube has coordinates of its own, in which it is measured by the metric."""
+        return self.coordinates == "auto" or (self.coordinates is None and bool(self.half_widths))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from tubecert.bounds.compute import bound_constants
@@ -18,14 +18,18 @@ from tubecert.claims import (
 )
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
-from tubecert.enclosure.constant import printable_above
+from tubecert.coordinates import Coordinates, Fields
+from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.constant import Constant, printable_above
+from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
-from tubecert.stages.tube import TubeFound, radii
+from tubecert.stages.tube import TubeFound
 from tubecert.tube import Tube
 from tubecert.verdict import Verdict
 
@@ -78,11 +82,24 @@ class Bounded:
 def enclose(tube: TubeFound) -> Enclosed:
     """Every constant over the tube."""
     question = tube.question
-    suprema = question.suprema(tube.plan).with_radius(tube.rho)
-    constants = bound_constants(
-        suprema, question.start, (tube.lower, tube.upper), question.declared_uncertainty
-    )
+    fresh = replace(question.suprema(tube.plan), coordinates=tube.coordinates)
+    suprema = fresh.with_radius(tube.rho, tube.sides)
+    declared = _declared_in(tube.coordinates, question.declared_uncertainty)
+    constants = bound_constants(suprema, question.start, (tube.lower, tube.upper), declared)
     return Enclosed(tube=tube, suprema=suprema, problem=_problem(tube, suprema, constants))
+
+
+def _declared_in(coordinates: Coordinates | None, declared: Mapping[str, Constant]) -> Mapping[str, Constant]:
+    """Declared bounds in the coordinates of the tube: a Lipschitz constant in x is one in z, times |S^-1|."""
+    if coordinates is None:
+        return declared
+    stretch = Interval.exact(supremum(SumOfNorms([coordinates.S_inverse]), BoxDomain({}), Effort()).above)
+    return {
+        name: Constant(below=0.0, above=printable_above(float((Interval.exact(bound.above) * stretch).hi)))
+        if name == "h_x"
+        else bound
+        for name, bound in declared.items()
+    }
 
 
 def bound(enclosed: Enclosed) -> Bounded | Stopped:
@@ -102,7 +119,7 @@ def _bounded(enclosed: Enclosed) -> Bounded:
 def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> TubeProblem:
     question = tube.question
     spec, adaptation = question.spec, question.spec.adaptation
-    epsilon, rho_a = radii(question)
+    epsilon, rho_a = tube.radii
     formulas = Formulas(question.options.formulas)
     return TubeProblem(
         constants=constants,
@@ -149,7 +166,9 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
     declared = enclosed.question.declared_uncertainty
     if not declared or enclosed.question.model.h is None:
         return None
-    for name, derived in zip(("h", "h_x", "h_t"), enclosed.suprema.uncertainty(), strict=True):
+    # what is declared is about x, whatever the coordinates of the tube
+    in_x = Fields(enclosed.question.model, None)
+    for name, derived in zip(("h", "h_x", "h_t"), enclosed.suprema.uncertainty(in_x), strict=True):
         if name in declared and derived.above > declared[name].above:
             broken = derived.below > declared[name].above
             claim = UncertaintyBound(
@@ -162,19 +181,22 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
 
 
 def _half_widths(enclosed: Enclosed) -> dict[str, float]:
-    """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho."""
+    """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho; or the sides of the tube."""
     tube = enclosed.tube
+    states = tube.question.spec.states
+    if tube.sides is not None:
+        return dict(zip(states, map(printable_above, tube.sides), strict=True))
     reach = sqrt(Interval.exact(tube.lower.below)) * Interval.of(tube.rho)
     most = fraction_bounds(tube.rho)[1]
     return {
         name: printable_above(min(float((Interval.exact(width.above) * reach).hi), most))
-        for name, width in zip(tube.question.spec.states, enclosed.suprema.half_widths(), strict=True)
+        for name, width in zip(states, enclosed.suprema.half_widths(), strict=True)
     }
 
 
 def _geodesics(enclosed: Enclosed) -> GeodesicTest:
     """Whether minimising geodesics are proven unique; if not, that stays an assumption."""
-    question, plan, rho = enclosed.question, enclosed.tube.plan, enclosed.suprema.rho
+    question, plan, suprema = enclosed.question, enclosed.tube.plan, enclosed.suprema
     model = question.model
-    tube = Tube(plan, rho, states=model.states, inputs=model.inputs, time=plan.time.get(TIME))
-    return unique_geodesics(model, tube, rho, question.effort_of("geodesics"))
+    tube = Tube(plan, suprema.section, states=model.states, inputs=model.inputs, time=plan.time.get(TIME))
+    return unique_geodesics(suprema.fields, tube, suprema.rho, question.effort_of("geodesics"))

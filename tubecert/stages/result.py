@@ -31,6 +31,7 @@ from tubecert.certificate.sections import (
     plan_data,
 )
 from tubecert.claims import Reason
+from tubecert.expression import number_text
 from tubecert.metric.verify import MetricProof
 from tubecert.printable import visible
 from tubecert.spec import Spec, canonical
@@ -40,7 +41,7 @@ from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.time import period_of
-from tubecert.stages.tube import Planned, TubeFound, radii
+from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, radii
 
 Stage = Question | ProvenMetric | Planned | TubeFound | Enclosed | Bounded | Judged
 
@@ -168,14 +169,22 @@ def _tube(reached: _Reached) -> TubeData | None:
     """The radii, once the tube is bounded; before that the radius that failed, if one did."""
     bounded, failed = reached.bounded, reached.partial
     if isinstance(failed, Radius):
+        if asked_half_widths(reached.question) is not None:  # there are no radii yet
+            return None
         epsilon, rho_a = radii(reached.question)
         return TubeData(epsilon=epsilon, rho_a=rho_a, rho=failed.rho)
     if bounded is None:
         return None
-    epsilon, rho_a = radii(reached.question)
-    rho = bounded.enclosed.tube.rho
+    tube = bounded.enclosed.tube
+    epsilon, rho_a = tube.radii
+    rows = None if tube.coordinates is None else tube.coordinates.rows
     return TubeData(
-        epsilon=epsilon, rho_a=rho_a, rho=rho, rho_r=rho - rho_a, half_widths=dict(bounded.half_widths)
+        epsilon=epsilon,
+        rho_a=rho_a,
+        rho=tube.rho,
+        rho_r=tube.rho - rho_a,
+        half_widths=dict(bounded.half_widths),
+        coordinates=None if rows is None else tuple(tuple(map(number_text, row)) for row in rows),
     )
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import isfinite
 
 from tubecert.bounds.compute import Radius, least_radius
 from tubecert.bounds.constants import Witness
+from tubecert.bounds.level import Proposed, greatest_level, least_level
+from tubecert.bounds.suprema import Suprema
 from tubecert.claims import (
     Claim,
     DeclareMetricBound,
@@ -19,7 +22,9 @@ from tubecert.claims import (
     TubeInSafeSet,
     TubeRadius,
 )
-from tubecert.enclosure.constant import Constant
+from tubecert.coordinates import Coordinates
+from tubecert.enclosure.constant import Constant, printable_below
+from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.spec import Knots
 from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.question import Question, Stopped, stopped
@@ -44,17 +49,27 @@ class Planned:
 
 @dataclass(frozen=True, kw_only=True)
 class TubeFound:
-    """O(rho) lies in the safe set, and rho >= sqrt(A/a)|x*(0) - x(0)| + epsilon + rho_a with a, A over O(rho)."""
+    """The tube lies in the safe set, and rho >= sqrt(A/a)|x*(0) - x(0)| + epsilon + rho_a with a, A over the tube.
+
+    With `coordinates` S, the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, and a curve from x* that leaves it
+    is at least sqrt(a) rho long; the radii are lengths in z = S x. Where half-widths are asked for, no side exceeds
+    them, and the radii are what the start leaves of rho.
+    """
 
     planned: Planned
     rho: Fraction
     lower: Constant
     upper: Constant
     contained: Containment
+    radii: tuple[Fraction, Fraction]
+    coordinates: Coordinates | None = None
+    sides: tuple[Fraction, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.contained.verdict is not Verdict.CERTIFIED:
             raise ValueError("the tube is not proven to lie in the safe set")
+        if (self.coordinates is None) != (self.sides is None):
+            raise ValueError("coordinates and half-widths come together")
 
     @property
     def question(self) -> Question:
@@ -68,17 +83,29 @@ class TubeFound:
 
 
 def radii(question: Question) -> tuple[Fraction, Fraction]:
-    """(epsilon, rho_a)."""
+    """(epsilon, rho_a) as they are asked for."""
     tube = question.spec.tube
     if tube.epsilon is None or tube.rho_a is None:
         raise ValueError("epsilon and rho_a are needed")
     return tube.epsilon, tube.rho_a
 
 
+def asked_half_widths(question: Question) -> tuple[Fraction | None, ...] | None:
+    """The half-widths that are asked for, by state; None where the radii are given instead."""
+    asked = dict(question.spec.tube.half_widths)
+    return tuple(map(asked.get, question.spec.states)) if asked else None
+
+
 def room_of(metric: ProvenMetric) -> Room:
-    """What a plan's defect is measured against: the least tube that there can be."""
-    epsilon, rho_a = radii(metric.question)
-    return Room(rho=epsilon + rho_a, lower=metric.lower.below, effort=metric.question.effort)
+    """What a plan's defect is measured against: the least tube that there can be, or about that."""
+    question = metric.question
+    effort, tube = question.effort, question.spec.tube
+    if (
+        tube.half_widths
+    ):  # |x - x*| < w for the narrowest side; its length in the metric is sqrt(a) w at least
+        return Room(rho=min(width for _, width in tube.half_widths), lower=metric.lower.below, effort=effort)
+    epsilon, rho_a = radii(question)
+    return Room(rho=epsilon + rho_a, lower=1.0 if tube.auto else metric.lower.below, effort=effort)
 
 
 def lay(metric: ProvenMetric, proposed: Knots | None = None) -> Planned:
@@ -87,13 +114,17 @@ def lay(metric: ProvenMetric, proposed: Knots | None = None) -> Planned:
     return Planned(metric=metric, plan=plan_of(question.spec, question.model, proposed))
 
 
-def find_tube(planned: Planned) -> TubeFound | Stopped:
-    """The least radius, proven, or why there is none."""
+def find_tube(planned: Planned, proposed: tuple[Coordinates, Proposed] | None = None) -> TubeFound | Stopped:
+    """The least tube, or the widest that was asked for, proven, or why there is none.
+
+    Coordinates of its own are proposed; they are needed where the specification asks for them.
+    """
     question = planned.question
-    suprema = question.suprema(planned.plan)
-    width = sum(radii(question), Fraction(0))
-    offset = question.start.offset(suprema)
-    radius = least_radius(suprema, question.spec.safe_set, offset, width, question.declared_metric)
+    if question.spec.tube.auto != (proposed is not None):
+        raise ValueError("coordinates are proposed where the specification asks for them, and nowhere else")
+    coordinates = None if proposed is None else proposed[0]
+    suprema = replace(question.suprema(planned.plan), coordinates=coordinates)
+    radius = _radius(question, suprema, None if proposed is None else proposed[1])
     if radius.obstacle is not None:
         return stopped(
             planned,
@@ -103,17 +134,53 @@ def find_tube(planned: Planned) -> TubeFound | Stopped:
         )
     contained = radius.contained
     if contained.verdict is not Verdict.CERTIFIED or radius.lower is None or radius.upper is None:
+        # half-widths are bounds of what the tube reaches: one that leaves the safe set refutes nothing
         return stopped(
             planned,
             _claim(radius),
-            contained.verdict,
+            Verdict.UNDECIDED if coordinates is not None else contained.verdict,
             where=Witness(t=contained.t, x=contained.x),
             relax=(ReduceRadii(), EnlargeSafeSet()),
             partial=radius,
         )
     return TubeFound(
-        planned=planned, rho=radius.rho, lower=radius.lower, upper=radius.upper, contained=contained
+        planned=planned,
+        rho=radius.rho,
+        lower=radius.lower,
+        upper=radius.upper,
+        contained=contained,
+        radii=_radii(question, suprema, radius, (radius.lower, radius.upper)),
+        coordinates=coordinates,
+        sides=radius.sides,
     )
+
+
+def _radius(question: Question, suprema: Suprema, proposed: Proposed | None) -> Radius:
+    safe_set, asked = question.spec.safe_set, asked_half_widths(question)
+    if proposed is not None and asked is not None:
+        return greatest_level(suprema, safe_set, asked, proposed)
+    offset, width = question.start.offset(suprema), sum(radii(question), Fraction(0))
+    if proposed is not None:
+        return least_level(suprema, safe_set, offset, width, proposed)
+    return least_radius(suprema, safe_set, offset, width, question.declared_metric)
+
+
+def _radii(
+    question: Question, suprema: Suprema, radius: Radius, metric: tuple[Constant, Constant]
+) -> tuple[Fraction, Fraction]:
+    """(epsilon, rho_a): as given, or, within half-widths, the two halves of what the start leaves of rho.
+
+    Theorems use rho_r + rho_a <= rho only. Where the start leaves nothing, no kind holds, whatever the split.
+    """
+    if asked_half_widths(question) is None:
+        return radii(question)
+    start = question.start.distance(suprema.with_radius(radius.rho, radius.sides), metric)
+    used = float((Interval.exact(start.above) / sqrt(Interval.exact(metric[0].below))).hi)
+    left = radius.rho - Fraction(used) if isfinite(used) and used < radius.rho else radius.rho
+    rho_a = question.spec.tube.rho_a
+    if rho_a is None or rho_a >= left:
+        rho_a = Fraction(repr(printable_below(left / 2)))
+    return Fraction(repr(printable_below(left - rho_a))), rho_a
 
 
 def _claim(radius: Radius) -> Claim:

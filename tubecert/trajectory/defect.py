@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import Objective, SumOfNorms
@@ -31,7 +32,8 @@ def plain_search(name: str, objective: Objective, domain: Domain, effort: Effort
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defect:
-    """The defect p of a plan, (n, 1), to be bounded for a tube of radius `rho`.
+    """The defect p of a plan, (n, 1), to be bounded for a tube of radius `rho`, both in z = S x where there
+    are `coordinates` S.
 
     It matters against rate times rho: what is a millionth of that is not refined further.
     """
@@ -42,11 +44,20 @@ class Defect:
     rho: float
     effort: Effort
     search: Search = plain_search
+    coordinates: Coordinates | None = None
 
     @classmethod
-    def of(cls, plan: Plan, model: ControlAffineModel, rho: float, effort: Effort) -> Defect:
+    def of(
+        cls,
+        plan: Plan,
+        model: ControlAffineModel,
+        rho: float,
+        effort: Effort,
+        coordinates: Coordinates | None = None,
+    ) -> Defect:
         """The defect of a plan."""
-        return cls(p=plan.defect(model), plan=plan, model=model, rho=rho, effort=effort)
+        p = Fields(model, coordinates).of_vector(plan.defect(model))
+        return cls(p=p, plan=plan, model=model, rho=rho, effort=effort, coordinates=coordinates)
 
     @property
     def vanishes(self) -> bool:
@@ -60,7 +71,8 @@ class Defect:
 
     def in_metric(self) -> Supremum:
         """Delta; negligible is what is negligible for |p|, in the units of the metric."""
-        W, fixed, domain = self.plan.on(self.model, self.model.W), self.plan.fixed, self.plan.domain
+        W = self.plan.on(self.model, Fields(self.model, self.coordinates).W)
+        fixed, domain = self.plan.fixed, self.plan.domain
         name, eye = "plan_defect_metric", identity(len(self.p))
         stretch = self.search(name, Pencil(eye, W, fixed=fixed), domain, self.effort)
         absolute = self._negligible * float(np.sqrt(max(stretch.below, 0.0)))

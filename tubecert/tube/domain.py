@@ -1,49 +1,45 @@
-"""The tube O(rho): all states within rho of the plan, as a domain that classifies boxes.
-
-In: a plan, a radius, a window of time. Out: for boxes in (x, u*, t): smaller boxes with the same points of the tube, or
-"outside"; for points: thin boxes proven inside. Trusted: yes. Implements: (omega_norm_ball), (full_tube), assumption 1.
+"""The tube as a domain that classifies boxes.
 
 Time is a coordinate of the search. Within a window the plan lies in a box P; a state box X is cut to the ranges that a
-point within rho of P can have given the gaps between X and P in the other coordinates. No cover of the tube by boxes
-is ever fixed: a boxed ball would be up to sqrt(n) too wide.
+point of a section around P can have given the gaps between X and P in the other coordinates. No cover of the tube by
+boxes is ever fixed: a boxed ball would be up to sqrt(n) too wide.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from fractions import Fraction
-
 import numpy as np
 from numpy.typing import NDArray
 
-from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Array, Interval, down, up
 from tubecert.enclosure.objective import Estimate
-from tubecert.enclosure.pencil import scalar
 from tubecert.expression import free_symbols
 from tubecert.model import TIME
 from tubecert.trajectory import Plan
 from tubecert.trajectory.plan import PIECE
-from tubecert.verdict import Verdict
+from tubecert.tube.sections import Ball, Section
 
 _WINDOWS = 64
 
 
 class Tube:
-    """O(rho) as a `Domain` over states, inputs (standing for u*(t)), time, and further independent ranges."""
+    """O(rho) as a `Domain` over states, inputs (standing for u*(t)), time, and further independent ranges.
+
+    `section` is what it is at one time; a number stands for the ball of that radius.
+    """
 
     def __init__(
         self,
         plan: Plan,
-        rho: float,
+        section: float | Section,
         *,
         states: tuple[str, ...],
         inputs: tuple[str, ...],
         time: Range | None,
         extra: dict[str, Range] | None = None,
     ) -> None:
-        self._plan, self._rho = plan, rho
+        self._plan = plan
+        self._section = Ball(section) if isinstance(section, (int, float)) else section
         self._states, self._inputs = states, inputs
         self._free = BoxDomain({**({} if time is None else {TIME: time}), **(extra or {})})
 
@@ -121,20 +117,13 @@ class Tube:
         lo[:, tied] = np.maximum(lo[:, tied], u.lo[:, tied_column])
         hi[:, tied] = np.minimum(hi[:, tied], u.hi[:, tied_column])
         centre = x[:, state_column]
-        # squared gaps between box and plan, rounded down, coordinate by coordinate
-        gap = np.maximum(0.0, np.maximum(down(lo[:, state] - centre.hi), down(centre.lo - hi[:, state])))
-        square = np.maximum(0.0, down(gap * gap))
-        square = np.where(np.isfinite(square), square, 0.0)
-        others = square @ (1.0 - np.eye(len(state)))  # the gaps in all other coordinates
-        room = up(up(np.square(self._rho)) - down(others * (1 - 1e-14)))
-        alive = np.all(room >= 0, axis=1)
-        reach = up(np.sqrt(up(np.maximum(room, 0.0))) * (1 + 1e-15))
-        lo[:, state] = np.maximum(lo[:, state], down(centre.lo - reach))
-        hi[:, state] = np.minimum(hi[:, state], up(centre.hi + reach))
+        lo[:, state], hi[:, state], alive = self._section.cut(
+            state_column, lo[:, state], hi[:, state], centre
+        )
         return lo, hi, alive & np.all(lo <= hi, axis=1)
 
     def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
-        """The points, moved into the ball around the plan at their time where that can be proven."""
+        """The points, moved into the tube at their time where that can be proven."""
         others = self._others(variables)
         other = [variables.index(v) for v in others]
         moved, _ = self._free.inside(others, points[:, other])
@@ -147,15 +136,7 @@ class Tube:
         x, u = self._window(variables, points, points)
         state, tied, state_column, tied_column = self._columns(variables)
         centre = x[:, state_column]
-        offset = points[:, state] - centre.mid
-        length = np.sqrt(np.sum(offset * offset, axis=1, keepdims=True))
-        blur = np.sum(centre.hi - centre.lo + 1e-15 * centre.magnitude, axis=1, keepdims=True)
-        reach = np.maximum(self._rho * (1 - 1e-9) - 2 * blur, 0.0)
-        scale = np.minimum(1.0, reach / np.maximum(length, 1e-300))
-        points[:, state] = centre.mid + scale * offset
-        distance = (Interval.exact(points[:, state]) - centre) ** 2
-        total = distance.hi.sum(axis=1) * (1 + 1e-14)
-        ok = total <= down(np.square(self._rho))
+        points[:, state], ok = self._section.pull(state_column, points[:, state], centre)
         lo, hi = points.copy(), points.copy()
         lo[:, tied], hi[:, tied] = u.lo[:, tied_column], u.hi[:, tied_column]
         return lo[ok], hi[ok]
@@ -175,8 +156,8 @@ class Tube:
         x, _ = self._window(variables, lo, hi)
         state, tied, state_column, _ = self._columns(variables)
         centre = x[:, state_column]
-        far = np.maximum(np.abs(hi[:, state] - centre.lo), np.abs(lo[:, state] - centre.hi))
-        boundary = (np.sum(far * far, axis=1) > self._rho**2).astype(float)[:, None]
+        crosses = self._section.crosses(state_column, lo[:, state], hi[:, state], centre)
+        boundary = crosses.astype(float)[:, None]
         priority = estimate.caused.copy()
         priority[:, state] += boundary * estimate.spread[:, state]
         if TIME in variables and not self._plan.is_constant:
@@ -205,98 +186,3 @@ class Tube:
         tied = [i for i, v in enumerate(variables) if v in self._inputs]
         which = [self._states.index(variables[i]) for i in state]
         return state, tied, which, [self._inputs.index(variables[i]) for i in tied]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Containment:
-    """Whether O(rho) lies in the safe set (assumption 1): certified, refuted with place and time, or undecided."""
-
-    verdict: Verdict
-    state: str = ""
-    side: str = ""
-    t: float = 0.0
-    x: tuple[float, ...] = ()
-    excess: float = 0.0
-
-
-def containment(
-    plan: Plan,
-    radius: Fraction,
-    states: tuple[str, ...],
-    safe_set: tuple[tuple[Fraction, Fraction], ...],
-    effort: Effort,
-) -> Containment:
-    """Decide assumption 1: x*(t) is at least rho away from every face of the safe set, for all t."""
-    radius = Fraction(radius)
-    if not plan.defined:
-        return _knots_outside(plan, radius, states, safe_set)
-    undecided: Containment | None = None
-    worst: Containment | None = None
-    for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
-        for side, sign, limit in (("upper", 1, highest), ("lower", -1, -lowest)):
-            exact = plan.x[i]
-            if exact.is_constant:
-                low = high = sign * exact.fraction
-                t = 0.0
-            else:
-                width = 1e-7 * float(highest - lowest)
-                # relative to the limit that is the same; to a curve far beyond it, it is all that matters
-                fine = Effort(
-                    gap=width / float(max(abs(highest), abs(lowest))), absolute=width, budget=effort.budget
-                )
-                found = supremum(scalar(sign * exact, plan.fixed), plan.domain, fine)
-                t = plan.moment(found.at) or 0.0
-                # what is not bounded is undecided
-                low = Fraction(found.below) if np.isfinite(found.below) else limit - radius - 1
-                high = Fraction(found.above) if np.isfinite(found.above) else limit + 1
-            if high + radius <= limit:
-                continue
-            here, _ = plan.enclose(np.array([t]), np.array([t]))
-            place = here.mid[0].copy()
-            place[i] += sign * float(radius)
-            case = Containment(
-                verdict=Verdict.REFUTED if low + radius > limit else Verdict.UNDECIDED,
-                state=name,
-                side=side,
-                t=t,
-                x=tuple(float(value) for value in place),
-                excess=float(low + radius - limit),
-            )
-            if case.verdict is Verdict.REFUTED and (worst is None or case.excess > worst.excess):
-                worst = case
-            elif case.verdict is Verdict.UNDECIDED:
-                undecided = case
-    return worst or undecided or Containment(verdict=Verdict.CERTIFIED)
-
-
-def _knots_outside(
-    plan: Plan,
-    radius: Fraction,
-    states: tuple[str, ...],
-    safe_set: tuple[tuple[Fraction, Fraction], ...],
-) -> Containment:
-    """The knot that is farthest from being allowed, for a curve whose slopes are not defined everywhere.
-
-    Inside the safe set they are, so that a knot outside is to be expected. Knots beyond the horizon shape the last
-    piece only: the curve need not reach them.
-    """
-    worst = Containment(verdict=Verdict.UNDECIDED, excess=0.0)
-    knots = plan.knots
-    reached = zip(knots.t, knots.x, strict=True) if knots else ()
-    for t, x in reached:
-        if plan.horizon is not None and t > plan.horizon:
-            break
-        for i, (name, (lowest, highest)) in enumerate(zip(states, safe_set, strict=True)):
-            for side, sign, excess in (("upper", 1, x[i] - highest), ("lower", -1, lowest - x[i])):
-                if excess + radius > worst.excess:
-                    place = [float(value) for value in x]
-                    place[i] += sign * float(radius)
-                    worst = Containment(
-                        verdict=Verdict.REFUTED,
-                        state=name,
-                        side=side,
-                        t=float(t),
-                        x=tuple(place),
-                        excess=float(excess + radius),
-                    )
-    return worst

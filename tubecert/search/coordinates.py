@@ -1,0 +1,141 @@
+"""Coordinates z = S x for the tube, its radius and its half-widths, proposed from samples in floats.
+
+S'S is a multiple of the metric at a point of the plan, or of the inverse of the mean dual metric: whichever makes the
+metric in the tube most like the identity in z. For a constant metric it is the metric itself. Untrusted: that S is
+invertible is checked where it is read, and every constant in z is proven.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from fractions import Fraction
+from math import sqrt
+
+import numpy as np
+
+from tubecert.bounds.level import Proposed
+from tubecert.coordinates import Coordinates
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.model import ControlAffineModel
+from tubecert.trajectory import Plan
+
+_TIMES = 17
+_DIRECTIONS = 48
+_PASSES = 4
+_DIGITS = Context(prec=9)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wish:
+    """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance.
+
+    `apart` (n,) is x(0) - x*(0); where any start within a radius is allowed, that is `within`. `box` (n, 2) is the safe
+    set.
+    """
+
+    asked: tuple[Fraction | None, ...] | None
+    width: float
+    apart: Array
+    within: float
+    box: Array
+
+    def start(self, S: Array) -> float:
+        """How far the start is from the plan's, in z."""
+        return float(np.linalg.norm(S @ self.apart) + self.within * np.linalg.norm(S, 2))
+
+    def level(self, widths: Array, start: float) -> float:
+        """Dbar, given sup sqrt(W_ii) and the start's distance."""
+        if self.asked is None:
+            return self.width + start
+        return min(float(w) / float(s) for w, s in zip(self.asked, widths, strict=True) if w is not None)
+
+
+def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordinates, Proposed]:
+    """Coordinates, and a tube in them; raises `ValueError` where the metric has no finite value on the plan."""
+    dual = Tape([e for row in model.W for e in row], model.states)
+    centres = _on_plan(plan)
+    around = _values(dual, centres)
+    if not len(around):
+        raise ValueError("the metric has no finite value on the plan")
+    S = _factor(around.mean(axis=0))
+    for _ in range(_PASSES):
+        bounds = _spectrum(around, S)
+        S = S * sqrt(bounds[0])
+        ratio = sqrt(bounds[1] / bounds[0])
+        widths = np.sqrt(np.max(np.diagonal(around, axis1=1, axis2=2), axis=0))
+        level = wish.level(widths, ratio * wish.start(S))
+        if all(e.is_constant for row in model.W for e in row):
+            break
+        around = _values(dual, _samples(centres, S, level, level * widths, wish.box))
+        candidates = [around.mean(axis=0), *_values(dual, centres[:: max(1, len(centres) // 4)])]
+        S = min(map(_factor, candidates), key=lambda each: _condition(around, each))
+    least = sqrt(_spectrum(around, S)[0])
+    coordinates = Coordinates(tuple(tuple(map(_short, row)) for row in S * least))
+    sides = tuple(Fraction(float(side)) for side in level * widths)
+    return coordinates, Proposed(rho=_short(level), sides=sides)
+
+
+def _on_plan(plan: Plan) -> Array:
+    """Points of the plan, (K, n)."""
+    end = 0.0 if plan.horizon is None else float(plan.horizon)
+    t = np.zeros(1) if plan.is_constant else np.linspace(0.0, np.nextafter(end, 0.0), _TIMES)
+    return plan.enclose(t, t)[0].mid
+
+
+def _values(dual: Tape, points: Array) -> Array:
+    """W at points (K, n), where it is positive definite: (K', n, n)."""
+    n = points.shape[1]
+    with np.errstate(all="ignore"):
+        values = dual.run_floats(list(points.T), (len(points),)).T.reshape(-1, n, n)
+    values = values[np.isfinite(values).all(axis=(1, 2))]
+    scale = np.sqrt(np.abs(np.diagonal(values, axis1=1, axis2=2)))
+    scale = np.where(scale > 0, scale, 1.0)
+    least = np.linalg.eigvalsh(values / scale[:, :, None] / scale[:, None, :])[:, 0]
+    return np.asarray(values[least > 0])
+
+
+def _samples(centres: Array, S: Array, level: float, sides: Array, box: Array) -> Array:
+    """Points of |S (x - x*)| <= level, within the half-widths and the safe set."""
+    n = S.shape[0]
+    drawn = np.random.default_rng(0).normal(size=(_DIRECTIONS, n))
+    drawn /= np.linalg.norm(drawn, axis=1)[:, None]
+    z = level * np.vstack([np.zeros((1, n)), np.eye(n), -np.eye(n), drawn, 0.5 * drawn])
+    offset = np.clip(z @ np.linalg.inv(S).T, -sides, sides)
+    corners = np.vstack([offset, sides * np.eye(n), -sides * np.eye(n)])
+    points = (centres[:, None] + corners[None]).reshape(-1, n)
+    return np.asarray(np.clip(points, box[:, 0], box[:, 1]))
+
+
+def _spectrum(duals: Array, S: Array) -> tuple[float, float]:
+    """The least and the greatest eigenvalue of S^-T M S^-1 over samples."""
+    values = np.linalg.eigvalsh(S @ duals @ S.T)
+    return 1 / float(values[:, -1].max()), 1 / float(values[:, 0].min())
+
+
+def _condition(duals: Array, S: Array) -> float:
+    least, greatest = _spectrum(duals, S)
+    return greatest / least
+
+
+def _factor(dual: Array) -> Array:
+    """S = L^-1, lower triangular, where L L' = W: S'S = W^-1. In plain arithmetic, the same everywhere."""
+    n = len(dual)
+    W = [[float(value) for value in row] for row in dual]
+    L = [[0.0] * n for _ in range(n)]
+    for i in range(n):
+        for j in range(i + 1):
+            rest = W[i][j] - sum(L[i][k] * L[j][k] for k in range(j))
+            L[i][j] = sqrt(rest) if i == j else rest / L[j][j]
+    S = [[0.0] * n for _ in range(n)]
+    for j in range(n):
+        for i in range(j, n):
+            own = float(i == j) - sum(L[i][k] * S[k][j] for k in range(j, i))
+            S[i][j] = own / L[i][i]
+    return np.array(S)
+
+
+def _short(value: float) -> Fraction:
+    """A decimal of few digits."""
+    return Fraction(_DIGITS.create_decimal(Decimal(float(value))))
