@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Section
@@ -21,6 +22,7 @@ from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_r
 from tubecert.recheck.specification import (
     Numbers,
     Range,
+    Rows,
     Specification,
     Wanted,
     read_specification,
@@ -109,13 +111,14 @@ class MetricSection:
 
 @dataclass(frozen=True, slots=True)
 class TubeSection:
-    """Radii and half-widths; a tube that leaves the set has no half-widths."""
+    """Radii and half-widths; a tube that leaves the set has no half-widths. `coordinates` are the rows of S."""
 
     epsilon: Fraction
     rho_a: Fraction
     rho: Fraction
     rho_r: Fraction | None
     half_widths: dict[str, Fraction] | None
+    coordinates: Rows | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +304,7 @@ def _geodesics(node: Node) -> Geodesics:
 
 
 def _tube(node: Node, states: tuple[str, ...]) -> TubeSection:
-    own = node.closed("epsilon", "rho_a", "rho", optional=("rho_r", "half_widths"))
+    own = node.closed("epsilon", "rho_a", "rho", optional=("rho_r", "half_widths", "coordinates"))
     widths = own.get("half_widths", lambda item: item.closed(*states))
     return TubeSection(
         epsilon=own["epsilon"].decimal(),
@@ -309,7 +312,18 @@ def _tube(node: Node, states: tuple[str, ...]) -> TubeSection:
         rho=own["rho"].decimal(),
         rho_r=own.get("rho_r", Node.decimal),
         half_widths=None if widths is None else {name: widths[name].decimal() for name in states},
+        coordinates=own.get("coordinates", lambda item: _coordinates(item, len(states))),
     )
+
+
+def _coordinates(node: Node, n: int) -> Rows:
+    """The rows of S."""
+    rows = tuple(tuple(e.exact() for e in row) for row in node.rows(n, n))
+    try:
+        Coordinates(rows)
+    except ValueError as error:
+        raise node.refused(f"is no matrix of coordinates: {error}") from None
+    return rows
 
 
 def _constants(node: Node, result: Members) -> dict[str, Enclosure]:

@@ -20,6 +20,7 @@ from tubecert.recheck.certificate import (
 )
 from tubecert.recheck.conditions import USED, Numbers, Setting
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
+from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import digest
@@ -81,7 +82,11 @@ class Case:
     @cached_property
     def place(self) -> Place:
         """The tube."""
-        return Place(self.system, self.curve, self.tube.rho, self.budget)
+        tube, states = self.tube, self.system.states
+        if tube.coordinates is None or tube.half_widths is None:
+            return Place(self.system, self.curve, tube.rho, self.budget)
+        sides = tuple(tube.half_widths[name] for name in states)
+        return Place(self.system, self.curve, tube.rho, self.budget, Coordinates(tube.coordinates), sides)
 
     @cached_property
     def setting(self) -> Setting:
@@ -90,7 +95,7 @@ class Case:
             bounds = {name: self.bound_if_any(name) for name in USED}
             # what has no bound is not a number: no comparison with what rests on it can hold
             values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
-        return Setting(self.system, Numbers(**values), self.place.rho)
+        return Setting(self.system, Numbers(**values), self.place.rho, self.tube.rho_a)
 
     def bound(self, name: str) -> Fraction:
         """The side of a constant that the conditions use; raises `ValueError` where there is none."""
@@ -112,7 +117,8 @@ class Case:
     @cached_property
     def over_tube(self) -> tuple[object, ...]:
         """What every claim over the tube depends on."""
-        return *self.whole, self.knots, self.place.rho
+        own = () if self.place.coordinates is None else (self.place.coordinates.S, self.place.sides)
+        return *self.whole, self.knots, self.place.rho, *own
 
     @cached_property
     def knots(self) -> str:
@@ -122,7 +128,7 @@ class Case:
     @cached_property
     def numbers(self) -> tuple[object, ...]:
         """What every claim about gains depends on."""
-        return *self.whole, self.place.rho, *(self.bound_if_any(name) for name in USED)
+        return *self.whole, self.place.rho, self.tube.rho_a, *(self.bound_if_any(name) for name in USED)
 
 
 def of_every(result: Result) -> Iterator[Claim]:
@@ -214,8 +220,8 @@ def _tube(case: Case) -> Iterator[Claim]:
     )
     yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",
-        (*case.over_tube, lower, upper),
-        lambda: start.radius(place, case.bound("lower"), case.bound("upper")),
+        (*case.over_tube, lower, upper, case.tube.epsilon, case.tube.rho_a),
+        lambda: _radius(case),
         SHARP,
     )
     yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))
@@ -225,6 +231,14 @@ def _tube(case: Case) -> Iterator[Claim]:
             (*case.over_tube, width, lower),
             lambda i=i, width=width: half_width(place, i, width, case.bound("lower")),  # type: ignore[misc]
         )
+
+
+def _radius(case: Case) -> Outcome:
+    """Rho holds both radii, and where these are asked for, what the start needs as well."""
+    width = case.tube.epsilon + case.tube.rho_a
+    if case.result.specification.half_widths:
+        return metric.stated(width <= case.place.rho, "it is smaller than epsilon + rho_a")
+    return start.radius(case.place, width, case.bound("lower"), case.bound("upper"))
 
 
 def _constants(case: Case) -> Iterator[Claim]:

@@ -58,6 +58,7 @@ class Setting:
     system: System
     n: Numbers
     rho: Fraction
+    rho_a: Fraction
 
     @property
     def rate(self) -> Ball:
@@ -131,9 +132,9 @@ def margins_26(setting: Setting, gains: Gains) -> dict[str, Ball]:
     nothing = dict.fromkeys(("26a", "26b", "26c"), arb("nan"))
     if not gains.sensible or not setting.radius_serves(gains.projection_radius):
         return nothing
-    n, s = setting.n, setting.system
+    n = setting.n
     d, a = derived(setting, gains), n.lower
-    rho_r, rho_a = exact(setting.rho - s.rho_a), exact(s.rho_a)
+    rho_r, rho_a = exact(setting.rho - setting.rho_a), exact(setting.rho_a)
     zeta_p = exact(setting.rho) * n.plan_defect_metric / (setting.rate * root(a))
     first = 1 - (n.initial_distance * n.initial_distance / a + d["zeta_1"] + zeta_p) / (rho_r * rho_r)
     rest = a - d["zeta_2"] - d["zeta_3"]

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tubecert.recheck.certificate import Geodesics, Result
+from tubecert.recheck.certificate import Geodesics, Result, TubeSection
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
-from tubecert.recheck.specification import Metric, Planned, Tabled, Wanted
+from tubecert.recheck.specification import Metric, Planned, Specification, Tabled, Wanted
 from tubecert.recheck.system import System
 
 _CLAIMS_ONLY = "the verdict is certified, but"
@@ -34,9 +34,7 @@ def _specification(result: Result) -> Iterator[tuple[bool, str]]:
         yield same, "metric.dual_metric is not that of the specification"
         yield metric.rate == spec.metric.rate, "metric.rate is not that of the specification"
     if tube is not None:
-        yield tube.epsilon == spec.epsilon, "tube.epsilon is not that of the specification"
-        yield tube.rho_a == spec.rho_a, "tube.rho_a is not that of the specification"
-        yield tube.rho_r in (None, tube.rho - spec.rho_a), "tube.rho_r is not rho - rho_a"
+        yield from _tube(tube, spec)
     trajectory = spec.trajectory
     yield plan.kind == trajectory.kind, "plan.kind is not that of the specification"
     if plan.interpolation is not None:
@@ -55,6 +53,29 @@ def _specification(result: Result) -> Iterator[tuple[bool, str]]:
         yield within, f"declared.{name} is not between the specification's and the constant"
     yield from _overrides(result)
     yield from _synthesised(result)
+
+
+def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
+    for name, own, given in (
+        ("epsilon", tube.epsilon, spec.epsilon),
+        ("rho_a", tube.rho_a, spec.rho_a),
+    ):
+        # within half-widths, rho_a may be more than there is room for
+        asked = given is not None and not (name == "rho_a" and spec.half_widths and own < given)
+        yield own == given if asked else own > 0, f"tube.{name} is not that of the specification"
+    yield tube.rho_r in (None, tube.rho - tube.rho_a), "tube.rho_r is not rho - rho_a"
+    shown = tube.coordinates is not None
+    yield spec.coordinates or not shown, "tube.coordinates were not asked for"
+    yield shown or not spec.coordinates or tube.half_widths is None, "tube.coordinates are missing"
+    yield not shown or tube.half_widths is not None, "tube.half_widths are missing"
+    for name, most in spec.half_widths.items():
+        widths = tube.half_widths
+        yield widths is None or widths[name] <= most, f"tube.half_widths.{name} is more than was asked for"
+    A_m = spec.loop.A_m
+    scalar = A_m is None or all(
+        e == (A_m[0][0] if i == j else 0) for i, row in enumerate(A_m) for j, e in enumerate(row)
+    )
+    yield scalar or not shown, "A_m is no multiple of the identity, in coordinates that are not x"
 
 
 def _overrides(result: Result) -> Iterator[tuple[bool, str]]:

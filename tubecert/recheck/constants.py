@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 
+from tubecert.recheck.balls import Ball, exact, sharp_norm
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.branches import norms_below, slopes_below
+from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.lipschitz import LipschitzBelow
@@ -28,14 +30,12 @@ from tubecert.recheck.pencils import MU, GainBelow, LeastGain, SlopesBelow
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
-from tubecert.recheck.system import System
 from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,
     Rows,
     all_zero,
     matrix_replaced,
-    matrix_slopes,
     number,
     plus,
     scaled,
@@ -53,9 +53,9 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
     `largest` is a bound of smax(Theta B) over the tube, None if none is claimed.
     """
     if name == "lower":
-        return lower_bound(place.system, limit, place.tube(), place.budget)
+        return lower_bound(place.system, limit, place.tube(), place.budget, place.fields.unit)
     if name == "upper":
-        return upper_bound(place.system, limit, place.tube(), place.budget)
+        return upper_bound(place.system, limit, place.tube(), place.budget, place.fields.unit)
     if limit < 0 and name != "contraction_excess":  # an eigenvalue: all others are norms, gains and lengths
         return stated(False, "it is negative")
     if name == "feedback_gain":
@@ -77,35 +77,27 @@ def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
     return prove(test, place.tube(), place.budget)
 
 
-def _columns(s: System) -> list[Matrix]:
-    return [[[row[j]] for row in s.B] for j in range(len(s.inputs))]
-
-
-def _jacobian(column: Rows, states: Sequence[str]) -> Matrix:
-    return turned([[row[0] for row in matrix_slopes(column, name)] for name in states])
-
-
-def _left_inverse_slopes(s: System) -> list[Matrix]:
-    gram = times(turned(s.B), s.B)
+def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
+    gram = times(turned(fields.B), fields.B)
     d = determinant(gram)
-    inverse = [[e / d for e in row] for row in times(adjugate(gram), turned(s.B))]
-    return [matrix_slopes(inverse, name) for name in s.states]
+    inverse = [[e / d for e in row] for row in times(adjugate(gram), turned(fields.B))]
+    return fields.slopes(inverse)
 
 
 def _left_inverse(place: Place, limit: Fraction) -> Outcome:
     if not limit:
         return stated(False, "it is zero")
-    gram = times(turned(place.system.B), place.system.B)
+    gram = times(turned(place.fields.B), place.fields.B)
     least = scaled(1 / limit**2, unit_matrix(len(gram)))
     return prove(PositiveDefinite(plus(gram, least, -1), gram), place.tube(), place.budget)
 
 
 def _metric_slope(place: Place, limit: Fraction) -> Outcome:
-    s = place.system
-    moving = [slope for slope in s.W_x if not all_zero(slope)]
+    fields = place.fields
+    moving = [slope for slope in fields.W_x if not all_zero(slope)]
     if not moving:
         return stated(limit >= 0, "it is negative")
-    return prove(SlopesBelow(moving, times(s.W, s.W), limit), place.tube(), place.budget)
+    return prove(SlopesBelow(moving, times(fields.W, fields.W), limit), place.tube(), place.budget)
 
 
 def feedback_gain(place: Place, limit: Fraction, largest: Fraction) -> Outcome:
@@ -131,7 +123,7 @@ def _input_on_plan(place: Place, limit: Fraction) -> Outcome:
 
 def _drift(place: Place, limit: Fraction) -> Outcome:
     s, curve = place.system, place.curve
-    drift = s.drift
+    drift = place.fields.drift
     if curve.moves and len(curve.parts) == 1:
         return prove(NormsBelow([place.around_plan(drift)], limit, place.numbers), place.ball(), place.budget)
     if not curve.moves:
@@ -147,7 +139,7 @@ def _metric_input_gain(place: Place, limit: Fraction) -> Outcome:
 
 
 def defect(place: Place) -> Matrix:
-    """x*' - f(x*) - B(x*) u* along the plan, (n, 1)."""
+    """x*' - f(x*) - B(x*) u* along the plan, (n, 1), by its components in x."""
     slope = [[e] for e in place.curve.slope]
     return plus(slope, place.on_plan(place.system.drift), -1)
 
@@ -160,7 +152,7 @@ def _plan_defect(place: Place, limit: Fraction) -> Outcome:
     p = defect(place)
     if _defect_zero(place, p):
         return stated(True, "")
-    return place.along(lambda: NormsBelow([p], limit, place.numbers))
+    return place.along(lambda: NormsBelow([place.fields.vector(p)], limit, place.numbers))
 
 
 def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
@@ -178,26 +170,34 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
 
 def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     s = place.system
-    if name in s.declared and s.declared[name] > limit:
+    if name in s.declared and not _declared(place, name) <= exact(limit):
         return stated(False, f"it is below the declared {float(s.declared[name]):g}")
     if s.h is None:
         return stated(name in s.declared, "it is neither declared nor derived")
     if name == "h_x":
-        test: Test = LipschitzBelow([row[0] for row in s.h], s.states, limit)
+        test: Test = LipschitzBelow([row[0] for row in s.h], place.fields, limit)
         return prove(test, place.tube(), place.budget)
     if name == "h_t":
         return prove(slopes_below(s.h, TIME, limit), place.tube(), place.budget)
     return _norms(place, [s.h], limit)
 
 
+def _declared(place: Place, name: str) -> Ball:
+    """A declared bound; a Lipschitz constant in x is one in z, times |S^-1|."""
+    own = exact(place.system.declared[name])
+    if name != "h_x" or place.coordinates is None:
+        return own
+    return own * sharp_norm([[exact(q) for q in row] for row in place.coordinates.inverse])
+
+
 _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {
-    "f": lambda p, t: _norms(p, [p.system.f], t),
-    "f_x": lambda p, t: _norms(p, [p.system.f_x], t),
-    "B": lambda p, t: _norms(p, [p.system.B], t),
-    "B_x": lambda p, t: _norms(p, [matrix_slopes(p.system.B, name) for name in p.system.states], t),
-    "b_x": lambda p, t: _norms(p, [_jacobian(b, p.system.states) for b in _columns(p.system)], t),
+    "f": lambda p, t: _norms(p, [p.fields.f], t),
+    "f_x": lambda p, t: _norms(p, [p.fields.f_x], t),
+    "B": lambda p, t: _norms(p, [p.fields.B], t),
+    "B_x": lambda p, t: _norms(p, p.fields.slopes(p.fields.B), t),
+    "b_x": lambda p, t: _norms(p, p.fields.b_x, t),
     "B_pinv": _left_inverse,
-    "B_pinv_x": lambda p, t: _norms(p, _left_inverse_slopes(p.system), t),
+    "B_pinv_x": lambda p, t: _norms(p, _left_inverse_slopes(p.fields), t),
     "M_x": _metric_slope,
     "u_star": _input_on_plan,
     "h": lambda p, t: _uncertainty(p, t, "h"),
@@ -216,11 +216,12 @@ OVER_TUBE = ("lower", "upper", *_CLAIMS, "feedback_gain")
 
 
 def contained(place: Place) -> Outcome:
-    """Assumption 1: x* stays at least rho away from every face of the safe set."""
+    """Assumption 1: x* stays at least rho, or its half-width, away from every face of the safe set."""
     s, outcomes = place.system, []
-    for name, x in zip(s.states, place.curve.x, strict=True):
+    sides = (place.rho,) * len(s.states) if place.sides is None else place.sides
+    for name, side, x in zip(s.states, sides, place.curve.x, strict=True):
         low, high = s.safe_set[name]
-        for room in (number(high - place.rho) - x, x - number(low + place.rho)):
+        for room in (number(high - side) - x, x - number(low + side)):
             outcomes.append(place.along(lambda room=room: NotNegative(room, place.numbers)))  # type: ignore[misc]
             if not outcomes[-1].holds:
                 return together(outcomes)
@@ -228,8 +229,11 @@ def contained(place: Place) -> Outcome:
 
 
 def half_width(place: Place, state: int, width: Fraction, lower: Fraction) -> Outcome:
-    """|x_i - x_i*| <= min(rho, sqrt(a) rho sup sqrt(W_ii)) <= width."""
-    if width >= place.rho:
+    """|x_i - x_i*| <= min(rho, sqrt(a) rho sup sqrt(W_ii)) <= width; without rho where it is no length in x.
+
+    In coordinates of its own the tube is cut to the half-widths: the supremum is over what they leave.
+    """
+    if place.coordinates is None and width >= place.rho:
         return stated(True, "")
     if width <= 0:
         return stated(False, "it is not positive")

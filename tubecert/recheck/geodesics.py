@@ -15,12 +15,12 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact, spectral_norm
 from tubecert.recheck.boxes import Box, Field, Found
+from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
-from tubecert.recheck.system import System
-from tubecert.recheck.terms import all_zero, matrix_slopes
+from tubecert.recheck.terms import all_zero
 
 # to propose how the bound is shared by G and L
 _SEGMENTS = 24
@@ -35,7 +35,7 @@ def unique(place: Place, limit: Fraction) -> Outcome:
     s, rho = place.system, place.rho
     if s.flat:
         return stated(limit >= 0, "it is negative")
-    symbols, slopes = (SymbolsBelow(s, order, Fraction(0)) for order in (0, 1))
+    symbols, slopes = (SymbolsBelow(place.fields, order, Fraction(0)) for order in (0, 1))
     found = [_sampled(test, place) for test in (symbols, slopes)]
     weights = float(rho), float(rho) ** 2 / 8
     slack = float(limit) - sum(w * x for w, x in zip(weights, found, strict=True))
@@ -59,7 +59,7 @@ def _below(place: Place, shares: Sequence[Fraction], budget: int) -> Outcome:
     """|Gamma| and |dGamma| are at most their shares of the bound."""
     outcomes: list[Outcome] = []
     for order, share in enumerate(shares):
-        outcomes.append(prove(SymbolsBelow(place.system, order, share), place.tube(), budget))
+        outcomes.append(prove(SymbolsBelow(place.fields, order, share), place.tube(), budget))
         if not outcomes[-1].holds:
             break
     return together(outcomes)
@@ -76,7 +76,7 @@ def _sampled(test: SymbolsBelow, place: Place) -> float:
         _, x, _ = segment.middle()
         for side in ([0.0] * len(columns), *sides):
             size = math.hypot(*side) or 1.0
-            at = [x[i] + float(place.rho) * d / size for i, d in zip(columns, side, strict=True)]
+            at = [x[i] + place.around.extent(i) * d / size for i, d in zip(columns, side, strict=True)]
             value = float(test.bound(at).mid())
             best = max(best, value) if math.isfinite(value) else best
     return best
@@ -96,12 +96,13 @@ def _along(place: Place) -> list[Segment]:
 class SymbolsBelow:
     """|Gamma| (order 0) or |dGamma| (order 1) is at most `limit`."""
 
-    def __init__(self, s: System, order: int, limit: Fraction) -> None:
-        self._n, self._order, self._limit = len(s.states), order, exact(limit)
-        self._moving = [i for i, slope in enumerate(s.W_x) if not all_zero(slope)]
-        first = [s.W_x[i] for i in self._moving]
-        second = [matrix_slopes(w, s.states[m]) for m in self._moving for w in first] if order else []
-        self._field = Field([e for matrix in (s.W, *first, *second) for row in matrix for e in row])
+    def __init__(self, fields: Fields, order: int, limit: Fraction) -> None:
+        self._n, self._order, self._limit = len(fields.system.states), order, exact(limit)
+        self._moving = [i for i, slope in enumerate(fields.W_x) if not all_zero(slope)]
+        first = [fields.W_x[i] for i in self._moving]
+        bent = [fields.slopes(w) for w in first] if order else []
+        second = [slopes[m] for m in self._moving for slopes in bent]
+        self._field = Field([e for matrix in (fields.W, *first, *second) for row in matrix for e in row])
         self.variables = self._field.variables
 
     def over(self, box: Box) -> Found:

@@ -2,7 +2,8 @@
 
 Absolute values have a sign in each branch, in which there are two bounds, and the smaller one counts on each box: the
 generalised Jacobian; and, since a norm is 1-Lipschitz in its arguments, |J_0| + sum_k |dh/dn_k| L_k with J_0 the
-Jacobian while the norms n_k are kept fixed and L_k that of n_k's arguments. Implements: Dhx of theory (2.3).
+Jacobian while the norms n_k are kept fixed and L_k that of n_k's arguments. In coordinates z = S x
+all derivatives are by z. Implements: Dhx of theory (2.3).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from flint import arb
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.boxes import Box, Found, Values
 from tubecert.recheck.branches import Signs
+from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import (
     Matrix,
@@ -26,7 +28,6 @@ from tubecert.recheck.terms import (
     matrix_slopes,
     names,
     remade,
-    turned,
     variable,
 )
 
@@ -48,15 +49,15 @@ class _Bound:
 
 
 class LipschitzBelow:
-    """|h(t, x) - h(t, y)| <= limit |x - y|, branch by branch where there are absolute values."""
+    """|h(t, x) - h(t, y)| <= limit |S (x - y)|, branch by branch where there are absolute values."""
 
-    def __init__(self, h: Sequence[Term], states: Sequence[str], limit: Fraction) -> None:
+    def __init__(self, h: Sequence[Term], fields: Fields, limit: Fraction) -> None:
         self._limit = exact(limit)
         self._signs = Signs(h)
         ones = self._signs.values((1,) * len(self._signs.names))
         entries = self._signs.entries
-        direct = _jacobian(entries, states)
-        levels = _levels(entries, states)
+        direct = _jacobian(entries, fields)
+        levels = _levels(entries, fields)
         every = [direct, *(m for own, gains in levels for m in (own, *gains))]
         found = names(e for m in every for row in m for e in row) - ones.keys()
         self.variables = tuple(sorted({*found, *self._signs.variables}))
@@ -105,7 +106,7 @@ class LipschitzBelow:
         return not self._levels and self._direct.with_values(signs).broken([point[i] for i in self._columns])
 
 
-def _levels(entries: Sequence[Term], states: Sequence[str]) -> list[tuple[Matrix, list[Matrix]]]:
+def _levels(entries: Sequence[Term], fields: Fields) -> list[tuple[Matrix, list[Matrix]]]:
     """For every norm, then for `entries`: the Jacobian with inner norms kept fixed, and the slopes along these."""
     plain, norms = _apart(entries)
     back = {name: variable(name) for name in norms}
@@ -115,7 +116,7 @@ def _levels(entries: Sequence[Term], states: Sequence[str]) -> list[tuple[Matrix
     earlier: list[str] = []
     for own in [*(args for _, args in norms.values()), plain]:
         gains = [matrix_replaced(matrix_slopes([[e] for e in own], name), back) for name in earlier]
-        found.append((matrix_replaced(_jacobian(own, states), back), gains))
+        found.append((matrix_replaced(_jacobian(own, fields), back), gains))
         if len(earlier) < len(norms):
             earlier.append(list(norms)[len(earlier)])
     return found
@@ -136,6 +137,5 @@ def _apart(h: Sequence[Term]) -> tuple[list[Term], dict[str, tuple[Term, list[Te
     return [plain[e] for e in h], norms
 
 
-def _jacobian(entries: Sequence[Term], states: Sequence[str]) -> Matrix:
-    columns = [[row[0] for row in matrix_slopes([[e] for e in entries], name)] for name in states]
-    return turned(columns)
+def _jacobian(entries: Sequence[Term], fields: Fields) -> Matrix:
+    return fields.jacobian([[e] for e in entries])

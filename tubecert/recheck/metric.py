@@ -49,18 +49,18 @@ def stated(holds: bool, why: str) -> Outcome:
     return CONFIRMED if holds else Outcome(verdict="contradicted", why=why)
 
 
-def lower_bound(s: System, a: Fraction, domain: Domain, budget: int) -> Outcome:
-    """M >= a I."""
+def lower_bound(s: System, a: Fraction, domain: Domain, budget: int, unit: Rows | None = None) -> Outcome:
+    """M >= a I; M >= a unit^-1 for another constant unit."""
     if a <= 0:
         return stated(False, "it is not positive")
-    eye = unit_matrix(len(s.states))
-    return prove(PositiveDefinite(plus(scaled(1 / a, eye), s.W, -1), eye), domain, budget)
+    own = unit_matrix(len(s.states)) if unit is None else unit
+    return prove(PositiveDefinite(plus(scaled(1 / a, own), s.W, -1), own), domain, budget)
 
 
-def upper_bound(s: System, A: Fraction, domain: Domain, budget: int) -> Outcome:
-    """0 < M <= A I."""
-    eye = unit_matrix(len(s.states))
-    return prove(PositiveDefinite(plus(scaled(A, s.W), eye, -1), s.W), domain, budget)
+def upper_bound(s: System, A: Fraction, domain: Domain, budget: int, unit: Rows | None = None) -> Outcome:
+    """0 < M <= A I; M <= A unit^-1 for another constant unit."""
+    own = unit_matrix(len(s.states)) if unit is None else unit
+    return prove(PositiveDefinite(plus(scaled(A, s.W), own, -1), s.W), domain, budget)
 
 
 def killing(s: System) -> Outcome:

@@ -1,8 +1,9 @@
-"""Norms of columns over a ball around a point, where the ball's own constraint carries the proof.
+"""Norms of columns over a ball or an ellipsoid around a point, where its own constraint carries the proof.
 
-For the largest |G|^2 over |x - x*| <= rho boxes alone are poor: near the sphere a box always has corners outside. With
-any L >= 0, t^2 - |G|^2 - L (rho^2 - |x - x*|^2) >= 0 on a box proves |G| <= t for its points in the ball, and with the
-multiplier of the maximum the left-hand side has no slope along the sphere. L is a proposal: an ascent in floats.
+For the largest |G|^2 over d'Q d <= rho^2, d = x - x*, boxes alone are poor: near its boundary a box always has corners
+outside. With any L >= 0, t^2 - |G|^2 - L (rho^2 - d'Q d) >= 0 on a box proves |G| <= t for its points in the tube, and
+with the multiplier of the maximum the left-hand side has no slope along the boundary. L is a proposal: an ascent in
+floats. Q is the identity for a ball; of an ellipsoid in more states it is that of the projection.
 A box is examined by a lower bound of the quadratic form about its centre, one variable at a time.
 """
 
@@ -25,7 +26,7 @@ _ASCENTS = 60
 
 
 def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
-    """|G| <= limit over O(rho) of a plan that stays where it is; None if there is no multiplier that helps."""
+    """|G| <= limit over the tube of a plan that stays where it is; None if there is no multiplier that helps."""
     if any(e.op in ("norm", "direction") for e in in_order(column)):
         return None  # no curvature
     square = sum((e * e for e in column), start=NOUGHT)
@@ -34,19 +35,27 @@ def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outco
     if not variables or not set(variables) <= set(centre):
         return None
     own = [centre[v] for v in variables]
-    share = _multiplier(
-        square, variables, [float(x.mid()) for x in Program(own, ()).run(())], float(place.rho)
-    )
+    which = [place.system.states.index(v) for v in variables]
+    middle = [float(x.mid()) for x in Program(own, ()).run(())]
+    share = _multiplier(square, variables, middle, place.around.directions(which), float(place.rho))
     if share is None:
         return None
     offsets = [variable(v) - x for v, x in zip(variables, own, strict=True)]
-    inside = number(place.rho**2) - sum((d * d for d in offsets), start=NOUGHT)
+    products = (
+        number(q) * a * b
+        for a, row in zip(offsets, place.around.form(which), strict=True)
+        for b, q in zip(offsets, row, strict=True)
+        if q
+    )
+    inside = number(place.rho**2) - sum(products, start=NOUGHT)
     test = QuadraticNotNegative(number(limit**2) - square - number(share) * inside)
     return prove(test, place.tube(), place.budget)
 
 
-def _multiplier(square: Term, variables: tuple[str, ...], centre: list[float], rho: float) -> Fraction | None:
-    """L with grad |G|^2 = 2 L (x - x*) at the largest |G|^2 on the sphere that is found."""
+def _multiplier(
+    square: Term, variables: tuple[str, ...], centre: list[float], C: list[list[float]], rho: float
+) -> Fraction | None:
+    """L with grad |G|^2 = 2 L Q (x - x*) at the largest |G|^2 that is found on x - x* = C d, |d| = rho."""
     program = Program([square, *(slopes([square], v)[0] for v in variables)], variables)
     best = -math.inf
     share = 0.0
@@ -55,14 +64,16 @@ def _multiplier(square: Term, variables: tuple[str, ...], centre: list[float], r
         d[start // 2] = rho if start % 2 else -rho
         value, product = -math.inf, 0.0
         for _ in range(_ASCENTS):
-            found = [
-                float(y.mid()) for y in program.run([arb(c + x) for c, x in zip(centre, d, strict=True)])
-            ]
-            size = math.hypot(*found[1:])
+            offset = [sum(c * x for c, x in zip(row, d, strict=True)) for row in C]
+            value, *slope = (
+                float(y.mid()) for y in program.run([arb(c + x) for c, x in zip(centre, offset, strict=True)])
+            )
+            slope = [sum(row[j] * g for row, g in zip(C, slope, strict=True)) for j in range(len(d))]
+            size = math.hypot(*slope)
             if not 0 < size < math.inf:
                 break
-            value, product = found[0], sum(g * x for g, x in zip(found[1:], d, strict=True))
-            d = [rho * g / size for g in found[1:]]
+            product = sum(g * x for g, x in zip(slope, d, strict=True))
+            d = [rho * g / size for g in slope]
         if value > best:
             best, share = value, product / (2 * rho * rho)
     return Fraction(share) if 0 < share < math.inf else None

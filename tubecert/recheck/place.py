@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 from flint import arb
 
+from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
+from tubecert.recheck.coordinates import Coordinates, Fields
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import CLOCK, Curve, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
+from tubecert.recheck.specification import Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable
@@ -20,21 +24,38 @@ from tubecert.recheck.times import time_range
 from tubecert.recheck.tube import Tube
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Place:
-    """A system with its plan and radius; `budget` boxes for each claim."""
+    """A system with its plan and its tube; `budget` boxes for each claim.
+
+    With `coordinates` S the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, else the ball of radius rho.
+    """
 
     system: System
     curve: Curve
     rho: Fraction
     budget: int
+    coordinates: Coordinates | None = None
+    sides: Numbers | None = None
+
+    @cached_property
+    def fields(self) -> Fields:
+        """The system in the coordinates of the tube."""
+        return Fields(self.system, self.coordinates)
+
+    @cached_property
+    def around(self) -> Round | Ellipsoid:
+        """The tube around one point of the plan."""
+        if self.coordinates is None or self.sides is None:
+            return Round(self.rho)
+        return Ellipsoid(self.coordinates, self.rho, self.sides)
 
     def tube(self, extra: dict[str, tuple[Fraction, Fraction]] | None = None) -> Tube:
-        """O(rho), with the times that matter for h."""
+        """The tube, with the times that matter for h."""
         s = self.system
         time = time_range(s.uncertainty, s.horizon)
         free = {**(extra or {}), **({} if time is None else {TIME: time})}
-        return Tube(self.curve, self.rho, s.states, s.inputs, free)
+        return Tube(self.curve, self.around, s.states, s.inputs, free)
 
     def on_plan(self, rows: Rows) -> Matrix:
         """A matrix along the plan."""
@@ -44,7 +65,7 @@ class Place:
         )
 
     def around_plan(self, rows: Rows) -> Matrix:
-        """A matrix in s and in x - x*, for a plan of one part: the tube is a ball there, whatever the plan does."""
+        """A matrix in s and in x - x*, for a plan of one part: the tube stays there, whatever the plan does."""
         offsets = [variable(name) + x for name, x in zip(self._offsets, self.curve.x, strict=True)]
         s = self.system
         return matrix_replaced(
@@ -57,7 +78,7 @@ class Place:
         nothing = [number(0)] * len(self.system.states)
         return Tube(
             expressed(nothing, (), TIME, None),
-            self.rho,
+            self.around,
             self._offsets,
             (),
             {CLOCK: (arb(0), part.length)},

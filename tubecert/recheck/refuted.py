@@ -106,6 +106,8 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
     """The plan comes closer to a face of the safe set than the radius, near the time of the witness."""
     if case.result.tube is None:
         return metric.stated(False, "no radius is stated")
+    if case.result.specification.coordinates:
+        return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
     rho, s = exact(case.result.tube.rho), case.system
     t = 0.0 if at is None else float(at)
     segment: Segment = case.curve.root

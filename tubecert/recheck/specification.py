@@ -146,8 +146,10 @@ class Specification:
     trajectory: Trajectory
     start: Start
     metric: Metric | Wanted
-    epsilon: Fraction
-    rho_a: Fraction
+    epsilon: Fraction | None  # None: with half-widths they follow from these
+    rho_a: Fraction | None
+    coordinates: bool  # whether the tube has coordinates of its own
+    half_widths: dict[str, Fraction]  # at most; empty if none are asked for
     loop: Loop
     hash: str
     content: str
@@ -173,15 +175,17 @@ def read_specification(node: Node) -> Specification:
     own["name"].text()
     plant = _plant(own["system"], own["safe_set"])
     n, m = len(plant.states), len(plant.inputs)
-    tube = own["tube"].closed("epsilon", "rho_a")
+    tube = _tube(own["tube"], plant)
     found = Specification(
         plant=plant,
         uncertainty=_uncertainty(own["uncertainty"], plant),
         trajectory=_trajectory(own["trajectory"], n, m),
         start=_start(own["initial_state"], n),
         metric=_metric(own["metric"], plant),
-        epsilon=_positive(tube["epsilon"]),
-        rho_a=_positive(tube["rho_a"]),
+        epsilon=tube.get("epsilon", _positive),
+        rho_a=tube.get("rho_a", _positive),
+        coordinates="coordinates" in tube,
+        half_widths=tube.get("half_widths", _widths) or {},
         loop=_loop(own["adaptation"], own["conditions"], n),
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in _IDLE}),
@@ -341,6 +345,25 @@ def _start(node: Node, n: int) -> Start:
     if ("at" in own) == ("within" in own):
         raise node.refused("must be `at` or `within`")
     return Start(own.get("at", lambda item: _several(item, n)), own.get("within", _not_negative))
+
+
+def _tube(node: Node, plant: Plant) -> Members:
+    """Radii in x, radii in coordinates that the certificate states, or half-widths, which have such coordinates."""
+    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths"))
+    own.get("coordinates", lambda item: item.word("auto"))
+    if "half_widths" not in own:
+        own.require("epsilon", "rho_a")
+        return own
+    own.require("coordinates")
+    widths = own["half_widths"]
+    widths.closed(optional=plant.states)
+    if "epsilon" in own or not widths.mapping():
+        raise node.refused("must have epsilon, or half-widths of some states")
+    return own
+
+
+def _widths(node: Node) -> dict[str, Fraction]:
+    return {name: _positive(value) for name, value in node.items()}
 
 
 # -- metric and loop -----------------------------------------------------------------------------------------------

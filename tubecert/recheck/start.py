@@ -10,7 +10,8 @@ from fractions import Fraction
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root
+from tubecert.recheck.around import Round
+from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root, sharp_norm
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
@@ -29,11 +30,16 @@ _GAP = 1 + Fraction(1, 500)  # more than the producer's gap
 _ALONG = "r#"  # no state can have this name
 
 
-def offset(s: System, curve: Curve) -> Ball:
-    """|x0 - x*(0)|, an upper bound."""
+def offset(place: Place) -> Ball:
+    """|S (x0 - x*(0))|, an upper bound."""
+    s, coordinates = place.system, place.coordinates
     if s.within is not None:
-        return exact(s.within)
-    return length(Program(_delta(s, curve), ()).run(()))
+        stretch = (
+            arb(1) if coordinates is None else sharp_norm([[exact(q) for q in row] for row in coordinates.S])
+        )
+        return stretch * exact(s.within)
+    apart = place.fields.vector([[d] for d in _delta(s, place.curve)])
+    return length(Program([d for (d,) in apart], ()).run(()))
 
 
 def _delta(s: System, curve: Curve) -> list[Term]:
@@ -42,20 +48,20 @@ def _delta(s: System, curve: Curve) -> list[Term]:
     return [number(q) - x for q, x in zip(s.x0, curve.start, strict=True)]
 
 
-def radius(place: Place, lower: Fraction, upper: Fraction) -> Outcome:
-    """rho >= sqrt(A/a)|x0 - x*(0)| + eps + rho_a for the true a and A over O(rho).
+def radius(place: Place, width: Fraction, lower: Fraction, upper: Fraction) -> Outcome:
+    """rho >= sqrt(A/a)|S (x0 - x*(0))| + eps + rho_a for the true a and A over the tube.
 
-    What is printed are bounds, rounded outward. Where rho is too small for them it may still serve for the true values:
-    then bounds that are as much sharper as needed are proven here.
+    `width` is eps + rho_a. What is printed are bounds, rounded outward. Where rho is too small for them it may still
+    serve for the true values: then bounds that are as much sharper as needed are proven here.
     """
-    s, rho = place.system, place.rho
+    rho = place.rho
     if lower <= 0 or upper <= 0 or rho <= 0:
         return stated(False, "the radius or a bound of the metric is not positive")
-    room, distance = exact(rho - s.epsilon - s.rho_a), offset(s, place.curve)
+    room, distance = exact(rho - width), offset(place)
     needed = root(exact(upper / lower)) * distance
     if room >= needed:
         return CONFIRMED
-    why = f"{float(needed.mid()) + float(s.epsilon + s.rho_a):.9g} is needed"
+    why = f"{float(needed.mid()) + float(width):.9g} is needed"
     if room <= 0 or not needed.is_finite():
         return Outcome(verdict="contradicted" if room < 0 or distance > 0 else "undecided", why=why)
     # A/a is too large by this factor
@@ -92,20 +98,23 @@ def _sharpened(place: Place, lower: Fraction, upper: Fraction, excess: Fraction)
 
 
 def _bounds(place: Place, lower: Fraction, upper: Fraction) -> tuple[Outcome, Outcome]:
-    """M >= lower I and M <= upper I over the tube."""
-    system, budget = place.system, place.budget
-    return lower_bound(system, lower, place.tube(), budget), upper_bound(system, upper, place.tube(), budget)
+    """M >= lower S'S and M <= upper S'S over the tube."""
+    system, budget, unit = place.system, place.budget, place.fields.unit
+    return (
+        lower_bound(system, lower, place.tube(), budget, unit),
+        upper_bound(system, upper, place.tube(), budget, unit),
+    )
 
 
 def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
     """The segment from x*(0) to x0 is at most `limit` long."""
     s = place.system
     if s.within is not None:
-        if limit < 0 or limit**2 >= upper * s.within**2:
+        known = place.coordinates is None and limit**2 >= upper * s.within**2
+        if limit < 0 or known or not s.within:
             return stated(limit >= 0, "it is negative")
-        return upper_bound(
-            s, (limit / s.within) ** 2, place.tube(), place.budget
-        )  # sqrt(A) r for a sharper A
+        # sqrt(A) r for the A of M in x; a segment that leaves the tube is at least dbar long, which is more than d0
+        return upper_bound(s, (limit / s.within) ** 2, place.tube(), place.budget)
     delta = _delta(s, place.curve)
     if all(d is NOUGHT for d in delta):
         return stated(limit >= 0, "it is negative")
@@ -170,4 +179,4 @@ def uncertainty(place: Place, limit: Fraction) -> Outcome:
     assert s.within is not None
     curve = place.curve
     still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
-    return prove(norms_below([at_start], limit), Tube(still, s.within, s.states, ()), place.budget)
+    return prove(norms_below([at_start], limit), Tube(still, Round(s.within), s.states, ()), place.budget)

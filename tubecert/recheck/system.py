@@ -49,8 +49,6 @@ class System:
     safe_set: dict[str, Range]
     x0: Numbers | None
     within: Fraction | None
-    epsilon: Fraction
-    rho_a: Fraction
     A_m: Rows | None  # None: auto
     smooth: Fraction | None
     kernel: str
@@ -129,8 +127,6 @@ def system_of(spec: Specification) -> System:
         safe_set=spec.plant.safe_set,
         x0=spec.start.at,
         within=spec.start.within,
-        epsilon=spec.epsilon,
-        rho_a=spec.rho_a,
         A_m=loop.A_m,
         smooth=loop.smooth,
         kernel=loop.kernel,

@@ -1,7 +1,7 @@
-"""The tube: all states within rho of the plan, as a domain that cuts boxes and tells which lie outside.
+"""The tube: all states around the plan, as a domain that cuts boxes and tells which lie outside.
 
-A box of states is compared with segments of the plan: with the gaps between box and segment in all other coordinates,
-a point of the tube is at most sqrt(rho^2 - gaps^2) from the segment in each one. Segments are halved while they are
+A box of states is compared with segments of the plan: what the offsets between them can be is cut to what the tube is
+around one point (`around`: a ball, or an ellipsoid with half-widths). Segments are halved while they are
 long against the box. Where a test depends on t or on u*, time is a coordinate and selects the segments.
 """
 
@@ -9,35 +9,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 
 from flint import arb
 
-from tubecert.recheck.balls import Ball, ceiling, exact, floor, length
+from tubecert.recheck.around import Around
+from tubecert.recheck.balls import Ball, ceiling, floor
 from tubecert.recheck.cover import Range, State, as_ball
 from tubecert.recheck.curve import Curve, Segment
 
 TIME = "t"
 
-# floats are correctly rounded: what they lose over a few operations is far below these factors
-_LESS, _MORE = 1 - 1e-14, 1 + 1e-14
 _MOST = 256  # segments that are looked at for one box: longer ones cover as well
 _COARSE = 0.25  # a segment may be so long against the box
 
 
 class Tube:
-    """O(rho) over states, inputs (standing for u*), time, and ranges that do not depend on the plan."""
+    """The tube over states, inputs (standing for u*), time, and ranges that do not depend on the plan."""
 
     def __init__(
         self,
         curve: Curve,
-        rho: Fraction,
+        around: Around,
         states: Sequence[str],
         inputs: Sequence[str],
         free: Mapping[str, Range] | None = None,
     ) -> None:
-        self._curve, self._rho = curve, exact(rho)
-        self._square = math.nextafter(float(rho * rho), math.inf)
+        self._curve, self._around = curve, around
         self._states = {name: i for i, name in enumerate(states)}
         self._inputs = {name: j for j, name in enumerate(inputs)}
         self._free = {v: (as_ball(lo), as_ball(hi)) for v, (lo, hi) in (free or {}).items()}
@@ -49,11 +46,12 @@ class Tube:
 
     def start(self, variables: tuple[str, ...]) -> list[State]:
         """One box around everything."""
-        root, rho = self._curve.root, ceiling(self._rho)
+        root = self._curve.root
         box = []
         for v in variables:
             if v in self._states:
                 lo, hi = root.x[self._states[v]]
+                rho = self._around.extent(self._states[v])
                 box.append((math.nextafter(lo - rho, -math.inf), math.nextafter(hi + rho, math.inf)))
             elif v in self._inputs:
                 box.append(root.u[self._inputs[v]])
@@ -105,20 +103,17 @@ class Tube:
         self, segment: Segment, columns: list[tuple[int, int]], box: list[tuple[float, float]]
     ) -> dict[int, tuple[float, float]] | None:
         """Where the tube around a segment can meet the box; None if nowhere."""
-        squares = []
-        for i, k in columns:
-            gap = max(0.0, box[i][0] - segment.x[k][1], segment.x[k][0] - box[i][1]) * _LESS
-            squares.append(gap * gap * _LESS)
-        if sum(squares) * _LESS > self._square:
+        offsets = [_apart(box[i], segment.x[k]) for i, k in columns]
+        cut = self._around.near([k for _, k in columns], offsets)
+        if cut is None:
             return None
-        found = {}
-        for place, (i, k) in enumerate(columns):
-            others = sum(squares[:place]) + sum(squares[place + 1 :])
-            room = max(0.0, self._square - others * _LESS)
-            half = math.sqrt(room) * _MORE
-            lo, hi = segment.x[k]
-            found[i] = math.nextafter(lo - half, -math.inf), math.nextafter(hi + half, math.inf)
-        return found
+        return {
+            i: (
+                math.nextafter(segment.x[k][0] + lo, -math.inf),
+                math.nextafter(segment.x[k][1] + hi, math.inf),
+            )
+            for (i, k), (lo, hi) in zip(columns, cut, strict=True)
+        }
 
     @staticmethod
     def _is_long(
@@ -139,13 +134,9 @@ class Tube:
         inside = [0.5 * lo + 0.5 * hi for lo, hi in box]
         columns = [(i, self._states[v]) for i, v in enumerate(variables) if v in self._states]
         offset = [arb(inside[i]) - x[k] for i, k in columns]
-        size = length(offset)
-        scale = 1.0
-        if not size <= self._rho:
-            scale = float((self._rho / size.upper()).lower()) * (1 - 1e-9) if size > 0 else 0.0
         at = [arb(value) for value in inside]
-        moved = [z * scale for z in offset]
-        if not length(moved) <= self._rho:
+        moved = self._around.inside([k for _, k in columns], offset)
+        if moved is None:
             return None
         for (i, k), z in zip(columns, moved, strict=True):
             at[i] = x[k] + z
@@ -173,7 +164,7 @@ class Tube:
             max(box[i][1] - lo, hi - box[i][0], 0.0) for (i, _), (lo, hi) in zip(columns, hull, strict=True)
         ]
         found = list(caused)
-        if sum(x * x for x in far) > self._square:
+        if self._around.crosses([k for _, k in columns], far):
             for i, _ in columns:
                 found[i] += spread[i]
         if TIME in variables and self._curve.moves:
@@ -185,6 +176,11 @@ class Tube:
         for i in tied:
             found[i] = 0.0
         return found
+
+
+def _apart(box: tuple[float, float], plan: tuple[float, float]) -> tuple[float, float]:
+    """x - x* for x in a box and x* in a segment, outward."""
+    return math.nextafter(box[0] - plan[1], -math.inf), math.nextafter(box[1] - plan[0], math.inf)
 
 
 def _joined(a: tuple[float, float] | None, b: tuple[float, float]) -> tuple[float, float]:
