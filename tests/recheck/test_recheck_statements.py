@@ -24,6 +24,7 @@ from tubecert.recheck import boxes
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.claims import of_certified
+from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Boxed, prove
 from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.pencils import GainBelow
@@ -251,7 +252,9 @@ def test_every_branch_of_a_kink_counts(name):
     domain = Boxed({"x": (Fraction(-1), Fraction(1)), "y": (Fraction(-1), Fraction(1))})
     for more, holds in ((LITTLE, True), (-LITTLE, False)):
         assert prove(norms_below([h], top * (1 + more)), domain, 3_000).holds is holds
-        lipschitz = LipschitzBelow([h[0][0]], ["x", "y"], slope * (1 + more))
+        lipschitz = LipschitzBelow(
+            [h[0][0]], Fields(SimpleNamespace(states=("x", "y")), None), slope * (1 + more)
+        )
         assert prove(lipschitz, domain, 3_000).holds is holds
 
 
