@@ -9,7 +9,7 @@ import tubecert
 
 # what is there now, outside the serialiser and recheck; lower a number when it falls (python tests/house/counts.py)
 MOST = {
-    "mappings of Any": 73,
+    "mappings of Any": 71,
     "string-key reads": 265,
     "Any": 310,
     "asserts that something is not None": 19,

@@ -32,6 +32,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         name: numbers.positive(flag(name), given[name])
         for name in ("rate", "condition_number", "rho_a", "epsilon", "deadline")
     }
+    seconds = values.pop("deadline")
     budget = numbers.count("--budget", given["budget"])
     numbers.check()
     target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
@@ -61,7 +62,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
             options,
             report,
             sweep=bool(given["sweep"] or given["plot"]),
-            deadline=deadline_after(values["deadline"]),
+            deadline=deadline_after(seconds),
             told=lambda so_far: _tell(so_far, system, terminal, output),
         )
     if found.file is not None and target != certificate.STDOUT:

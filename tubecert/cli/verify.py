@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec
 
 _METRICS = (".json", ".csv", ".npz", ".mat")
-_BUDGET = 2_000_000
+_BUDGET, _GAP = 2_000_000, Fraction(1, 1000)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,15 +33,26 @@ class Case:
     spec: Spec
 
 
-def run(given: Mapping[str, Any], output: Output) -> ExitCode:
-    """Verify every metric; `given` holds the options by the names of their parameters."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """The command line."""
+
+    files: Sequence[str]
+    rate: str | None
+    gap: str
+    budget: str | None
+    target: str | None
+
+
+def run(given: Given, output: Output) -> ExitCode:
+    """Verify every metric."""
     numbers = Numbers()
-    rate = numbers.positive("--rate", given["rate"])
-    gap = numbers.positive("--gap", given["gap"], below=1)
-    budget = numbers.count("--budget", given["budget"])
+    rate = numbers.positive("--rate", given.rate)
+    gap = numbers.positive("--gap", given.gap, below=1)
+    budget = numbers.count("--budget", given.budget)
     numbers.check()
-    cases = list(_cases(given["files"], rate))
-    target = given["output"]
+    cases = list(_cases(given.files, rate))
+    target = given.target
     if target is not None:
         if len(cases) != 1:
             raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
@@ -51,8 +62,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert.pipeline.verification import verify
     from tubecert.report import progress
 
-    assert gap is not None
-    effort = Effort(gap=float(gap), budget=budget or _BUDGET)
+    effort = Effort(gap=float(gap or _GAP), budget=budget or _BUDGET)
     terminal = Terminal.stderr(color=output.color)
     found: list[tuple[str, Verified]] = []
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:

@@ -56,9 +56,8 @@ def verify(
     how: Output,
 ) -> None:
     """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
-    given = dict(locals())
     with guarded(how):
-        from tubecert.cli.verify import run
+        from tubecert.cli.verify import Given, run
 
-        code = run(given, how)
+        code = run(Given(files=files, rate=rate, gap=gap, budget=budget, target=output), how)
     raise typer.Exit(code)

@@ -15,7 +15,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
 from tubecert.kinds import DISTANCE
-from tubecert.kinds.data import Pair
+from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan
@@ -65,7 +65,7 @@ def judged_row(row: Row, question: Question) -> Row:
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
-    decisive = next((found for section in end.sections if (found := _pair(question, section))), None)
+    decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
         served=distance.verdict is Verdict.CERTIFIED,
@@ -104,11 +104,11 @@ def _judged(question: Question, enclosed: Enclosed) -> Ending:
     return Ending(enclosed=enclosed, sections=tuple(sections.values()), claim=claim, verdict=verdict)
 
 
-def _pair(question: Question, section: Section[Any]) -> Pair | None:
+def _pair(question: Question, section: SectionData) -> Pair | None:
     """The gains of a kind that a metric is judged by: those of least adaptation rate where it has one."""
     options = question.options
     fixed = options.bandwidth is not None or options.adaptation_rate is not None
-    pairs = section.data().pairs(asked=fixed)
+    pairs = section.pairs(asked=fixed)
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 

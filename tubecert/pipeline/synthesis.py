@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
-from typing import Any, Literal
+from typing import Literal
 
 from tubecert.certificate.metric_file import metric_file
 from tubecert.certificate.result import SolverData
@@ -52,7 +52,7 @@ from tubecert.pipeline.candidates import judged_row
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
-from tubecert.records import exact_json
+from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.memory import Memory
@@ -331,19 +331,21 @@ class SynthesisRun:
 
     def _none_certified(self) -> NoneCertified | None:
         """That metrics were found, and what each of them lacks; None if none was found."""
-        rows = [row for row in self._table() if row.claim is not None and row.floor == "identity"]
-        if not rows:
+        failed = [
+            (row, row.claim)
+            for row in self._table()
+            if row.claim is not None and row.verdict is not None and row.floor == "identity"
+        ]
+        if not failed:
             return None
-        slow, fast = rows[0], rows[-1]
-        assert slow.claim is not None
-        assert fast.claim is not None
+        (slow, slow_claim), (fast, fast_claim) = failed[0], failed[-1]
         return NoneCertified(
-            compared=len(rows),
+            compared=len(failed),
             slowest=slow.rate,
             fastest=fast.rate,
-            slow=slow.claim,
+            slow=slow_claim,
             slow_verdict=slow.verdict or Verdict.UNDECIDED,
-            fast=fast.claim,
+            fast=fast_claim,
             fast_verdict=fast.verdict or Verdict.UNDECIDED,
         )
 
@@ -410,7 +412,7 @@ def _solver(metric: VerifiedMetric) -> SolverData:
     )
 
 
-def _metric_data(metric: VerifiedMetric) -> dict[str, Any]:
+def _metric_data(metric: VerifiedMetric) -> dict[str, Json]:
     return {
         "rate": exact_json(metric.rate),
         "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from tubecert.claims import MetricKilling
 from tubecert.printable import printable_json, visible
-from tubecert.records import to_json
+from tubecert.records import Json, to_json
 from tubecert.report.layout import indented
 from tubecert.report.numbers import down, exact, up
 from tubecert.report.sections import VERDICTS, place
@@ -79,7 +79,7 @@ def as_json(found: Sequence[tuple[str, Verified]]) -> str:
     return printable_json(json.dumps([_data(*each) for each in found], indent=1, ensure_ascii=False)) + "\n"
 
 
-def _data(file: str, found: Verified) -> dict[str, Any]:
+def _data(file: str, found: Verified) -> dict[str, Json]:
     numbers = ("largest_rate", "condition_number", "lower", "upper")
     known = {key: getattr(found, key) for key in numbers}
     return {
