@@ -5,7 +5,10 @@ from __future__ import annotations
 import copy
 
 import pytest
-from rechecked import certified, examine, failing, respecified
+from rechecked import certified, examine, failing, respecified, sealed
+from systems import SMALL
+
+from tubecert.errors import TubecertError
 
 FRICTION = """
 tubecert: 1
@@ -43,3 +46,55 @@ def test_another_function_is_not_confirmed(old, new):
         f[1], h[0] = f[1].replace(old, new), h[0].replace(old, new)
 
     assert failing(examine(respecified(document, changed)))
+
+
+BOX = SMALL.replace("{at: [0.05, 0]}", "{box: {x: [-0.03, 0.05], y: [-1 deg, 1 deg]}}")
+BENT = BOX.replace('[[1, "-0.3"], ["-0.3", 2]]', '[["1 + 0.01*cos(x)", "-0.3"], ["-0.3", 2]]')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [BOX, BENT], ids=["flat", "bent"])
+def test_a_box_of_starts_is_confirmed_and_a_smaller_d0_is_not(text):
+    document = certified(text, conditions="distance")
+    assert document["result"]["verdict"] == "certified"
+    assert failing(examine(document)) == []
+    for name in ("initial_distance", "h_initial"):
+        lying = copy.deepcopy(document)
+        constant = lying["result"]["constants"][name]
+        constant["above"] *= 0.98
+        constant["below"] = min(constant["below"], constant["above"])
+        assert any(name in claim for claim, _ in failing(examine(sealed(lying))))
+
+
+@pytest.mark.slow
+def test_a_wider_box_is_another_claim():
+    """The same constants for starts that are further away: every claim about the start fails, none is believed."""
+    document = certified(BOX, conditions="distance")
+
+    def wider(effective):
+        effective["initial_state"]["box"]["x"][1] = "0.06"
+
+    names = [name for name, _ in failing(examine(respecified(document, wider)))]
+    assert any("initial_distance" in name for name in names)
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        {"x": ["0", "0.1"]},
+        {"x": ["0", "0"], "y": ["0", "0"]},
+        {"x": ["0.1", "0"], "y": ["0", "1"]},
+        {"x": ["0", "0.1"], "y": ["0"]},
+        {"x": ["0", "0.1"], "y": ["0", "0"], "z": ["0", "0"]},
+        [["0", "1"], ["0", "1"]],
+    ],
+)
+def test_a_box_of_another_form_is_refused(box):
+    document = copy.deepcopy(certified(BOX, conditions="distance"))
+
+    def other(effective):
+        effective["initial_state"]["box"] = box
+
+    with pytest.raises(TubecertError) as raised:
+        examine(respecified(document, other))
+    assert raised.value.findings[0].code == "TC603"

@@ -1,4 +1,4 @@
-"""Where the state may start: at a point, or anywhere within a radius of the plan's start.
+"""Where the state may start: at a point, anywhere in a box, or anywhere within a radius of the plan's start.
 
 Either answers with |x*(0) - x(0)|, with d0 (any upper bound of the Riemannian distance), and with a bound of
 |h(0, x(0))|.
@@ -7,9 +7,10 @@ Implements: d0 and H0 of theory section 4. Trusted: yes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +24,7 @@ from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, wh
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.tape import Tape
 from tubecert.enclosure.taylor import MatrixFunction
-from tubecert.expression import ZERO, Expression, constant, substitute, symbol
+from tubecert.expression import ZERO, Expression, constant, free_symbols, root_above, substitute, symbol
 from tubecert.expression.matrix import column
 from tubecert.model import TIME
 from tubecert.trajectory import Plan
@@ -134,6 +135,46 @@ class StartWithin:
         instant = (Fraction(0), Fraction(0))
         ball = replace(suprema, plan=still, rho=radius, time=instant, coordinates=None, sides=None)
         return ball.norms("h_initial", [column(suprema.h)])
+
+
+@dataclass(frozen=True, slots=True)
+class StartBox:
+    """x(0) is any point of a box, `sides` (n pairs): what is convex in x(0) is largest at a corner."""
+
+    sides: tuple[tuple[Fraction, Fraction], ...]
+
+    def offset(self, suprema: Suprema) -> Interval:
+        """|x*(0) - x(0)| at the corner where it is largest."""
+        found = [KnownStart(corner).offset(suprema) for corner in self._corners()]
+        return Interval(max(float(x.lo) for x in found), max(float(x.hi) for x in found))
+
+    def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
+        """Under a constant metric the length of the longest segment from x*(0) to a corner.
+
+        Else that of the segment to the centre, and from there sqrt(A) times the radius of the box.
+        """
+        if not free_symbols(e for row in suprema.model.W for e in row):
+            found = [KnownStart(corner).distance(suprema, metric) for corner in self._corners()]
+            return Constant(below=max(c.below for c in found), above=max(c.above for c in found))
+        centre = tuple((low + high) / 2 for low, high in self.sides)
+        first = KnownStart(centre).distance(suprema, metric)
+        square = sum(((high - low) ** 2 / 4 for low, high in self.sides), start=Fraction(0))
+        rest = StartWithin(root_above(square)).distance(suprema, metric)
+        whole = Interval.exact(first.above) + Interval.exact(rest.above)
+        return Constant(below=first.below, above=float(whole.hi))
+
+    def uncertainty(self, suprema: Suprema) -> Constant:
+        """sup |h(0, x)| over the box."""
+        sides = dict(zip(suprema.model.states, self.sides, strict=True))
+        known = {name: constant(low) for name, (low, high) in sides.items() if low == high}
+        start = SumOfNorms([column(substitute(suprema.h, {TIME: ZERO, **known}))])
+        if start.is_zero:
+            return Constant.exactly(0.0)
+        found = supremum(start, BoxDomain(sides), suprema.effort)
+        return Constant(below=max(found.below, 0.0), above=found.above)
+
+    def _corners(self) -> Iterator[tuple[Fraction, ...]]:
+        return product(*(dict.fromkeys(side) for side in self.sides))
 
 
 def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:

@@ -35,14 +35,15 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """The initial state that is claimed about: a point, or anything within a radius of the plan's start."""
+    """The initial state that is claimed about: a point, a box, or anything within a radius of the plan's start."""
 
     at: tuple[str, ...] | None = None
     within: str | None = None
+    box: Mapping[str, tuple[str, str]] | None = None
 
     def __post_init__(self) -> None:
-        if (self.at is None) == (self.within is None):
-            raise ValueError("a start is either a point or a radius")
+        if (self.at is None) + (self.within is None) + (self.box is None) != 2:
+            raise ValueError("a start is either a point, a radius or a box")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

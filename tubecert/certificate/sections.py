@@ -83,15 +83,22 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
             name: (number_text(low), number_text(high))
             for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
         },
-        start=Start(at=tuple(map(number_text, spec.x0)))
-        if spec.within is None
-        else Start(within=number_text(spec.within)),
+        start=_start(spec),
         uncertainty="bounds"
         if spec.uncertainty.h is None
         else "expression"
         if bounds is None or bounds.h is None
         else "expression_or_bounds",
     )
+
+
+def _start(spec: Spec) -> Start:
+    if spec.within is not None:
+        return Start(within=number_text(spec.within))
+    if not spec.start_box:
+        return Start(at=tuple(map(number_text, spec.x0)))
+    sides = zip(spec.states, spec.start_box, strict=True)
+    return Start(box={name: (number_text(low), number_text(high)) for name, (low, high) in sides})
 
 
 def _period_text(q: Fraction, of_pi: bool) -> str:

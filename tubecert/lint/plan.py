@@ -88,10 +88,12 @@ def _excess(spec: Spec, points: Array) -> tuple[int, int, float]:
 
 def _start(spec: Spec) -> Iterator[Finding]:
     """The initial state, exactly."""
-    for i, (value, (low, high)) in enumerate(zip(spec.x0, spec.safe_set, strict=True)):
-        if spec.within is None and not low <= value <= high:
+    ends = spec.start_box or tuple((value, value) for value in spec.x0)
+    for i, ((least, most), (low, high)) in enumerate(zip(ends, spec.safe_set, strict=True)):
+        if spec.within is None and not low <= least <= most <= high:
+            value = least if least < low else most
             name = spec.states[i]
-            path = f"initial_state.at[{i}]"
+            path = f"initial_state.{'box' if spec.start_box else 'at'}[{i}]"
             yield Finding(
                 code=codes.START_OUTSIDE,
                 message=f"the initial state is not in the safe set: {name} = {number_text(value)[:40]}",
@@ -123,7 +125,8 @@ def _least_radius(spec: Spec) -> float:
 def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     offset = 0.0
     if spec.within is None and spec.trajectory.task is None:
-        offset = float(np.linalg.norm(floats(spec.x0) - curve.x[0]))
+        spread = floats([(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0))
+        offset = float(np.linalg.norm(np.abs(floats(spec.x0) - curve.x[0]) + spread))
     rho = _least_radius(spec) + offset
     k, i, beyond = _excess(spec, curve.x)
     if not math.isfinite(rho) or beyond + rho <= _ROUNDING * rho:

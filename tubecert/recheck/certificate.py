@@ -20,12 +20,13 @@ from tubecert.recheck.orientation import elasticities, run, synthesis
 from tubecert.recheck.plans import Plan, read_plan
 from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_reason
 from tubecert.recheck.specification import (
-    Numbers,
     Range,
     Rows,
     Specification,
+    Start,
     Wanted,
     read_specification,
+    read_start,
 )
 
 MEASURED = (
@@ -65,7 +66,7 @@ class Claim:
     for_all_time: str | None
     period: str | None
     domain: dict[str, Range]
-    start: tuple[Numbers | None, Fraction | None]  # x(0), or how far from x*(0) it may be
+    start: Start
     uncertainty: str
 
 
@@ -244,14 +245,13 @@ def _complete(node: Node, result: Result) -> Result:
 
 def _claim(node: Node, states: tuple[str, ...]) -> Claim:
     own = node.closed("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
-    start = own["start"].closed(optional=("at", "within"))
     return Claim(
         id=own["id"].text(),
         horizon=own.known("horizon", Node.exact),
         for_all_time=own.known("for_all_time", Node.text),
         period=own.known("period", Node.text),
         domain=_box(own["domain"], states, Node.exact),
-        start=(start.get("at", Node.exacts), start.get("within", Node.exact)),
+        start=read_start(own["start"], states),
         uncertainty=own["uncertainty"].text(),
     )
 

@@ -30,7 +30,7 @@ def own_claim(spec: Specification) -> Claim:
         for_all_time=for_all_time,
         period=period,
         domain=spec.plant.safe_set,
-        start=(spec.start.at, spec.start.within),
+        start=spec.start,
         uncertainty=spec.uncertainty.words,
     )
 

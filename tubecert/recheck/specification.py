@@ -21,6 +21,7 @@ Rows = tuple[Numbers, ...]
 
 _IDLE = ("name", "expect", "simulation", "obstacles")
 _MOST_STATES = 32
+_MOST_WIDE = 10  # sides of a box of starts: all its corners are examined
 _LOCKED = ("rho", "bandwidth", "adaptation_rate", "sample_time")
 
 
@@ -122,10 +123,11 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """x(0): a point, or anything within a radius of x*(0)."""
+    """x(0): a point, anything within a radius of x*(0), or anything in a box."""
 
     at: Numbers | None
     within: Fraction | None
+    box: dict[str, Range] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +182,7 @@ def read_specification(node: Node) -> Specification:
         plant=plant,
         uncertainty=_uncertainty(own["uncertainty"], plant),
         trajectory=_trajectory(own["trajectory"], n, m),
-        start=_start(own["initial_state"], n),
+        start=read_start(own["initial_state"], plant.states),
         metric=_metric(own["metric"], plant),
         epsilon=tube.get("epsilon", _positive),
         rho_a=tube.get("rho_a", _positive),
@@ -340,11 +342,30 @@ def _planned(node: Node, n: int, m: int) -> Planned:
     )
 
 
-def _start(node: Node, n: int) -> Start:
-    own = node.closed(optional=("at", "within"))
-    if ("at" in own) == ("within" in own):
-        raise node.refused("must be `at` or `within`")
-    return Start(own.get("at", lambda item: _several(item, n)), own.get("within", _not_negative))
+def read_start(node: Node, states: Sequence[str]) -> Start:
+    """The start; a claim says it in the same words."""
+    own = node.closed(optional=("at", "within", "box"))
+    if len(node.mapping()) != 1:
+        raise node.refused("must be `at`, `within` or `box`")
+    return Start(
+        own.get("at", lambda item: _several(item, len(states))),
+        own.get("within", _not_negative),
+        own.get("box", lambda item: _start_box(item, states)),
+    )
+
+
+def _start_box(node: Node, states: Sequence[str]) -> dict[str, Range]:
+    """A range for every state, which may be a point, but not all of them."""
+    own = node.closed(*states)
+    box: dict[str, Range] = {}
+    for name in states:
+        low, high = (end.exact() for end in own[name].pair())
+        if low > high:
+            raise own[name].refused("is an empty range")
+        box[name] = low, high
+    if not 0 < sum(low < high for low, high in box.values()) <= _MOST_WIDE:
+        raise node.refused(f"must have a width in 1 to {_MOST_WIDE} states")
+    return box
 
 
 def _tube(node: Node, plant: Plant) -> Members:

@@ -7,11 +7,12 @@ length is at most width times the root of the mean of g(s) = delta'M delta; that
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import product
 
 from flint import arb, arb_mat
 
 from tubecert.recheck.around import Round
-from tubecert.recheck.balls import Ball, between, exact, length, magnitude, root, sharp_norm
+from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root, sharp_norm
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
@@ -19,6 +20,7 @@ from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
+from tubecert.recheck.specification import Numbers, Range
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import NOUGHT, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube
@@ -38,14 +40,27 @@ def offset(place: Place) -> Ball:
             arb(1) if coordinates is None else sharp_norm([[exact(q) for q in row] for row in coordinates.S])
         )
         return stretch * exact(s.within)
-    apart = place.fields.vector([[d] for d in _delta(s, place.curve)])
-    return length(Program([d for (d,) in apart], ()).run(()))
+    sizes = []
+    for point in _points(s):
+        apart = place.fields.vector([[d] for d in _delta(point, place.curve)])
+        sizes.append(length(Program([d for (d,) in apart], ()).run(())))
+    largest = sizes[0]
+    for size in sizes[1:]:
+        largest = larger(largest, size)
+    return largest
 
 
-def _delta(s: System, curve: Curve) -> list[Term]:
+def _points(s: System) -> list[Numbers]:
+    """x0, or the corners of the box of starts, where everything that is convex in x(0) is largest."""
+    if s.box is None:
+        assert s.x0 is not None
+        return [s.x0]
+    return list(product(*(dict.fromkeys(s.box[name]) for name in s.states)))
+
+
+def _delta(x0: Numbers, curve: Curve) -> list[Term]:
     """x0 - x*(0), exact."""
-    assert s.x0 is not None
-    return [number(q) - x for q, x in zip(s.x0, curve.start, strict=True)]
+    return [number(q) - x for q, x in zip(x0, curve.start, strict=True)]
 
 
 def radius(place: Place, width: Fraction, lower: Fraction, upper: Fraction) -> Outcome:
@@ -107,7 +122,7 @@ def _bounds(place: Place, lower: Fraction, upper: Fraction) -> tuple[Outcome, Ou
 
 
 def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
-    """The segment from x*(0) to x0 is at most `limit` long."""
+    """The segment from x*(0) to x0 is at most `limit` long; with a constant metric, that to every corner."""
     s = place.system
     if s.within is not None:
         known = place.coordinates is None and limit**2 >= upper * s.within**2
@@ -115,7 +130,40 @@ def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
             return stated(limit >= 0, "it is negative")
         # sqrt(A) r for the A of M in x; a segment that leaves the tube is at least dbar long, which is more than d0
         return upper_bound(s, (limit / s.within) ** 2, place.tube(), place.budget)
-    delta = _delta(s, place.curve)
+    if s.box is not None and not s.flat:
+        return _from_centre(place, limit, upper, s.box)
+    for point in _points(s):
+        found = _segment(place, point, limit)
+        if not found.holds:
+            return found
+    return CONFIRMED
+
+
+def _from_centre(place: Place, limit: Fraction, upper: Fraction, box: dict[str, Range]) -> Outcome:
+    """d0 <= the segment to the centre of the box + sqrt(A) r, r its radius: a corner is no further from the centre."""
+    s = place.system
+    sides = [box[name] for name in s.states]
+    delta = _delta(tuple((low + high) / 2 for low, high in sides), place.curve)
+    first = arb(0)
+    if not all(d is NOUGHT for d in delta):
+        _, first = _Speed(s, place.curve, delta).over_pieces(_PIECES[-2])
+    room = exact(limit) - first.upper()
+    square = sum(((high - low) ** 2 / 4 for low, high in sides), start=Fraction(0))
+    if not room > 0:
+        return Outcome(
+            verdict="undecided", why=f"the segment to the centre alone is {float(first.upper()):.9g} long"
+        )
+    if place.coordinates is None and room * room >= exact(upper * square):
+        return CONFIRMED
+    sharper = Fraction(float((room * room).lower())) * (1 - Fraction(1, 10**15)) / square
+    found = upper_bound(s, sharper, place.tube(), place.budget)
+    return CONFIRMED if found.holds else Outcome(verdict="undecided", why=found.why, boxes=found.boxes)
+
+
+def _segment(place: Place, point: Numbers, limit: Fraction) -> Outcome:
+    """The segment from x*(0) to one point."""
+    s = place.system
+    delta = _delta(point, place.curve)
     if all(d is NOUGHT for d in delta):
         return stated(limit >= 0, "it is negative")
     speed = _Speed(s, place.curve, delta)
@@ -176,6 +224,9 @@ def uncertainty(place: Place, limit: Fraction) -> Outcome:
     if s.x0 is not None:
         fixed = matrix_replaced(at_start, dict(zip(s.states, map(number, s.x0), strict=True)))
         return prove(norms_below([fixed], limit), Boxed({}), 1)
+    if s.box is not None:
+        known = {name: number(low) for name, (low, high) in s.box.items() if low == high}
+        return prove(norms_below([matrix_replaced(at_start, known)], limit), Boxed(s.box), place.budget)
     assert s.within is not None
     curve = place.curve
     still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)

@@ -49,6 +49,7 @@ class System:
     safe_set: dict[str, Range]
     x0: Numbers | None
     within: Fraction | None
+    box: dict[str, Range] | None
     A_m: Rows | None  # None: auto
     smooth: Fraction | None
     kernel: str
@@ -127,6 +128,7 @@ def system_of(spec: Specification) -> System:
         safe_set=spec.plant.safe_set,
         x0=spec.start.at,
         within=spec.start.within,
+        box=spec.start.box,
         A_m=loop.A_m,
         smooth=loop.smooth,
         kernel=loop.kernel,

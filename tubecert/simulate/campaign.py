@@ -160,7 +160,7 @@ def _uncertainty(setting: Setting, seed: int, replay: int | None) -> tuple[Array
     if replay is not None:
         found = case(setting, seed, replay)
         return found.start, disturbance_of(setting, [found]), RANDOM.format(run=replay, seed=seed)
-    start = _surface(setting) if setting.within else setting.x0
+    start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
     return start, Disturbance.from_expressions(setting.h, setting.model, 1), SPECIFIED
 
 
@@ -172,12 +172,6 @@ def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
         comparison=compare(setting, runs, loop.promise),
         clearance=of_curve(setting.spec, runs.t, runs.x[0]),
     )
-
-
-def _surface(setting: Setting) -> Array:
-    """A start at the rim of the ball that is allowed."""
-    n = len(setting.centre)
-    return np.asarray(setting.centre + setting.within * np.ones(n) / np.sqrt(n))
 
 
 def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None) -> Attack:

@@ -64,13 +64,16 @@ def case(setting: Setting, seed: int, number: int) -> Case:
 
 
 def _random_start(setting: Setting, rng: np.random.Generator) -> Array:
-    """The initial state, or a point of the ball that is allowed (its surface, half of the time)."""
-    if not setting.within:
-        return setting.x0
+    """The initial state, or a point of the ball or the box that is allowed (its surface, half of the time)."""
     n = len(setting.x0)
+    if not setting.varied:
+        return setting.x0
+    if not setting.within:
+        part = rng.uniform(-1, 1, n)
+        return setting.started(np.sign(part) if rng.random() < 0.5 else part)
     direction = rng.normal(size=n)
     radius = 1.0 if rng.random() < 0.5 else rng.random() ** (1 / n)
-    return np.asarray(setting.centre + setting.within * radius * direction / np.linalg.norm(direction))
+    return setting.started(direction, radius)
 
 
 def disturbance_of(setting: Setting, cases: Sequence[Case]) -> Disturbance:
@@ -130,7 +133,7 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
     """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     problem = with_times(loop.problem, 2)
-    n = len(setting.x0) if setting.within else 0
+    n = len(setting.x0) if setting.varied else 0
     size = genes_of(setting.uncertainty) + n
     genes, worst = rng.random((_POPULATION, size)), np.full(_POPULATION, -np.inf)
     kept = np.zeros((0, size))
@@ -160,10 +163,6 @@ def _children(parents: Array, spread: float, rng: np.random.Generator) -> Array:
 def _bred(setting: Setting, genes: Array) -> Case:
     kind = setting.uncertainty
     own = genes_of(kind)
-    start = setting.x0
-    if setting.within:
-        direction = 2 * genes[own:] - 1
-        length = float(np.linalg.norm(direction)) or 1.0
-        start = setting.centre + setting.within * direction / length
+    start = setting.started(2 * genes[own:] - 1) if setting.varied else setting.x0
     member = adversary(kind, genes[:own], setting.S @ start, setting.S @ setting.centre, setting.layer)
     return Case(start=start, member=member)

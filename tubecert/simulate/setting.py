@@ -71,7 +71,10 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
-    """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0."""
+    """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
+
+    `spread` (n,): how far from x0 they may be, state by state.
+    """
 
     spec: Spec
     certified: Certified
@@ -82,9 +85,22 @@ class Setting:
     x0: Array
     centre: Array
     within: float
+    spread: Array
     uncertainty: Class
     h: tuple[Expression, ...] | None
     layer: float
+
+    @property
+    def varied(self) -> bool:
+        """Whether there is more than one start."""
+        return self.within > 0 or bool(self.spread.any())
+
+    def started(self, direction: Array, radius: float = 1.0) -> Array:
+        """The start (n,) in a direction: at a part of the radius of the ball, or in the box (|direction_i| <= 1)."""
+        if self.within:
+            length = float(np.linalg.norm(direction)) or 1.0
+            return np.asarray(self.centre + self.within * radius * direction / length)
+        return np.asarray(self.x0 + self.spread * direction)
 
     @property
     def rho(self) -> float:
@@ -139,6 +155,7 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
         x0=np.array([float(value) for value in spec.x0]),
         centre=Tape(plan.start, ()).run_floats([], ()),
         within=0.0 if spec.within is None else float(spec.within),
+        spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
         uncertainty=class_of(certified, len(spec.states), len(spec.inputs)),
         h=None if wanted is None else tuple(term.expression for term in wanted),
         layer=_LAYER * certified["metric_input_gain"] * certified.reach,

@@ -25,7 +25,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
         "safe_set": {name: _numbers(side) for name, side in zip(spec.states, spec.safe_set, strict=True)},
         "uncertainty": _uncertainty(spec),
         "trajectory": _trajectory(spec),
-        "initial_state": _given(within=spec.within) if spec.within is not None else {"at": _numbers(spec.x0)},
+        "initial_state": _initial_state(spec),
         "tube": _tube(spec.tube),
         "adaptation": {
             "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),
@@ -70,6 +70,14 @@ def _uncertainty(spec: Spec) -> dict[str, Any]:
     if (bounds := spec.uncertainty.bounds) is not None:
         data["bounds"] = _given(h=bounds.h, h_x=bounds.h_x, h_t=bounds.h_t)
     return data
+
+
+def _initial_state(spec: Spec) -> dict[str, Any]:
+    if spec.within is not None:
+        return _given(within=spec.within)
+    if not spec.start_box:
+        return {"at": _numbers(spec.x0)}
+    return {"box": {name: _numbers(side) for name, side in zip(spec.states, spec.start_box, strict=True)}}
 
 
 def _trajectory(spec: Spec) -> dict[str, Any]:

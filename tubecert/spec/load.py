@@ -143,7 +143,8 @@ def _read_named(
     uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
-    x0, within = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
+    x0 = start.x0
     if box is not None and not entries.keys() & {"uncertainty", "trajectory"}:  # as `load_system` leaves it
         plan, uncertainty = at_rest(entries["safe_set"], box, len(names.inputs))
         x0 = tuple((low + high) / 2 for low, high in box)
@@ -175,7 +176,8 @@ def _read_named(
         uncertainty=uncertainty,
         trajectory=plan,
         x0=x0,
-        within=within,
+        within=start.within,
+        start_box=start.box,
         metric=metric,
         synthesis=synthesis,
         tube=tube,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
 from tubecert.expression import ZERO, constant, substitute, to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
+from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.table import read_table
@@ -17,6 +18,7 @@ from tubecert.spec.types import Interpolation, Matrix, Task, Term, Trajectory, U
 
 KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr")
 MAX_KNOTS: Final = 2_001
+MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 
 _KNOTS: Final = 101
 
@@ -195,23 +197,87 @@ def _constant_term(field: Field, value: Fraction) -> Term:
     return Term(expression=e, obligations=(), places=(), text=to_text(e), location=field.location)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InitialState:
+    """A point, or the plan's start with a radius around it, or a box (n pairs) and its centre; None if unreadable."""
+
+    x0: Vector | None
+    within: Fraction | None = None
+    box: tuple[tuple[Fraction, Fraction], ...] = ()
+
+
 def read_initial_state(
     field: Field | None, trajectory: Field | None, plan: Trajectory | None, names: Names
-) -> tuple[Vector | None, Fraction | None]:
-    """The initial state, by default the start of the plan; or that start and the radius around it that is allowed."""
+) -> InitialState:
+    """The initial state, by default the start of the plan."""
+
+    def planned() -> Vector | None:
+        return _start(trajectory, plan) if trajectory and plan else None
+
     if field is None:
-        return _start(trajectory, plan) if trajectory and plan else None, None
-    entries = field.mapping(optional=("at", "within"))
+        return InitialState(x0=planned())
+    entries = field.mapping(optional=("at", "within", "box"))
     if entries is None:
-        return None, None
+        return InitialState(x0=None)
     if len(entries) != 1:
-        message = "the initial state is either a point or a radius around the plan's start"
-        field.fail(codes.MISSING_KEY, message, "write at: [...], or within: r")
-        return None, None
-    if "at" in entries:
-        return entries["at"].numbers(len(names.states), names.values), None
-    radius = entries["within"].number(names.values, above=0, side="above")
-    return _start(trajectory, plan) if trajectory and plan else None, radius
+        message = "the initial state is a point, a box, or a radius around the plan's start"
+        field.fail(codes.MISSING_KEY, message, "write at: [...], box: {x: [low, high], ...}, or within: r")
+        return InitialState(x0=None)
+    if "within" in entries:
+        radius = entries["within"].number(names.values, above=0, side="above")
+        return InitialState(x0=planned(), within=radius)
+    (given,) = entries.values()
+    if isinstance(given.node, MappingNode):
+        ends = _named_ends(given, planned, names)
+    else:
+        items = given.items(len(names.states), "numbers") or []
+        ends = [_ends(item, names) for item in items]
+    box = tuple(end for end in ends if end is not None)
+    if len(box) < len(names.states):
+        return InitialState(x0=None)
+    if (wide := sum(low < high for low, high in box)) > MAX_WIDE:
+        field.fail(
+            codes.LIMIT, f"the box of starts has {wide} sides of some width; at most {MAX_WIDE} are read"
+        )
+        return InitialState(x0=None)
+    centre = tuple((low + high) / 2 for low, high in box)
+    return InitialState(x0=centre, box=box if any(low < high for low, high in box) else ())
+
+
+def _named_ends(
+    field: Field, planned: Callable[[], Vector | None], names: Names
+) -> list[tuple[Fraction, Fraction] | None]:
+    """Values or ranges by state; a state that is not named starts on the plan."""
+    entries = field.mapping(optional=names.states)
+    if entries is None:
+        return []
+    start = planned() if len(entries) < len(names.states) else None
+    found: list[tuple[Fraction, Fraction] | None] = []
+    for i, name in enumerate(names.states):
+        if name in entries:
+            found.append(_ends(entries[name], names))
+        else:
+            found.append(None if start is None else (start[i], start[i]))
+    return found
+
+
+def _ends(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
+    """A range, or a number, which is one without width; with pi in it, the least one that contains it."""
+    single = isinstance(field.node, Scalar)
+    fields = [field, field] if single else field.items(2, "numbers, or one number") or []
+    if not fields:
+        return None
+    low, high = fields[0].number(names.values, side="below"), None
+    if low is not None:
+        high = fields[1].number(names.values, side="above")
+    if low is None or high is None:
+        return None
+    if low > high:
+        field.fail(
+            codes.RANGE, f"{field.path}: the lower end must not exceed the upper end", "write [lower, upper]"
+        )
+        return None
+    return low, high
 
 
 def _start(field: Field, plan: Trajectory) -> Vector | None:

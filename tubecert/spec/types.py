@@ -258,6 +258,7 @@ class Spec:
     trajectory: Trajectory
     x0: Vector
     within: Fraction | None  # instead of x0: any start this near to the plan's
+    start_box: tuple[tuple[Fraction, Fraction], ...] = ()  # instead of x0, its centre: any start in the box
     metric: Metric | None
     synthesis: Synthesis | None = None  # only where there is no metric
     tube: Tube
@@ -273,6 +274,7 @@ class Spec:
         n, m = len(self.states), len(self.inputs)
         assert len(self.f) == len(self.B) == len(self.safe_set) == len(self.x0) == n
         assert all(len(row) == m for row in self.B)
+        assert len(self.start_box) in (0, n)
 
     def location(self, path: str) -> Location | None:
         """Where the value of `path` stands, or the nearest enclosing key that is in the file."""

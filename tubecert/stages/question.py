@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from tubecert.bounds.start import InitialState, KnownStart, StartWithin
+from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.result import SynthesisData
 from tubecert.certificate.sections import declared_metric, declared_uncertainty
@@ -51,6 +51,8 @@ class Question:
     @cached_property
     def start(self) -> InitialState:
         """Where the state starts."""
+        if self.spec.start_box:
+            return StartBox(self.spec.start_box)
         within = self.spec.within
         return KnownStart(self.spec.x0) if within is None else StartWithin(within)
 
