@@ -27,7 +27,6 @@ from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, free_symbols, root_above, substitute, symbol
 from tubecert.expression.matrix import column
 from tubecert.model import TIME
-from tubecert.trajectory import Plan
 
 _PIECES = 512
 
@@ -130,9 +129,8 @@ class StartWithin:
 
     def uncertainty(self, suprema: Suprema) -> Constant:
         """sup |h(0, x)| over the ball of starts."""
-        still = Plan(tuple(suprema.plan.start), tuple(ZERO for _ in suprema.model.inputs), None)
         radius = fraction_bounds(self.radius)[1]
-        instant = (Fraction(0), Fraction(0))
+        instant, still = (Fraction(0), Fraction(0)), suprema.plan.at_start
         ball = replace(suprema, plan=still, rho=radius, time=instant, coordinates=None, sides=None)
         return ball.norms("h_initial", [column(suprema.h)])
 

@@ -35,6 +35,7 @@ from tubecert.expression.matrix import Matrix, column, constants, identity, jaco
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
+from tubecert.trajectory.family import starred
 from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
@@ -202,11 +203,25 @@ class Suprema:
 
     def plan_defect(self) -> tuple[Constant, Constant]:
         """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
+        if self.plan.allowance is not None:
+            return self._limited_defect(self.plan.allowance)
         found = Defect.of(self.plan, self.model, self.rho, self.effort, self.coordinates)
         defect = replace(found, search=self._run)
         if defect.vanishes:
             return Constant.exactly(0.0), Constant.exactly(0.0)
         return self._constant(defect.in_state()), self._constant(defect.in_metric())
+
+    def _limited_defect(self, limit: Fraction) -> tuple[Constant, Constant]:
+        """The limit, and the limit times the root of sup lmax(M) on the plan: any p that is allowed may be met."""
+        low, high = fraction_bounds(limit)
+        if not high > 0:
+            return Constant.exactly(0.0), Constant.exactly(0.0)
+        M = Pencil(identity(len(self.model.states)), self.plan.on(self.model, self.model.W))
+        stretch = self._root(self._search_plan("plan_defect_metric", M))
+        size = Interval(low, high) * Interval(stretch.below, stretch.above)
+        return Constant(below=low, above=high), Constant(
+            below=float(size.lo), above=float(size.hi), at=stretch.at
+        )
 
     def half_widths(self) -> tuple[Constant, ...]:
         """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
@@ -233,7 +248,7 @@ class Suprema:
             states=self.model.states,
             inputs=self.model.inputs,
             time=time,
-            extra=extra,
+            extra={**self.plan.ranges, **(extra or {})},
         )
         return self._run(name, objective, tube, effort or self.effort)
 
@@ -265,7 +280,12 @@ class Suprema:
             t = 0.0
         moment = np.array([0.0 if t is None else t])
         centre, _ = self.plan.enclose(moment, moment)
-        x = np.array([found.at.get(name, centre.mid[0, i]) for i, name in enumerate(self.model.states)])
+        x = np.array(
+            [
+                found.at.get(name, found.at.get(starred(name), centre.mid[0, i]))
+                for i, name in enumerate(self.model.states)
+            ]
+        )
         if isinstance(self.section, Ellipsoid):  # the others are such that the point lies in it
             which = [i for i, name in enumerate(self.model.states) if name in found.at]
             x = (

@@ -47,6 +47,15 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Plans:
+    """Every plan that is claimed about: x* and u* in boxes, and the defect at most so large; exact texts."""
+
+    x: Mapping[str, tuple[str, str]]
+    u: Mapping[str, tuple[str, str]]
+    defect: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claimed:
     """What is claimed, in words of its own, exact texts; `recheck` derives it again from the specification."""
 
@@ -57,6 +66,7 @@ class Claimed:
     domain: Mapping[str, tuple[str, str]]
     start: Start
     uncertainty: Literal["bounds", "expression", "expression_or_bounds"]
+    plans: Plans | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +109,7 @@ class Samples:
 class PlanData:
     """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps."""
 
-    kind: Literal["equilibrium", "expressions", "csv", "ilqr"]
+    kind: Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
     interpolation: Literal["exact", "hold", "linear"] | None = None
     curve: Literal["hermite"] | None = None
     knots: KnotTexts | None = None

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Meaning
-from tubecert.certificate.result import Bound, Claimed, KnotTexts, MetricData, PlanData, Samples, Start
+from tubecert.certificate.result import Bound, Claimed, KnotTexts, MetricData, PlanData, Plans, Samples, Start
 from tubecert.claims import (
     Assumption,
     ExactGeodesics,
@@ -33,6 +33,7 @@ from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
+from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
 
 _SAMPLES = 201
@@ -84,6 +85,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
             for name, (low, high) in zip(spec.states, spec.safe_set, strict=True)
         },
         start=_start(spec),
+        plans=None if spec.trajectory.bundle is None else _plans(spec, spec.trajectory.bundle),
         uncertainty="bounds"
         if spec.uncertainty.h is None
         else "expression"
@@ -99,6 +101,14 @@ def _start(spec: Spec) -> Start:
         return Start(at=tuple(map(number_text, spec.x0)))
     sides = zip(spec.states, spec.start_box, strict=True)
     return Start(box={name: (number_text(low), number_text(high)) for name, (low, high) in sides})
+
+
+def _plans(spec: Spec, bundle: Bundle) -> Plans:
+    x, u = (
+        {name: (number_text(low), number_text(high)) for name, (low, high) in zip(names, box, strict=True)}
+        for names, box in ((spec.states, bundle.x), (spec.inputs, bundle.u))
+    )
+    return Plans(x=x, u=u, defect=number_text(bundle.defect))
 
 
 def _period_text(q: Fraction, of_pi: bool) -> str:
@@ -144,7 +154,9 @@ def plan_data(spec: Spec, plan: Plan) -> PlanData:
 
 
 def _samples(plan: Plan) -> Samples | None:
-    """Points of the plan, to draw it: 7 digits, no part of any proof. A constant plan is one point."""
+    """Points of the plan, to draw it: 7 digits, no part of any proof. A constant plan is one point, a family none."""
+    if plan.allowance is not None:
+        return None
     end = 0.0 if plan.horizon is None else float(plan.horizon)
     t = np.zeros(1) if plan.is_constant else np.linspace(0.0, np.nextafter(end, 0.0), _SAMPLES)
     x = plan.enclose(t, t)[0]

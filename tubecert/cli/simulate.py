@@ -66,9 +66,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     system = spec.load(given["spec"])
     wishes = _wishes(given, numbers, chosen, system)
     folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
+    from tubecert.simulate.certified import require_plan
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
 
+    require_plan(system)
     terminal = Terminal.stderr(color=output.color)
     wanted = not (output.no_progress or output.quiet)
     with prepared(folder), _progress(terminal, wanted=wanted) as report:

@@ -44,11 +44,11 @@ def plan_findings(spec: Spec) -> list[Finding]:
     findings += outside or _room(spec, curve)
     if not outside and spec.trajectory.kind in ("equilibrium", "expressions"):
         findings += _defect(spec, curve, build(spec))
-    return [*findings, *_obstacles(spec, curve)]
+    return findings if spec.trajectory.bundle is not None else [*findings, *_obstacles(spec, curve)]
 
 
 def _curve(spec: Spec) -> _Curve:
-    """Samples of the plan; of a plan that is still to be made, its two ends."""
+    """Samples of the plan; of a plan that is still to be made, its two ends; of a family, two corners."""
     plan = spec.trajectory
     if plan.table is not None:
         knots = plan.table.knots
@@ -66,6 +66,9 @@ def _curve(spec: Spec) -> _Curve:
         count = 2 if plan.task.goal else 1
         u = np.zeros((count, len(spec.inputs)))
         return _Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
+    if plan.bundle is not None:  # the corners that are farthest out
+        corners = np.array([floats([ends[side] for ends in plan.bundle.x]) for side in (0, 1)])
+        return _Curve(t=np.zeros(1), x=corners, u=np.zeros((2, len(spec.inputs))), path="trajectory.x")
     count = 1 if plan.kind == "equilibrium" else _SAMPLES
     t = np.linspace(0.0, nearest(plan.horizon or Fraction(0)), count)
     tape = Tape([term.expression for term in (*plan.x, *plan.u)], (TIME,))

@@ -138,6 +138,8 @@ def _asked(question: Question) -> Asked:
 def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:
     """Where gains are missing and the plan's defect takes a part of the tube that matters, that is said too."""
     share = _defect_share(judged.bounded.problem)
+    if judged.bounded.enclosed.tube.plan.allowance is not None:
+        return told  # nobody's plan: the specification allows its defect
     if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < _NOTABLE:
         return told
     tube, defect = judged.bounded.enclosed.tube, judged.bounded.problem.constants.plan_defect

@@ -58,6 +58,15 @@ INFIMA = ("lower", "input_gain_least")  # constants whose lower side is used
 
 
 @dataclass(frozen=True, slots=True)
+class Plans:
+    """The family of plans that is claimed about."""
+
+    x: dict[str, Range]
+    u: dict[str, Range]
+    defect: Fraction
+
+
+@dataclass(frozen=True, slots=True)
 class Claim:
     """What the certificate says that it claims, in its own words."""
 
@@ -68,6 +77,7 @@ class Claim:
     domain: dict[str, Range]
     start: Start
     uncertainty: str
+    plans: Plans | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +213,7 @@ def read_result(node: Node) -> Result:
         formulas=own["formulas"].word("corrected", "as-printed"),
         specification=specification,
         effective_hash=spec["effective_hash"].text(),
-        claim=_claim(own["claim"], states),
+        claim=_claim(own["claim"], states, specification.plant.inputs),
         overrides=_overrides(own["overrides"]),
         plan=read_plan(own["plan"], specification),
         safe_set=_box(own["safe_set"], states, Node.decimal),
@@ -243,8 +253,9 @@ def _complete(node: Node, result: Result) -> Result:
 # -- what is claimed, and of what ----------------------------------------------------------------------------------
 
 
-def _claim(node: Node, states: tuple[str, ...]) -> Claim:
-    own = node.closed("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
+def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Claim:
+    keys = ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
+    own = node.closed(*keys, optional=("plans",))
     return Claim(
         id=own["id"].text(),
         horizon=own.known("horizon", Node.exact),
@@ -253,7 +264,14 @@ def _claim(node: Node, states: tuple[str, ...]) -> Claim:
         domain=_box(own["domain"], states, Node.exact),
         start=read_start(own["start"], states),
         uncertainty=own["uncertainty"].text(),
+        plans=own.get("plans", lambda item: _plans(item, states, inputs)),
     )
+
+
+def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:
+    own = node.closed("x", "u", "defect")
+    x, u = _box(own["x"], states, Node.exact), _box(own["u"], inputs, Node.exact)
+    return Plans(x=x, u=u, defect=own["defect"].exact())
 
 
 def _box(node: Node, states: tuple[str, ...], read: Callable[[Node], Fraction]) -> dict[str, Range]:

@@ -6,10 +6,10 @@ horizon), on which set the metric is one, from which start, against which uncert
 
 from __future__ import annotations
 
-from tubecert.recheck.certificate import Claim, Result
+from tubecert.recheck.certificate import Claim, Plans, Result
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated
-from tubecert.recheck.specification import Resting, Specification
+from tubecert.recheck.specification import AnyPlan, Resting, Specification
 from tubecert.recheck.times import period_of
 
 TUBE = "tube"
@@ -20,7 +20,7 @@ def own_claim(spec: Specification) -> Claim:
     horizon = spec.trajectory.horizon
     for_all_time = period = None
     if horizon is None:
-        assert isinstance(spec.trajectory, Resting), "every other plan has a horizon"
+        assert isinstance(spec.trajectory, (Resting, AnyPlan)), "every other plan has a horizon"
         found = period_of(spec.uncertainty)
         for_all_time = "periodic" if found.length else "autonomous"
         period = found.text if found.length else None
@@ -32,13 +32,18 @@ def own_claim(spec: Specification) -> Claim:
         domain=spec.plant.safe_set,
         start=spec.start,
         uncertainty=spec.uncertainty.words,
+        plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
     )
+
+
+def _plans(family: AnyPlan) -> Plans:
+    return Plans(x=family.x, u=family.u, defect=family.defect)
 
 
 def agrees(result: Result) -> Outcome:
     """Whether `claim` is what follows from the specification."""
     own = own_claim(result.specification)
-    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty"):
+    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty", "plans"):
         if getattr(own, key) != getattr(result.claim, key):
             return stated(False, f"claim.{key} is not that of the specification")
     return stated(True, "")

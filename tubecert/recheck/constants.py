@@ -14,7 +14,8 @@ from tubecert.recheck.balls import Ball, exact, sharp_norm
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.branches import norms_below, slopes_below
 from tubecert.recheck.coordinates import Fields
-from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.family import Everyone
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.metric import (
@@ -70,7 +71,7 @@ def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
     found = prove(test, place.tube(), min(place.budget, _FIRST))
     if found.verdict != "undecided" or place.budget <= _FIRST:
         return found
-    if len(matrices) == 1 and len(matrices[0][0]) == 1 and not place.curve.moves:
+    if len(matrices) == 1 and len(matrices[0][0]) == 1 and not place.curve.moves and not place.curve.ranges:
         eased = column_below(place, [row[0] for row in matrices[0]], limit)
         if eased is not None and eased.holds:
             return eased
@@ -149,13 +150,26 @@ def _defect_zero(place: Place, p: Matrix) -> bool:
 
 
 def _plan_defect(place: Place, limit: Fraction) -> Outcome:
+    if isinstance(place.curve, Everyone):
+        return stated(limit >= place.curve.limit, "it is below the defect that is allowed")
     p = defect(place)
     if _defect_zero(place, p):
         return stated(True, "")
     return place.along(lambda: NormsBelow([place.fields.vector(p)], limit, place.numbers))
 
 
+def _allowed_defect_metric(place: Place, curve: Everyone, limit: Fraction) -> Outcome:
+    """|Theta p| <= limit on P for every |p| that is allowed: M <= (limit/|p|)^2 I."""
+    if not curve.limit or not limit:
+        return stated(limit >= curve.limit, "it is below the defect that is allowed")
+    s = place.system
+    P = Boxed(dict(zip(s.states, curve.boxes[0], strict=True)))
+    return upper_bound(s, (limit / curve.limit) ** 2, P, place.budget)
+
+
 def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
+    if isinstance(place.curve, Everyone):
+        return _allowed_defect_metric(place, place.curve, limit)
     p = defect(place)
     if _defect_zero(place, p):
         return stated(True, "")

@@ -6,7 +6,7 @@ given by expressions of t, one cubic Hermite piece for every pair of knots. Segm
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -16,6 +16,7 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Field
+from tubecert.recheck.cover import Range
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Term, names, number, replaced, slopes, variable
 
@@ -41,6 +42,11 @@ class Curve:
     parts: tuple[Part, ...]
     horizon: Fraction | None
     start: tuple[Term, ...]  # x*(0), free of variables
+
+    @property
+    def ranges(self) -> Mapping[str, Range]:
+        """Variables of x* and u* beside s: none for a plan that is known."""
+        return {}
 
     @cached_property
     def moves(self) -> bool:
@@ -81,6 +87,11 @@ class Segment:
     def middle(self) -> tuple[Ball, list[Ball], list[Ball]]:
         """A time of it, with x* and u* there."""
         raise NotImplementedError
+
+    def nearest(self, state: int, at: float, own: Ball) -> Ball:
+        """An x* of the segment in one state, where `own` is that of its middle, near to a number."""
+        del state, at
+        return own
 
 
 class Piece(Segment):

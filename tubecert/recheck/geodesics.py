@@ -74,9 +74,14 @@ def _sampled(test: SymbolsBelow, place: Place) -> float:
     best = 0.0
     for segment in _along(place):
         _, x, _ = segment.middle()
+        # of a family of plans, half of its box: else next to nothing
+        half = [0.5 * (high - low) if place.curve.ranges else 0.0 for low, high in segment.x]
         for side in ([0.0] * len(columns), *sides):
             size = math.hypot(*side) or 1.0
-            at = [x[i] + place.around.extent(i) * d / size for i, d in zip(columns, side, strict=True)]
+            at = [
+                x[i] + place.around.extent(i) * d / size + half[i] * d
+                for i, d in zip(columns, side, strict=True)
+            ]
             value = float(test.bound(at).mid())
             best = max(best, value) if math.isfinite(value) else best
     return best

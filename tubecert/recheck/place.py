@@ -54,7 +54,7 @@ class Place:
         """The tube, with the times that matter for h."""
         s = self.system
         time = time_range(s.uncertainty, s.horizon)
-        free = {**(extra or {}), **({} if time is None else {TIME: time})}
+        free = {**self.curve.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
         return Tube(self.curve, self.around, s.states, s.inputs, free)
 
     def on_plan(self, rows: Rows) -> Matrix:
@@ -94,7 +94,7 @@ class Place:
         outcomes: list[Outcome] = []
         for part in self.curve.parts:
             own = whole.with_values(part.values)
-            domain = Boxed({CLOCK: (arb(0), part.length)})
+            domain = Boxed({CLOCK: (arb(0), part.length), **self.curve.ranges})
             outcomes.append(prove(own, domain, self.budget))
             if not outcomes[-1].holds:
                 break

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tubecert.recheck.document import Node
-from tubecert.recheck.specification import Numbers, Resting, Rows, Specification, Tabled
+from tubecert.recheck.specification import AnyPlan, Numbers, Resting, Rows, Specification, Tabled
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,13 @@ class Plan:
 def read_plan(node: Node, specification: Specification) -> Plan:
     """`result.plan`; the members that it has depend on the kind of trajectory."""
     n, m = len(specification.plant.states), len(specification.plant.inputs)
-    optional = ["interpolation", "samples"]
-    if not isinstance(specification.trajectory, Resting) and specification.trajectory.kind != "expressions":
+    optional = (
+        ["interpolation"] if isinstance(specification.trajectory, AnyPlan) else ["interpolation", "samples"]
+    )
+    if (
+        not isinstance(specification.trajectory, (Resting, AnyPlan))
+        and specification.trajectory.kind != "expressions"
+    ):
         optional += ["curve", "knots"]
     if isinstance(specification.trajectory, Tabled):
         optional += ["file", "file_hash"]

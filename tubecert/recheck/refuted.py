@@ -22,7 +22,7 @@ from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
-from tubecert.recheck.specification import Metric
+from tubecert.recheck.specification import AnyPlan, Metric
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
 _AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")
@@ -109,6 +109,11 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
     if case.result.specification.coordinates:
         return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
     rho, s = exact(case.result.tube.rho), case.system
+    family = case.result.specification.trajectory
+    if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
+        own = case.result.tube.rho
+        pairs = [(family.x[name], s.safe_set[name]) for name in s.states]
+        return _if(any(low - own < least or high + own > most for (low, high), (least, most) in pairs))
     t = 0.0 if at is None else float(at)
     segment: Segment = case.curve.root
     while segment.halves:

@@ -98,7 +98,18 @@ class Planned:
     kind: str = "ilqr"
 
 
-Trajectory = Resting | Expressed | Tabled | Planned
+@dataclass(frozen=True, slots=True)
+class AnyPlan:
+    """Every plan with x* and u* in boxes, by name, and |x*' - f - B u*| <= `defect`."""
+
+    x: dict[str, Range]
+    u: dict[str, Range]
+    defect: Fraction
+    horizon: Fraction | None
+    kind: str = "any"
+
+
+Trajectory = Resting | Expressed | Tabled | Planned | AnyPlan
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,12 +187,12 @@ def read_specification(node: Node) -> Specification:
     _version(own["tubecert"])
     own["name"].text()
     plant = _plant(own["system"], own["safe_set"])
-    n, m = len(plant.states), len(plant.inputs)
+    n = len(plant.states)
     tube = _tube(own["tube"], plant)
     found = Specification(
         plant=plant,
         uncertainty=_uncertainty(own["uncertainty"], plant),
-        trajectory=_trajectory(own["trajectory"], n, m),
+        trajectory=_trajectory(own["trajectory"], plant),
         start=read_start(own["initial_state"], plant.states),
         metric=_metric(own["metric"], plant),
         epsilon=tube.get("epsilon", _positive),
@@ -193,6 +204,10 @@ def read_specification(node: Node) -> Specification:
         content=digest({key: value for key, value in node.mapping().items() if key not in _IDLE}),
     )
     _idle(own, plant)
+    if isinstance(found.trajectory, AnyPlan) and own["tube"].mapping().keys() != {"epsilon", "rho_a"}:
+        raise own["tube"].refused("must be epsilon and rho_a: a family of plans has no other tube")
+    if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
+        raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
     return found
 
 
@@ -290,8 +305,10 @@ def _uncertainty(node: Node, plant: Plant) -> Uncertainty:
 # -- plan and start ------------------------------------------------------------------------------------------------
 
 
-def _trajectory(node: Node, n: int, m: int) -> Trajectory:
-    kind = node.mapping().get("kind")
+def _trajectory(node: Node, plant: Plant) -> Trajectory:
+    kind, n, m = node.mapping().get("kind"), len(plant.states), len(plant.inputs)
+    if kind == "any":
+        return _any(node, plant)
     readers: dict[object, Callable[[Node, int, int], Trajectory]] = {
         "equilibrium": _resting,
         "expressions": _expressed,
@@ -299,7 +316,7 @@ def _trajectory(node: Node, n: int, m: int) -> Trajectory:
         "ilqr": _planned,
     }
     if not isinstance(kind, str) or kind not in readers:
-        raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}")
+        raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}, any")
     return readers[kind](node, n, m)
 
 
@@ -313,6 +330,26 @@ def _expressed(node: Node, n: int, m: int) -> Expressed:
     reader = Reader.of((TIME,))
     x, u = reader.column(own["x"], n), reader.column(own["u"], m)
     return Expressed(x, u, _positive(own["horizon"]), tuple(reader.duties))
+
+
+def _any(node: Node, plant: Plant) -> AnyPlan:
+    own = node.closed("kind", "x", "u", "defect", optional=("horizon",))
+    x, u = (
+        {name: _span(ends[name]) for name in names}
+        for names, ends in (
+            (plant.states, own["x"].closed(*plant.states)),
+            (plant.inputs, own["u"].closed(*plant.inputs)),
+        )
+    )
+    return AnyPlan(x, u, _not_negative(own["defect"]), own.get("horizon", _positive))
+
+
+def _span(node: Node) -> Range:
+    """Ends that may be one point."""
+    low, high = (end.exact() for end in node.pair())
+    if low > high:
+        raise node.refused("is an empty range")
+    return low, high
 
 
 def _held(node: Node) -> bool:

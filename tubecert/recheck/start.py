@@ -229,5 +229,7 @@ def uncertainty(place: Place, limit: Fraction) -> Outcome:
         return prove(norms_below([matrix_replaced(at_start, known)], limit), Boxed(s.box), place.budget)
     assert s.within is not None
     curve = place.curve
-    still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
+    still = curve
+    if not curve.ranges:
+        still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
     return prove(norms_below([at_start], limit), Tube(still, Round(s.within), s.states, ()), place.budget)

@@ -9,10 +9,12 @@ from itertools import pairwise
 
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
 from tubecert.recheck.document import wrong
+from tubecert.recheck.family import everyone
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import (
+    AnyPlan,
     Expressed,
     Metric,
     Numbers,
@@ -140,6 +142,8 @@ def system_of(spec: Specification) -> System:
 def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     """The plan: expressions of the specification, or the knots that the certificate holds."""
     trajectory = spec.trajectory
+    if isinstance(trajectory, AnyPlan):
+        return everyone(trajectory, s.states, s.inputs)
     if isinstance(trajectory, Resting):
         return expressed(
             [number(q) for q in trajectory.at],

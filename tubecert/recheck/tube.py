@@ -130,9 +130,12 @@ class Tube:
     def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
         """The centre of the box, moved towards the plan into the tube."""
         box, segments = state
-        t, x, u = segments[len(segments) // 2].middle()
+        segment = segments[len(segments) // 2]
+        t, x, u = segment.middle()
         inside = [0.5 * lo + 0.5 * hi for lo, hi in box]
         columns = [(i, self._states[v]) for i, v in enumerate(variables) if v in self._states]
+        for i, k in columns:
+            x[k] = segment.nearest(k, inside[i], x[k])
         offset = [arb(inside[i]) - x[k] for i, k in columns]
         at = [arb(value) for value in inside]
         moved = self._around.inside([k for _, k in columns], offset)

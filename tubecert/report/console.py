@@ -89,8 +89,8 @@ def _promise(result: Result) -> Text:
     chosen = deciding(result)
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
-        f"With this metric, {loops}, the state stays within {up(sections.radius(result))} of the plan "
-        f"{sections.span(result)}, under the assumptions below."
+        f"With this metric, {loops}, the state stays within {up(sections.radius(result))} of "
+        f"{sections.plan_words(result)} {sections.span(result)}, under the assumptions below."
     )
 
 

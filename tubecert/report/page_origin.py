@@ -10,7 +10,7 @@ from tubecert.certificate.result import Certificate, Result
 from tubecert.records import to_json
 from tubecert.report.numbers import exact
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
-from tubecert.report.sections import safe_set
+from tubecert.report.sections import family_words, safe_set
 
 
 def system(result: Result) -> Iterator[Block]:
@@ -42,7 +42,9 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
     yield "safe set", Cell(text=", ".join(box))
     if bounds := effective.uncertainty.bounds:
         yield "bounds declared", Cell(text=_list(bounds))
-    yield "plan", Cell(text=_plan(effective.part("trajectory")))
+    plans = result.claim.plans
+    words = _plan(effective.part("trajectory")) if plans is None else f"any with {family_words(plans)}"
+    yield "plan", Cell(text=words)
     for name, words in (("initial_state", "initial state"), ("adaptation", "adaptation")):
         if part := effective.part(name):
             yield words, Cell(text=_list(part))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from tubecert.certificate.result import Result
 from tubecert.report.gains import NAMES
 from tubecert.report.numbers import exact, up
+from tubecert.report.sections import plan_words
 from tubecert.verdict import Verdict
 
 
@@ -21,7 +22,7 @@ def proven(result: Result) -> Iterator[str]:
                 "compatible with the inputs (C3) on the whole safe set."
             )
     if tube is not None and tube.rho_r is not None:
-        yield f"The tube of radius {up(tube.rho)} around the plan lies in the safe set."
+        yield f"The tube of radius {up(tube.rho)} around {plan_words(result)} lies in the safe set."
     if metric is not None and metric.unique_geodesics is not None and metric.unique_geodesics.holds:
         yield "Minimising geodesics in the tube are unique."
     if count := len(result.constants):

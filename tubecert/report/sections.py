@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.bounds.constants import DERIVED, TABLE
-from tubecert.certificate.result import Bound, MetricData, Result, TubeData
+from tubecert.certificate.result import Bound, MetricData, Plans, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, SAMPLED
@@ -57,6 +57,18 @@ def span(result: Result) -> str:
     """The time that is claimed."""
     end = horizon(result)
     return "for all t >= 0" if end is None else f"for 0 <= t <= {short(end, 12)} s"
+
+
+def plan_words(result: Result) -> str:
+    """What the state stays close to."""
+    return "the plan" if result.claim.plans is None else "every plan of the family"
+
+
+def family_words(plans: Plans) -> str:
+    """Which plans belong to a family."""
+    sides = [*((f"{name}*", ends) for box in (plans.x, plans.u) for name, ends in box.items())]
+    boxes = ", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in sides)
+    return f"{boxes}; |x*' - f(x*) - B(x*) u*| <= {plans.defect}"
 
 
 def horizon(result: Result) -> Fraction | None:
@@ -164,6 +176,8 @@ def _limit(result: Result) -> list[Text]:
 
 def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     lines = [f"rho = {radii(tube)}; epsilon = {short(tube.epsilon)}"]
+    if result.claim.plans is not None:
+        lines.append(f"around every plan with {family_words(result.claim.plans)}")
     if tube.half_widths:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
     found = (f"in the long run |x - x*| <= {up(radius)} with {title}" for title, radius in long_run(result))

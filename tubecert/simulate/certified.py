@@ -100,6 +100,20 @@ def _without_plan(effective: Mapping[str, Any]) -> Spec:
     return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
 
 
+def require_plan(spec: Spec) -> None:
+    """Raises TC708 for a family of plans: a loop follows one plan."""
+    if spec.trajectory.bundle is None:
+        return
+    message = "a family of plans cannot be simulated: a loop follows one plan"
+    help = (
+        "write the specification of a plan of the family (its own trajectory and initial_state), and choose the "
+        "gains of the family's certificate: --bandwidth W --adaptation-rate G"
+    )
+    raise TubecertError(
+        [Finding(code="TC708", message=message, location=spec.location("trajectory.kind"), help=help)]
+    )
+
+
 def require_tube(result: Result) -> None:
     """Raises the reason why there is no tube to be compared with, if there is none."""
     if result.tube is not None and result.tube.rho_r is not None and result.constants:

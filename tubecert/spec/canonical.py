@@ -13,7 +13,7 @@ from typing import Any
 
 from tubecert.expression import full_text, number_text
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term, Tube
+from tubecert.spec.types import Bundle, Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term, Tube
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -88,8 +88,23 @@ def _trajectory(spec: Spec) -> dict[str, Any]:
         return {**shown, **_given(horizon=plan.horizon)}
     if plan.task is not None:
         return _task(plan.task, plan.horizon)
+    if plan.bundle is not None:
+        return _bundle(spec, plan.bundle)
     x, u = ("at", "input") if plan.kind == "equilibrium" else ("x", "u")
     return {"kind": plan.kind, x: _texts(plan.x), u: _texts(plan.u), **_given(horizon=plan.horizon)}
+
+
+def _bundle(spec: Spec, bundle: Bundle) -> dict[str, Any]:
+    x, u = (
+        {name: _numbers(ends) for name, ends in zip(names, box, strict=True)}
+        for names, box in ((spec.states, bundle.x), (spec.inputs, bundle.u))
+    )
+    return {
+        "kind": "any",
+        "x": x,
+        "u": u,
+        **_given(defect=bundle.defect, horizon=spec.trajectory.horizon),
+    }
 
 
 def _task(task: Task, horizon: Fraction | None) -> dict[str, Any]:

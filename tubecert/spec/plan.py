@@ -14,9 +14,9 @@ from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.table import read_table
-from tubecert.spec.types import Interpolation, Matrix, Task, Term, Trajectory, Uncertainty, Vector
+from tubecert.spec.types import Bundle, Interpolation, Matrix, Task, Term, Trajectory, Uncertainty, Vector
 
-KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr")
+KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr", "any")
 MAX_KNOTS: Final = 2_001
 MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 
@@ -25,7 +25,13 @@ _KNOTS: Final = 101
 
 def read_trajectory(field: Field, names: Names) -> Trajectory | None:
     """The plan; what a planner's start is by default is not known yet (see `completed`)."""
-    readers = {"equilibrium": _equilibrium, "expressions": _expressions, "csv": _csv, "ilqr": _ilqr}
+    readers = {
+        "equilibrium": _equilibrium,
+        "expressions": _expressions,
+        "csv": _csv,
+        "ilqr": _ilqr,
+        "any": _any,
+    }
     kind = _kind(field)
     return readers[kind](field, names) if kind else None
 
@@ -130,6 +136,31 @@ def _ilqr(field: Field, names: Names) -> Trajectory | None:
     return Trajectory(kind="ilqr", horizon=horizon, task=task)
 
 
+def _any(field: Field, names: Names) -> Trajectory | None:
+    entries = field.mapping(required=("kind", "x", "u"), optional=("defect", "horizon"))
+    if entries is None:
+        return None
+    x = _ranges(entries.get("x"), names.states, names)
+    u = _ranges(entries.get("u"), names.inputs, names)
+    defect = (
+        entries["defect"].number(names.values, least=0, side="above") if "defect" in entries else Fraction(0)
+    )
+    horizon, sound = _horizon(entries.get("horizon"), names)
+    if x is None or u is None or defect is None or not sound:
+        return None
+    return Trajectory(kind="any", horizon=horizon, bundle=Bundle(x=x, u=u, defect=defect))
+
+
+def _ranges(
+    field: Field | None, wanted: Sequence[str], names: Names
+) -> tuple[tuple[Fraction, Fraction], ...] | None:
+    """[low, high] for every name, in their order, rounded outward: what is proven holds for all that was asked for."""
+    entries = field.mapping(required=tuple(wanted)) if field else None
+    found = [_ends(entries[name], names) for name in wanted if name in entries] if entries else []
+    kept = tuple(ends for ends in found if ends)
+    return kept if len(kept) == len(wanted) else None
+
+
 def completed(plan: Trajectory, x0: Vector | None) -> Trajectory | None:
     """The plan with the start that a planner takes if none is given: the initial state."""
     if plan.task is None or plan.task.start:
@@ -214,6 +245,13 @@ def read_initial_state(
     def planned() -> Vector | None:
         return _start(trajectory, plan) if trajectory and plan else None
 
+    if plan is not None and plan.bundle is not None and (field is None or not _has(field, "within")):
+        message = "a family of plans has no start of its own"
+        where = trajectory if field is None else field
+        if where is not None:
+            help = "write initial_state: {within: r}: how far from the start of its plan the state may be"
+            where.fail(codes.MISSING_KEY, message, help)
+        return InitialState(x0=None)
     if field is None:
         return InitialState(x0=planned())
     entries = field.mapping(optional=("at", "within", "box"))
@@ -280,10 +318,16 @@ def _ends(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
     return low, high
 
 
+def _has(field: Field, key: str) -> bool:
+    return isinstance(field.node, MappingNode) and any(own.text == key for own, _ in field.node.pairs)
+
+
 def _start(field: Field, plan: Trajectory) -> Vector | None:
     """x*(0), if it is rational."""
     if plan.table is not None:
         return plan.table.knots.x[0]
+    if plan.bundle is not None:
+        return tuple((low + high) / 2 for low, high in plan.bundle.x)  # one of the starts that there may be
     if plan.task is not None:
         if not plan.task.start:
             message = "the planner needs a start"

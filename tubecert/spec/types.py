@@ -102,22 +102,34 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Bundle:
+    """A family of plans: x* (n ranges) and u* (m ranges) stay in boxes, the defect (state units per s) is limited."""
+
+    x: tuple[tuple[Fraction, Fraction], ...]
+    u: tuple[tuple[Fraction, Fraction], ...]
+    defect: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
     """The plan: horizon in s, and what its kind needs.
 
-    x (n) and u (m) are expressions of t (constants for an equilibrium); csv has a `table`, ilqr a `task` instead.
+    x (n) and u (m) are expressions of t (constants for an equilibrium); csv has a `table`, ilqr a `task`, any
+    a `bundle` instead.
     """
 
-    kind: Literal["equilibrium", "expressions", "csv", "ilqr"]
+    kind: Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
     x: tuple[Term, ...] = ()
     u: tuple[Term, ...] = ()
     horizon: Fraction | None
     table: Table | None = None
     task: Task | None = None
+    bundle: Bundle | None = None
 
     def __post_init__(self) -> None:
         assert (self.table is not None) == (self.kind == "csv")
         assert (self.task is not None) == (self.kind == "ilqr")
+        assert (self.bundle is not None) == (self.kind == "any")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

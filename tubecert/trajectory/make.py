@@ -20,6 +20,7 @@ from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Interpolation, Knots, Spec, Task
 from tubecert.trajectory.defect import Defect
+from tubecert.trajectory.family import family
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import Plan
 
@@ -49,6 +50,9 @@ def plan_of(spec: Spec, model: ControlAffineModel, proposed: Knots | None = None
     Raises `SpecError` for proposed knots that are not what was asked for.
     """
     trajectory = spec.trajectory
+    if trajectory.bundle is not None:
+        boxes = trajectory.bundle.x, trajectory.bundle.u
+        return family(spec.states, spec.inputs, boxes, trajectory.bundle.defect, trajectory.horizon)
     if trajectory.table is not None:
         return piecewise_plan(model, trajectory.table.knots, trajectory.horizon)
     if trajectory.task is not None:

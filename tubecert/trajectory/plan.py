@@ -47,7 +47,7 @@ class Plan:
 
     @cached_property
     def is_constant(self) -> bool:
-        """Whether x* and u* do not move."""
+        """Whether x* and u* do not depend on t."""
         return not free_symbols([*self.x, *self.u])
 
     @cached_property
@@ -73,6 +73,26 @@ class Plan:
     def domain(self) -> Domain:
         """Where the variables of the plan live."""
         return BoxDomain(self.time)
+
+    @property
+    def at_start(self) -> Plan:
+        """A plan that stays at x*(0), without an input."""
+        return Plan(tuple(self.start), tuple(ZERO for _ in self.u), None)
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """Variables of the plan that are independent of x* and of time."""
+        return {}
+
+    @property
+    def allowance(self) -> Fraction | None:
+        """What the defect is limited to, for plans that are not known; None where it follows from the plan."""
+        return None
+
+    def near(self, x: Interval, columns: Sequence[int], points: Array) -> Interval:
+        """A point of the plan near to `points` (N, k), where x* (N, n) is enclosed; `columns` are its states."""
+        del points
+        return x[:, list(columns)]
 
     @property
     def fixed(self) -> frozenset[str]:

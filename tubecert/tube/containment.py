@@ -63,6 +63,8 @@ def containment(
                 continue
             here, _ = plan.enclose(np.array([t]), np.array([t]))
             place = here.mid[0].copy()
+            if plan.allowance is not None:  # the member that comes nearest
+                place[i] = sign * float(low)
             place[i] += sign * float(radius)
             case = Containment(
                 verdict=Verdict.REFUTED if low + radius > limit else Verdict.UNDECIDED,

@@ -55,6 +55,8 @@ class Tube:
 
     def _moves(self, needed: tuple[str, ...]) -> bool:
         """Whether the plan moves in the needed variables: a ball projected to others is a ball that stays."""
+        if self._plan.is_constant:
+            return False
         curves = zip((*self._states, *self._inputs), (*self._plan.x, *self._plan.u), strict=True)
         return bool(free_symbols([curve for name, curve in curves if name in needed]))
 
@@ -135,7 +137,7 @@ class Tube:
             points = self._in_its_piece(variables, points)
         x, u = self._window(variables, points, points)
         state, tied, state_column, tied_column = self._columns(variables)
-        centre = x[:, state_column]
+        centre = self._plan.near(x, state_column, points[:, state])
         points[:, state], ok = self._section.pull(state_column, points[:, state], centre)
         lo, hi = points.copy(), points.copy()
         lo[:, tied], hi[:, tied] = u.lo[:, tied_column], u.hi[:, tied_column]

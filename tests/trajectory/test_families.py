@@ -1,0 +1,336 @@
+"""Families of plans: what is proven for all is at least what holds for any one, and recheck proves it again."""
+
+from __future__ import annotations
+
+import copy
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from proven import proven
+from rechecked import examine, failing, sealed
+
+from tubecert import pipeline
+from tubecert.bounds.suprema import Suprema
+from tubecert.cli.app import app
+from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.errors import SpecError
+from tubecert.model import build
+from tubecert.pipeline import Options
+from tubecert.spec import canonical, load_text
+from tubecert.trajectory.make import plan_of
+from tubecert.tube import Tube, containment
+from tubecert.verdict import Verdict
+
+FAMILY = """
+tubecert: 1
+name: any_plan
+system:
+  states: [x1, x2]
+  inputs: [u]
+  f: [-x1 + 2*x2, -0.25*x2**3 - 3*x1 + 4*x2]
+  B: [[0.5], [-2]]
+safe_set: {x1: [-6, 6], x2: [-6, 6]}
+uncertainty: {h: ["-2*sin(2*t) - 0.1*norm(x1, x2)"]}
+trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}
+initial_state: {within: 0.05}
+metric: {rate: 1.74, dual_metric: [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]}
+tube: {epsilon: 0.6, rho_a: 0.1}
+"""
+# a metric that moves, and two inputs: nothing is exact by luck
+BENT = """
+tubecert: 1
+name: bent
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + 0.2*y**2", "-y + 0.3*sin(x)"]
+  B: [["0"], ["1"]]
+safe_set: {x: [-2, 2], y: [-2, 2]}
+uncertainty: {h: ["0.1*sin(t)*x"]}
+trajectory: {kind: any, x: {x: [-0.5, 0.7], y: [-0.4, 1/3]}, u: {u: [-0.5, 0.2]}, defect: 0.02}
+initial_state: {within: 0.02}
+metric: {rate: 0.3, dual_metric: [["1 + 0.1*x**2", "0.1"], ["0.1", "1.2"]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+"""
+OWN = "trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}"
+
+
+@pytest.fixture(scope="module")
+def document():
+    return proven(FAMILY, conditions="distance")
+
+
+def result_of(text, **options):
+    return pipeline.certify(load_text(text, "spec.yaml"), Options(**{"conditions": "distance"} | options))
+
+
+def test_a_family_is_certified_for_all_time_and_says_which_plans(document):
+    result = document["result"]
+    assert result["verdict"] == "certified"
+    assert result["claim"]["plans"] == {
+        "x": {"x1": ["-1", "1"], "x2": ["-0.5", "0.5"]},
+        "u": {"u": ["-1", "1"]},
+        "defect": "0.01",
+    }
+    assert (result["claim"]["horizon"], result["claim"]["for_all_time"]) == (None, "periodic")
+    assert result["plan"] == {"kind": "any", "interpolation": "exact"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text", [FAMILY, BENT, BENT.replace("1/3]", "-0.4]")], ids=["two-state", "bent", "flat box"]
+)
+def test_recheck_confirms_it(text):
+    made = proven(text, conditions="distance")
+    assert made["result"]["verdict"] == "certified"
+    assert failing(examine(made)) == []
+
+
+def values(rows, states, x):
+    """Entries at points (N, n), in plain floats."""
+    from tubecert.enclosure.tape import Tape
+
+    flat = [e for row in rows for e in row]
+    return Tape(flat, states).run_floats(list(x.T), (len(x),)).T.reshape(len(x), len(rows), -1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [FAMILY, BENT], ids=["two-state", "bent"])
+def test_no_sampled_value_is_above_a_constant_and_corners_come_near(text):
+    """Independent sampling over (x* in P, |z| <= rho, u* in U), in floats, from the definitions."""
+    spec = load_text(text)
+    result = result_of(text)
+    model, c, rho = build(spec), result.constants, float(result.tube.rho)
+    rng = np.random.default_rng(7)
+    low, high = (np.array([float(ends[k]) for ends in spec.trajectory.bundle.x]) for k in (0, 1))
+    N = 40_000
+    plan = np.where(rng.random((N, 2)) < 0.5, rng.choice([0.0, 1.0], (N, 2)), rng.random((N, 2)))
+    plan = low + plan * (high - low)
+    angle, reach = rng.uniform(0, 2 * np.pi, N), rho * rng.choice([1.0, 0.7], N)
+    x = plan + reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    u_low, u_high = (float(end) for end in spec.trajectory.bundle.u[0])
+    u = rng.choice([u_low, u_high], N)
+    f, B = values([(e,) for e in model.f], model.states, x)[..., 0], values(model.B, model.states, x)
+    W_plan, B_plan = values(model.W, model.states, plan), values(model.B, model.states, plan)
+    M_plan = np.linalg.inv(W_plan)
+    sampled = {
+        "drift_on_plan": np.linalg.norm(f + B[..., 0] * u[:, None], axis=1).max(),
+        "f": np.linalg.norm(f, axis=1).max(),
+        "u_star": np.abs(u).max(),
+        "metric_input_gain": np.sqrt(
+            np.linalg.eigvalsh(np.swapaxes(B_plan, 1, 2) @ M_plan @ B_plan)[:, -1].max()
+        ),
+        "plan_defect_metric": float(spec.trajectory.bundle.defect)
+        * np.sqrt(np.linalg.eigvalsh(M_plan)[:, -1].max()),
+        "upper": np.linalg.eigvalsh(np.linalg.inv(values(model.W, model.states, x)))[:, -1].max(),
+    }
+    for name, value in sampled.items():
+        assert value <= c[name].above, name
+        assert c[name].below <= c[name].above <= value * 1.03, name
+    limit = float(spec.trajectory.bundle.defect)
+    assert limit <= c["plan_defect"].above <= limit * (1 + 1e-11)
+
+
+@pytest.mark.slow
+def test_the_constants_of_members_are_at_most_those_of_the_family(document):
+    """Twenty plans of the family, by the methods for single plans."""
+    family, rho = document["result"]["constants"], Fraction(repr(document["result"]["tube"]["rho"]))
+    rng = np.random.default_rng(3)
+    for k in range(20):
+        w = Fraction(int(rng.integers(1, 4)))
+        a, b = (Fraction(int(rng.integers(0, 51)), 100) for _ in range(2))
+        moving = f'expressions, x: ["{a}*sin({w}*t)", "{b}*cos({w}*t)"], u: ["{2 * a}*sin({w}*t)**2"]'
+        held = f"equilibrium, at: [{2 * a}, -{b}], input: [{1 - 2 * b}]"
+        plan = f"trajectory: {{kind: {moving if k % 4 else held}, horizon: 2}}"
+        spec = load_text(FAMILY.replace(OWN, plan))
+        model = build(spec)
+        own = Suprema(model, plan_of(spec, model), 0.0, (0, 2), Effort(gap=0.05)).with_radius(rho)
+        for name, found in (
+            ("u_star", own.input_on_plan()),
+            ("metric_input_gain", own.metric_input_gain()),
+            ("drift_on_plan", own.drift_on_plan()),
+            ("h", own.uncertainty()[0]),
+        ):
+            assert 0 <= found.below <= family[name]["above"] * (1 + 1e-12), (plan, name)
+
+
+def test_the_tube_of_a_family_is_what_lies_within_rho_of_its_box():
+    spec = load_text(FAMILY)
+    plan, rho = plan_of(spec, build(spec)), 0.5
+    tube = Tube(plan, rho, states=spec.states, inputs=(), time=None)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-2, 2, (4000, 2))
+    gap = np.maximum(0.0, np.maximum(np.array([-1, -0.5]) - points, points - np.array([1, 0.5])))
+    distance = np.linalg.norm(gap, axis=1)
+    _, _, alive = tube.contract(spec.states, points, points)
+    assert alive[distance <= rho].all()
+    assert not alive[distance > rho * (1 + 1e-9)].any()
+    lo, hi = tube.inside(spec.states, points)
+    assert len(lo) > 0.99 * len(points)
+    assert (lo == hi).all()
+    moved = np.maximum(0.0, np.maximum(np.array([-1, -0.5]) - lo, lo - np.array([1, 0.5])))
+    assert (np.linalg.norm(moved, axis=1) <= rho).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(low=st.fractions(-2, 2), width=st.fractions(0, 2), rho=st.fractions("1/100", 3))
+def test_containment_is_exact_but_for_roundings(low, width, rho):
+    """P + rho in the safe set, in rational arithmetic."""
+    text = FAMILY.replace("x1: [-1, 1], x2", f"x1: [{low}, {low + width}], x2")
+    spec = load_text(text)
+    found = containment(plan_of(spec, build(spec)), rho, spec.states, spec.safe_set, Effort())
+    room = min(6 - (low + width) - rho, low - rho + 6, Fraction(11, 2) - rho)
+    if abs(room) > Fraction(1, 10**6):
+        assert found.verdict is (Verdict.CERTIFIED if room > 0 else Verdict.REFUTED)
+    else:
+        assert found.verdict is not Verdict.REFUTED or room < 0
+
+
+def test_a_family_that_leaves_the_safe_set_is_refuted_where_it_does():
+    result = result_of(FAMILY.replace("x2: [-0.5, 0.5]", "x2: [-0.5, 5.5]"))
+    assert result.verdict is Verdict.REFUTED
+    assert result.reason.claim.state == "x2"
+    assert result.reason.at.x[1] > 6
+    assert (
+        failing(examine(sealed({"format": "tubecert-certificate/2", "result": result.to_json(), "run": {}})))
+        == []
+    )
+
+
+def test_it_is_written_and_read_again():
+    spec = load_text(BENT)
+    again = load_text(json.dumps(canonical(spec)))
+    assert again.trajectory == spec.trajectory
+    assert canonical(again) == canonical(spec)
+    wide = load_text(BENT.replace("x: [-0.5, 0.7]", "x: [-pi/6, pi/5]")).trajectory.bundle
+    assert wide.x[0][0] < -Fraction("0.523598775598298")  # outward: all that is asked for is covered
+    assert wide.x[0][1] > Fraction("0.628318530717958")
+
+
+def changed(document, change):
+    made = copy.deepcopy(document)
+    change(made["result"])
+    return sealed(made)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["metric_input_gain", "plan_defect_metric", "drift_on_plan", "initial_distance"]
+)
+def test_two_percent_less_is_not_confirmed_where_the_metric_moves(name):
+    def less(result):
+        constant = result["constants"][name]
+        constant.update(above=constant["above"] * 0.98, below=0.0)
+
+    assert failing(examine(changed(proven(BENT, conditions="distance"), less))) != []
+
+
+LIES = {
+    "u_star": lambda c: c["u_star"].update(above=0.98, below=0.97),
+    "phi": lambda c: c["drift_on_plan"].update(above=c["drift_on_plan"]["above"] * 0.98, below=1.0),
+    "beta": lambda c: c["metric_input_gain"].update(above=c["metric_input_gain"]["above"] * 0.98, below=0.1),
+    "delta": lambda c: c["plan_defect_metric"].update(
+        above=c["plan_defect_metric"]["above"] * 0.98, below=0.0
+    ),
+    "delta_p": lambda c: c["plan_defect"].update(above=0.0098, below=0.0),
+    "H0": lambda c: c["h_initial"].update(above=c["h_initial"]["above"] * 0.98, below=0.0),
+    "h": lambda c: c["h"].update(above=c["h"]["above"] * 0.98, below=0.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LIES)
+def test_a_constant_of_a_family_that_is_too_small_is_not_confirmed(document, name):
+    forged = changed(document, lambda result: LIES[name](result["constants"]))
+    assert failing(examine(forged)) != []
+
+
+def wider(trajectory):
+    trajectory["x"]["x1"] = ["-3", "3"]
+
+
+FORGED = {
+    "wider boxes in the specification alone": lambda r: wider(r["spec"]["effective"]["trajectory"]),
+    "wider inputs": lambda r: r["spec"]["effective"]["trajectory"]["u"].update(u=["-2", "2"]),
+    "more defect": lambda r: r["spec"]["effective"]["trajectory"].update(defect="0.1"),
+    "wider boxes in the claim": lambda r: r["claim"]["plans"]["x"].update(x1=["-3", "3"]),
+    "more defect in the claim": lambda r: r["claim"]["plans"].update(defect="0.1"),
+    "no family in the claim": lambda r: r["claim"].pop("plans"),
+    "both wider": lambda r: (
+        wider(r["spec"]["effective"]["trajectory"]),
+        r["claim"]["plans"]["x"].update(x1=["-3", "3"]),
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORGED)
+def test_a_family_that_was_not_proven_is_not_confirmed(document, name):
+    forged = changed(document, FORGED[name])
+    effective = forged["result"]["spec"]["effective"]
+    from tubecert.certificate import digest
+
+    forged["result"]["spec"]["effective_hash"] = digest(effective)
+    assert failing(examine(sealed(forged))) != []
+
+
+REFUSED = {
+    "a start at a point": lambda e: e.update(initial_state={"at": ["0", "0"]}),
+    "an unknown key": lambda e: e["trajectory"].update(speed="1"),
+    "a state that is missing": lambda e: e["trajectory"]["x"].pop("x2"),
+    "an empty range": lambda e: e["trajectory"]["u"].update(u=["1", "-1"]),
+    "a tube in other coordinates": lambda e: e["tube"].update(coordinates="auto"),
+    "a negative defect": lambda e: e["trajectory"].update(defect="-1"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_recheck_refuses_what_is_no_family(document, name):
+    from tubecert.errors import TubecertError
+
+    forged = changed(document, lambda result: REFUSED[name](result["spec"]["effective"]))
+    with pytest.raises(TubecertError) as caught:
+        examine(forged)
+    assert {item.code for item in caught.value.findings} <= {"TC601", "TC603"}
+
+
+def test_samples_of_a_family_are_refused(document):
+    from tubecert.errors import TubecertError
+
+    forged = changed(document, lambda r: r["plan"].update(samples={"t": [0.0], "x": [[0.0, 0.0]]}))
+    with pytest.raises(TubecertError):
+        examine(forged)
+
+
+def test_a_family_is_no_plan_that_a_loop_can_follow(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "any.yaml").write_text(FAMILY)
+    done = CliRunner().invoke(app, ["simulate", "any.yaml"])
+    assert done.exit_code == 2
+    assert "TC708" in done.output
+    assert "--bandwidth" in done.output
+
+
+def test_the_report_names_the_family(document):
+    from tubecert.certificate.result import Certificate
+    from tubecert.report.sections import family_words, plan_words
+
+    result = Certificate.from_json(document).result
+    assert plan_words(result) == "every plan of the family"
+    assert family_words(result.claim.plans) == (
+        "x1* in [-1, 1], x2* in [-0.5, 0.5], u* in [-1, 1]; |x*' - f(x*) - B(x*) u*| <= 0.01"
+    )
+
+
+@pytest.mark.slow
+def test_h_without_a_period_needs_a_horizon():
+    text = FAMILY.replace("sin(2*t)", "exp(-t)")
+    with pytest.raises(SpecError, match="TC204"):
+        result_of(text)
+    assert result_of(text.replace("defect: 0.01}", "defect: 0.01, horizon: 3}")).claim.horizon == "3"
