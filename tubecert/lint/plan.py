@@ -119,13 +119,20 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
 
 
 def _least_radius(spec: Spec) -> float:
-    """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown)."""
+    """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown).
+
+    Of half-widths it is the least one, for comparison only: the other states make the tube thinner.
+    """
     tube = spec.tube
+    if tube.half_widths:
+        return nearest(min(width for _, width in tube.half_widths))
     radius = nearest((tube.epsilon or Fraction(0)) + (tube.rho_a or Fraction(0)))
     return radius + (0.0 if spec.within is None else nearest(spec.within))
 
 
 def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+    if spec.tube.auto:  # how far it reaches in x is the metric's
+        return
     offset = 0.0
     if spec.within is None and spec.trajectory.task is None:
         spread = floats([(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0))

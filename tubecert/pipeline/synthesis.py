@@ -49,6 +49,7 @@ from tubecert.expression import to_text
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
+from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
@@ -210,8 +211,6 @@ class SynthesisRun:
 
     def _certifiable(self) -> None:
         """Raises `SpecError` if the end cannot be judged: what `certify` needs is missing."""
-        from tubecert.pipeline.checks import missing_radii
-
         missing = missing_radii(self.spec)
         if missing:
             raise SpecError(missing)
@@ -239,8 +238,7 @@ class SynthesisRun:
             condition_number=metric.condition_number.above,
             metric=metric,
         )
-        tube = self.spec.tube
-        if tube.epsilon is None or tube.rho_a is None:
+        if missing_radii(self.spec):
             return row
         try:
             spec = self._with(metric)

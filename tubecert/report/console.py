@@ -51,7 +51,8 @@ def verdict_line(result: Result) -> Text:
     line.append(f" {name(result)}: ", style="bold")
     if verdict is Verdict.CERTIFIED:
         chosen = deciding(result)
-        numbers = [f"rho = {up(sections.radius(result))}"]
+        measured = result.tube is not None and result.tube.coordinates is not None
+        numbers = [sections.extent(result) if measured else f"rho = {up(sections.radius(result))}"]
         numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))
     else:
@@ -89,7 +90,7 @@ def _promise(result: Result) -> Text:
     chosen = deciding(result)
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
-        f"With this metric, {loops}, the state stays within {up(sections.radius(result))} of "
+        f"With this metric, {loops}, the state stays within {sections.extent(result)} of "
         f"{sections.plan_words(result)} {sections.span(result)}, under the assumptions below."
     )
 

@@ -72,10 +72,19 @@ def _plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
         units=(units.get(states[i], ""), units.get(states[j], "")),
         index=pair,
         plan=tuple((float(x[i]), float(x[j])) for x in samples),
-        rho=None if result.tube is None else float(result.tube.rho),
+        rho=_reach(result, pair),
         sides=(float(widths[states[i]]), float(widths[states[j]])) if widths else None,
         safe=((low[0], low[1]), (high[0], high[1])),
     )
+
+
+def _reach(result: Result, pair: tuple[int, int]) -> float | None:
+    """The radius of a ball; what covers the half-widths, where these are what is known of a projection."""
+    tube = result.tube
+    if tube is None or tube.coordinates is None or tube.half_widths is None:
+        return None if tube is None else float(tube.rho)
+    states = result.spec.effective.system.states
+    return math.hypot(*(tube.half_widths[states[i]] for i in pair))
 
 
 def tube_figures(result: Result) -> list[Figure]:

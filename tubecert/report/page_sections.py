@@ -40,6 +40,7 @@ _TUBE = (
     "The tube projected on each plane: the state is within rho of the plan in the Euclidean norm, and each coordinate "
     "within its half-width."
 )
+_SIDES = "The tube projected on each plane: each coordinate is within its half-width of the plan."
 
 
 def page_of(certificate: Certificate) -> Page:
@@ -160,17 +161,23 @@ def _tube(result: Result) -> Iterator[Block]:
     if figures:
         yield Figures(figures=figures)
         if result.tube is not None and result.tube.half_widths is not None:
-            yield Words(text=_TUBE)
+            yield Words(text=_TUBE if result.tube.coordinates is None else _SIDES)
 
 
 def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
     yield "radius rho", Cell(text=sections.radii(tube))
     yield "epsilon", Cell(text=short(tube.epsilon))
+    if tube.coordinates is not None:
+        yield (
+            "measured by",
+            Cell(text="the metric: rho, rho_a and epsilon are lengths in it, whatever the units of states"),
+        )
+        yield "epsilon, by state", Cell(text=f"at most {sections.in_states(result, tube, tube.epsilon)}")
     if tube.half_widths:
         yield "half-widths", Cell(text=sections.half_widths(result, tube.half_widths))
     yield "claimed", Cell(text=sections.span(result))
-    for words, radius in sections.long_run(result):
-        yield f"in the long run, {words}", Cell(text=f"|x - x*| <= {up(radius)}")
+    for words, rest in sections.long_run(result):
+        yield f"in the long run, {words}", Cell(text=rest)
 
 
 def _rests_on(result: Result) -> Iterator[Block]:

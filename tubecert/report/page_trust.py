@@ -22,7 +22,10 @@ def proven(result: Result) -> Iterator[str]:
                 "compatible with the inputs (C3) on the whole safe set."
             )
     if tube is not None and tube.rho_r is not None:
-        yield f"The tube of radius {up(tube.rho)} around {plan_words(result)} lies in the safe set."
+        if tube.coordinates is None:
+            yield f"The tube of radius {up(tube.rho)} around {plan_words(result)} lies in the safe set."
+        else:
+            yield f"The tube, as wide as its half-widths around {plan_words(result)}, lies in the safe set."
     if metric is not None and metric.unique_geodesics is not None and metric.unique_geodesics.holds:
         yield "Minimising geodesics in the tube are unique."
     if count := len(result.constants):

@@ -180,8 +180,25 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(f"around every plan with {family_words(result.claim.plans)}")
     if tube.half_widths:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
-    found = (f"in the long run |x - x*| <= {up(radius)} with {title}" for title, radius in long_run(result))
+    if tube.coordinates is not None:
+        lines[0] += " (lengths in the metric)"
+        lines.append(f"a length of epsilon in the metric is at most {in_states(result, tube, tube.epsilon)}")
+    found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
+
+
+def extent(result: Result) -> str:
+    """How far the state may be from the plan: the radius, or the half-widths of a tube measured by the metric."""
+    tube = result.tube
+    if tube is None or tube.coordinates is None or tube.half_widths is None:
+        return up(radius(result))
+    return f"the half-widths {half_widths(result, tube.half_widths)}"
+
+
+def in_states(result: Result, tube: TubeData, length: Fraction) -> str:
+    """What a length in the metric is in each state: that part of the half-widths."""
+    share = float(length / tube.rho)
+    return half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
 
 
 def radii(tube: TubeData) -> str:
@@ -200,15 +217,22 @@ def half_widths(result: Result, widths: Mapping[str, float]) -> str:
     )
 
 
-def long_run(result: Result) -> Iterator[tuple[str, float]]:
-    """The radius that remains when the initial error has died out, for each certificate that holds."""
+def long_run(result: Result) -> Iterator[tuple[str, str]]:
+    """How near the plan the state is when the initial error has died out, for each certificate that holds."""
     if horizon(result) is not None:
         return
     for key, words in NAMES.items():
         section = result.sections.get(key)
         held = section is not None and section.verdict is Verdict.CERTIFIED
         if section is not None and held and section.ultimate_radius is not None:
-            yield words, section.ultimate_radius
+            yield words, _rest(result, section.ultimate_radius)
+
+
+def _rest(result: Result, ultimate: float) -> str:
+    tube = result.tube
+    if tube is None or tube.coordinates is None:
+        return f"|x - x*| <= {up(ultimate)}"
+    return f"|x_i - x_i*| <= {up(100 * ultimate / float(tube.rho), 3)} % of the half-widths"
 
 
 def _metric(result: Result, metric: MetricData) -> list[RenderableType]:

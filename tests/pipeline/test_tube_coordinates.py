@@ -1,0 +1,231 @@
+"""Tubes measured by the metric, end to end: gains depend on no units, only half-widths must fit into the safe set."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tubecert.certificate.result import Result
+from tubecert.claims import TubeInSafeSet
+from tubecert.errors import SpecError
+from tubecert.pipeline import Options, certify
+from tubecert.simulate.compare import compare
+from tubecert.simulate.fast import generator
+from tubecert.simulate.grid import fast_part
+from tubecert.simulate.integrator import integrate
+from tubecert.simulate.layout import slices
+from tubecert.simulate.monte_carlo import case, disturbance_of
+from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.spec import load_text
+from tubecert.verdict import Verdict
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+COARSE = Options(gap=Fraction(1, 5))
+# a link and a motor behind a spring; W for speeds in rad/s
+JOINT = np.array(
+    [
+        [2.3016, -3.1262, 1.0781, 5.0602],
+        [-3.1262, 29.5904, -7.9889, -11.166],
+        [1.0781, -7.9889, 4.443, -5.0177],
+        [5.0602, -11.166, -5.0177, 89.4433],
+    ]
+)
+
+
+def joint(
+    s: int, order: tuple[int, ...] = (0, 1, 2, 3), clock: int = 1, tube: str = "half_widths: {q: 0.15}"
+) -> str:
+    """A flexible joint with speeds in s rad/s, states in an order, and time in units of 1/clock s."""
+    names = np.array(["q", "w", "th", "om"])
+    f = np.array(["s*w", "(-10*(q - th) - 5*sin(q))/s", "s*om", "20*(q - th)/s"])
+    B = np.array(["0", "0", "0", "2/s"])
+    sides = [1.0, 8 / s, 2.0, 20 / s]
+    scale = np.diag([1, 1 / s, 1, 1 / s])
+    W = (scale @ JOINT @ scale)[np.ix_(order, order)]
+    at = list(order)
+    return f"""tubecert: 1
+name: joint
+system:
+  states: [{", ".join(names[at])}]
+  inputs: [tau]
+  parameters: {{s: {s}, c: {clock}}}
+  f: [{", ".join(f'"({e})/c"' for e in f[at])}]
+  B: [{", ".join(f'["{e}/c"]' for e in B[at])}]
+safe_set: {{{", ".join(f"{names[i]}: [{-sides[i]!r}, {sides[i]!r}]" for i in at)}}}
+uncertainty: {{h: ["0.05*sin(t/c) + 0.02*norm(q)"]}}
+trajectory: {{kind: equilibrium, at: [0, 0, 0, 0]}}
+metric: {{dual_metric: {[[repr(float(value)) for value in row] for row in W]}, rate: 1/c}}
+tube: {{{tube}}}
+"""
+
+
+def gains(result: Result) -> dict[str, float]:
+    """The numbers of every kind's recipe that a controller takes."""
+    taken = ("bandwidth", "adaptation_rate", "sample_time")
+    recipes = result.to_json()["proof"]
+    return {
+        f"{key} {name}": recipe[name] for key, recipe in recipes.items() for name in taken if name in recipe
+    }
+
+
+@pytest.fixture(scope="module")
+def plain() -> Result:
+    result = certify(load_text(joint(1)), COARSE)
+    assert result.verdict is Verdict.CERTIFIED
+    assert len(gains(result)) == 6
+    return result
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("s", [4, 12])
+def test_units_change_no_gain(plain, s):
+    """Issue of the flexible joint: omega was 1017 for s = 1, 93 for s = 4 and 11 for s = 12."""
+    other = certify(load_text(joint(s)), COARSE)
+    assert gains(other) == pytest.approx(gains(plain), rel=5e-3)
+    for name, width in plain.tube.half_widths.items():
+        expected = width / s if name in ("w", "om") else width
+        assert other.tube.half_widths[name] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [(3, 2, 1, 0), (1, 3, 0, 2)])
+def test_the_order_of_the_states_changes_no_gain(plain, order):
+    other = certify(load_text(joint(1, order)), COARSE)  # enclosures at 20 % are not the same
+    assert gains(other) == pytest.approx(gains(plain), rel=5e-2)
+    assert other.tube.half_widths == pytest.approx(plain.tube.half_widths, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_unit_of_time_changes_gains_by_its_power(plain):
+    """omega is 1/s; Gamma is per unit of x x/u s, but s enters B, too: sigma' = Gamma B'P xt has it once."""
+    other, own = gains(certify(load_text(joint(1, clock=3)), COARSE)), gains(plain)
+    for name, value in own.items():
+        power = {"bandwidth": -1, "adaptation_rate": 0, "sample_time": 1}[name.split()[1]]
+        assert other[name] == pytest.approx(3**power * value, rel=1e-2), name
+
+
+@pytest.mark.slow
+def test_identity_as_it_was_depends_on_units():
+    """What the coordinates are for: the same radii as a ball give other gains in other units."""
+    ball = "epsilon: 0.05, rho_a: 0.03"
+    found = [gains(certify(load_text(joint(s, tube=ball)), COARSE)) for s in (1, 4)]
+    assert found[0]["distance bandwidth"] > 3 * found[1]["distance bandwidth"]
+
+
+PENDULUM = """tubecert: 1
+name: pendulum
+system: {states: [q, w], inputs: [tau], f: [w, "9.81*sin(q) - 0.1*w"], B: [[0], [1]]}
+safe_set: {q: [-0.4, 0.4], w: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t) + 0.05*norm(w)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {rate: 1, dual_metric: [[0.3, -0.6], [-0.6, 2.4]]}
+tube: {TUBE}
+"""
+
+
+def test_a_tube_whose_half_widths_fit_is_not_refused():
+    """The ball of w's size leaves the safe set through q, which never moves so far."""
+    refused = certify(load_text(PENDULUM.replace("TUBE", "epsilon: 0.4, rho_a: 0.4")), COARSE)
+    assert refused.verdict is Verdict.REFUTED
+    assert isinstance(refused.reason.claim, TubeInSafeSet)
+    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")), COARSE)
+    assert found.verdict is Verdict.CERTIFIED
+    widths = found.tube.half_widths
+    assert widths["q"] == pytest.approx(0.3, rel=1e-6)
+    assert widths["w"] == pytest.approx(0.3 * np.sqrt(2.4 / 0.3), rel=1e-6)
+    assert float(found.tube.rho) > 0.4  # a ball of that radius would leave
+    same = certify(
+        load_text(PENDULUM.replace("TUBE", "epsilon: 0.27, rho_a: 0.27, coordinates: auto")), COARSE
+    )
+    assert same.verdict is Verdict.CERTIFIED
+    assert float(same.tube.rho) == pytest.approx(0.54)
+    assert same.tube.half_widths["q"] == pytest.approx(0.54 * np.sqrt(0.3), rel=1e-6)
+
+
+def test_half_widths_that_leave_the_safe_set_are_told_by_state():
+    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {w: 1.9}")), COARSE)
+    assert found.verdict is Verdict.UNDECIDED  # half-widths are bounds: nothing is refuted
+    claim = found.reason.claim
+    assert isinstance(claim, TubeInSafeSet)
+    assert claim.state == "q"
+    assert found.tube is None
+
+
+def test_a_radius_of_the_command_line_splits_the_tube():
+    spec = load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}"))
+    half = certify(spec, COARSE).tube
+    less = certify(spec, Options(gap=Fraction(1, 5), rho_a=Fraction(1, 20))).tube
+    assert float(half.rho_a) == pytest.approx(float(half.rho) / 2)
+    assert (less.rho, less.rho_a) == (half.rho, Fraction(1, 20))
+    with pytest.raises(SpecError, match="beside tube"):
+        certify(spec, Options(epsilon=Fraction(1, 20)))
+
+
+def test_a_start_takes_its_part_of_the_tube():
+    at_rest = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")), COARSE)
+    moved = PENDULUM.replace("TUBE", "half_widths: {q: 0.3}") + "initial_state: {at: [0.1, 0]}\n"
+    found = certify(load_text(moved), COARSE)
+    assert found.tube.rho == at_rest.tube.rho
+    assert found.verdict is Verdict.CERTIFIED
+    M = np.linalg.inv(np.array([[0.3, -0.6], [-0.6, 2.4]]))
+    assert found.constants["initial_distance"].above == pytest.approx(0.1 * np.sqrt(M[0, 0]), rel=1e-6)
+    assert float(found.tube.epsilon + found.tube.rho_a) == pytest.approx(
+        float(found.tube.rho) - 0.1 * np.sqrt(M[0, 0]), rel=1e-5
+    )
+    beyond = certify(load_text(moved.replace("[0.1, 0]", "[0.35, 0]")), COARSE)
+    assert beyond.verdict is not Verdict.CERTIFIED
+    assert not beyond.proof.of
+
+
+def test_without_coordinates_certificates_are_as_they_were():
+    result = certify(load_text(PENDULUM.replace("TUBE", "epsilon: 0.1, rho_a: 0.1")), COARSE).to_json()
+    assert set(result["tube"]) == {"epsilon", "rho_a", "rho_r", "rho", "half_widths"}
+    assert set(result["spec"]["effective"]["tube"]) == {"epsilon", "rho_a"}
+    text = PENDULUM.replace("TUBE", "epsilon: 0.1, rho_a: 0.1, coordinates: identity")
+    assert certify(load_text(text), COARSE).to_json()["tube"] == result["tube"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tube", ["half_widths: {x1: 0.04}", "epsilon: 0.02, rho_a: 0.02, coordinates: auto"])
+def test_simulations_stay_within_what_is_certified(tube):
+    """A metric that is not constant: the loop written in z, random uncertainties of the class in z."""
+    text = re.sub(
+        r"^tube: .*$", f"tube: {{{tube}}}", (CONFIGS / "three_state.yaml").read_text("utf-8"), flags=re.M
+    )
+    spec = load_text(text)
+    result = certify(spec, COARSE)
+    assert result.verdict is Verdict.CERTIFIED
+    setting = setting_of(spec, result)
+    for controller, source in (("l1", "distance"), ("sampled", "sampled")):
+        loop = loop_of(setting, controller, Choice(source=source))
+        cases = [case(setting, 0, number) for number in range(6)]
+        starts = np.array([each.start for each in cases])
+        runs = integrate(loop.problem, starts, disturbance_of(setting, cases), tolerance=setting.tolerance)
+        found = compare(setting, runs, loop.promise)
+        assert not found.violations
+        assert not found.outside
+        assert found.uses["xtilde"].value > 0
+
+
+@pytest.mark.slow
+def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
+    """Its field is that of the same system written in z, where P = I: one step of it, mapped back, is a step here."""
+    result = certify(load_text(joint(12)), COARSE)
+    setting = setting_of(load_text(joint(12)), result)
+    loop = loop_of(setting, "l1", Choice(source="distance"))
+    S, P = setting.S, loop.problem.P
+    assert not np.allclose(P, np.eye(4))
+    lengths = np.array([0.01])
+    own = fast_part(loop.problem, lengths, 0)
+    B = np.array([[0.0], [0.0], [0.0], [2 / 12]])
+    L, E = generator(own, B)
+    L_z, E_z = generator(own._replace(P=np.eye(4)), S @ B)
+    y = slices(own.at)
+    T = np.eye(own.at.size)
+    T[y.xtilde, y.xtilde] = T[y.v, y.v] = S
+    assert T @ L @ np.linalg.inv(T) == pytest.approx(L_z)
+    assert pytest.approx(E_z) == T @ E
