@@ -230,6 +230,39 @@ def test_two_percent_less_is_not_confirmed_where_the_metric_moves(name):
     assert failing(examine(changed(proven(BENT, conditions="distance"), less))) != []
 
 
+WIDE = BENT.replace("tube: {epsilon: 0.2, rho_a: 0.1}", "tube: {half_widths: {x: 0.3, y: 0.35}}")
+
+
+@pytest.mark.slow
+def test_a_tube_in_coordinates_of_its_own():
+    """The ellipsoid of the metric, cut to half-widths, around the box: sampled, confirmed, and what is less is not."""
+    spec, made = load_text(WIDE), proven(WIDE, conditions="distance")
+    assert failing(examine(made)) == []
+    tube, c, model = made["result"]["tube"], made["result"]["constants"], build(spec)
+    S = np.array([[float(Fraction(value)) for value in row] for row in tube["coordinates"]])
+    rng, N = np.random.default_rng(5), 40_000
+    low, high = (np.array([float(ends[k]) for ends in spec.trajectory.bundle.x]) for k in (0, 1))
+    plan = np.where(rng.random((N, 2)) < 0.5, low, high)
+    angle = rng.uniform(0, 2 * np.pi, N)
+    offset = tube["rho"] * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.inv(S).T
+    keep = np.all(np.abs(offset) <= [tube["half_widths"][name] for name in spec.states], axis=1)
+    plan, x = plan[keep], (plan + offset)[keep]
+    u = rng.choice([float(end) for end in spec.trajectory.bundle.u[0]], len(x))
+    f, B = values([(e,) for e in model.f], model.states, x)[..., 0], values(model.B, model.states, x)
+    M = np.linalg.inv(values(model.W, model.states, plan))
+    limit = float(spec.trajectory.bundle.defect)
+    sampled = {
+        "drift_on_plan": np.linalg.norm((f + B[..., 0] * u[:, None]) @ S.T, axis=1).max(),
+        "plan_defect": limit * np.linalg.norm(S, 2),
+        "plan_defect_metric": limit * np.sqrt(np.linalg.eigvalsh(M)[:, -1].max()),
+    }
+    for name, value in sampled.items():
+        assert value * 0.97 <= c[name]["below"] <= c[name]["above"], name
+        assert value <= c[name]["above"] <= value * 1.03, name
+        less = lambda r, name=name: r["constants"][name].update(above=c[name]["above"] * 0.96, below=0.0)  # noqa: E731
+        assert failing(examine(changed(made, less))) != [], name
+
+
 LIES = {
     "u_star": lambda c: c["u_star"].update(above=0.98, below=0.97),
     "phi": lambda c: c["drift_on_plan"].update(above=c["drift_on_plan"]["above"] * 0.98, below=1.0),
@@ -284,7 +317,6 @@ REFUSED = {
     "an unknown key": lambda e: e["trajectory"].update(speed="1"),
     "a state that is missing": lambda e: e["trajectory"]["x"].pop("x2"),
     "an empty range": lambda e: e["trajectory"]["u"].update(u=["1", "-1"]),
-    "a tube in other coordinates": lambda e: e["tube"].update(coordinates="auto"),
     "a negative defect": lambda e: e["trajectory"].update(defect="-1"),
 }
 

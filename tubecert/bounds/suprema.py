@@ -16,7 +16,7 @@ from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
-from tubecert.enclosure.domain import Range
+from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil, SumOfPencils
@@ -212,15 +212,23 @@ class Suprema:
         return self._constant(defect.in_state()), self._constant(defect.in_metric())
 
     def _limited_defect(self, limit: Fraction) -> tuple[Constant, Constant]:
-        """The limit, and the limit times the root of sup lmax(M) on the plan: any p that is allowed may be met."""
-        low, high = fraction_bounds(limit)
-        if not high > 0:
+        """The limit, and the limit times the root of sup lmax(M) on the plan: any p that is allowed may be met.
+
+        The limit is of |p| in x, and M the metric in x; in z = S x the first is |S| times that.
+        """
+        if not limit:
             return Constant.exactly(0.0), Constant.exactly(0.0)
+        length = Interval.of(limit)
+        own = length
+        if self.coordinates is not None:
+            norm = supremum(SumOfNorms([self.coordinates.S]), BoxDomain({}), self.effort)
+            own = Interval(norm.below, norm.above) * length
         M = Pencil(identity(len(self.model.states)), self.plan.on(self.model, self.model.W))
         stretch = self._root(self._search_plan("plan_defect_metric", M))
-        size = Interval(low, high) * Interval(stretch.below, stretch.above)
-        return Constant(below=low, above=high), Constant(
-            below=float(size.lo), above=float(size.hi), at=stretch.at
+        size = length * Interval(stretch.below, stretch.above)
+        return (
+            Constant(below=float(own.lo), above=float(own.hi)),
+            Constant(below=float(size.lo), above=float(size.hi), at=stretch.at),
         )
 
     def half_widths(self) -> tuple[Constant, ...]:

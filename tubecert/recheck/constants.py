@@ -151,11 +151,19 @@ def _defect_zero(place: Place, p: Matrix) -> bool:
 
 def _plan_defect(place: Place, limit: Fraction) -> Outcome:
     if isinstance(place.curve, Everyone):
-        return stated(limit >= place.curve.limit, "it is below the defect that is allowed")
+        return _allowed_defect(place, place.curve, limit)
     p = defect(place)
     if _defect_zero(place, p):
         return stated(True, "")
     return place.along(lambda: NormsBelow([place.fields.vector(p)], limit, place.numbers))
+
+
+def _allowed_defect(place: Place, curve: Everyone, limit: Fraction) -> Outcome:
+    """|S p| <= |S| |p|, attained by some p that is allowed; |p| where there is no S."""
+    if place.coordinates is None:
+        return stated(limit >= curve.limit, "it is below the defect that is allowed")
+    own = exact(curve.limit) * sharp_norm([[exact(q) for q in row] for row in place.coordinates.S])
+    return stated(bool(own <= exact(limit)), "it is below the defect that is allowed")
 
 
 def _allowed_defect_metric(place: Place, curve: Everyone, limit: Fraction) -> Outcome:

@@ -204,8 +204,6 @@ def read_specification(node: Node) -> Specification:
         content=digest({key: value for key, value in node.mapping().items() if key not in _IDLE}),
     )
     _idle(own, plant)
-    if isinstance(found.trajectory, AnyPlan) and own["tube"].mapping().keys() != {"epsilon", "rho_a"}:
-        raise own["tube"].refused("must be epsilon and rho_a: a family of plans has no other tube")
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
     return found

@@ -151,12 +151,6 @@ def _read_named(
     plan = completed(plan, x0) if plan else None
     metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)
-    if plan is not None and plan.bundle is not None and tube is not None and tube.auto:
-        entries["tube"].fail(
-            codes.NOT_YET,
-            "a family of plans in coordinates of its own is not yet supported",
-            "write tube: {epsilon: ..., rho_a: ...}",
-        )
     adaptation = read_adaptation(entries.get("adaptation"), names)
     check_predictor(reader, tube, adaptation)
     kernel, _ = read_kernel(entries.get("conditions"))
