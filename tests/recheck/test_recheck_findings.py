@@ -14,6 +14,7 @@ from tubecert import spec
 from tubecert.certificate.result import Result
 from tubecert.cli.belonging import ForeignError, belongs
 from tubecert.errors import ExitCode
+from tubecert.expression import number_text
 from tubecert.recheck import geodesics
 from tubecert.recheck.document import Node
 from tubecert.records import FormError
@@ -75,7 +76,7 @@ def scaled(document, factor, rows):
     first = [Fraction(x) for x in knots["x"][0]]
     for k in rows:
         knots["x"][k] = [
-            str(a + factor * (Fraction(x) - a)) for a, x in zip(first, knots["x"][k], strict=True)
+            number_text(a + factor * (Fraction(x) - a)) for a, x in zip(first, knots["x"][k], strict=True)
         ]
     return sealed(document)
 
@@ -165,7 +166,7 @@ def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
     with ctx.workprec(64):
         assert geodesics.unique(place, value).holds
         sampled = [
-            Fraction(geodesics._sampled(geodesics.SymbolsBelow(place.system, order, Fraction(0)), place))
+            Fraction(geodesics._sampled(geodesics.SymbolsBelow(place.fields, order, Fraction(0)), place))
             for order in (0, 1)
         ]
         tight = sampled[0] * place.rho + sampled[1] * place.rho**2 / 8

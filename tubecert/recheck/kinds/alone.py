@@ -80,7 +80,7 @@ class Alone(Kind[AloneSection, NoGains]):
             yield ground.claim(
                 f"0: sup D <= {float(top):.6g} without adaptation",
                 (top,),
-                lambda: at_most(supremum(setting, setting.n.h), top, "sup D without adaptation"),
+                lambda: _reaches(top, ground),
             )
         if limit is not None:
             yield ground.claim(
@@ -98,11 +98,23 @@ def settled(setting: Setting, h: Ball) -> Ball:
 
 def supremum(setting: Setting, h: Ball) -> Ball:
     """sup D of (4.0) over the horizon: at one of its ends."""
+    return larger(setting.n.initial_distance, _at_the_end(setting, h))
+
+
+def _at_the_end(setting: Setting, h: Ball) -> Ball:
     d0, A1 = setting.n.initial_distance, settled(setting, h)
     if setting.horizon is None:
-        return larger(d0, A1)
+        return A1
     left = (-setting.rate * setting.horizon).exp()
-    return larger(d0, d0 * left + A1 * (1 - left))
+    return d0 * left + A1 * (1 - left)
+
+
+def _reaches(top: Fraction, ground: Ground) -> Outcome:
+    """sup D is at most this: d0, which may be the very same decimal, exactly; the end as a ball."""
+    d0 = ground.constants["initial_distance"].above
+    started = stated(d0 is not None and d0 <= top, "it is less than d0")
+    end = _at_the_end(ground.setting, ground.setting.n.h)
+    return all_of((started, at_most(end, top, "sup D without adaptation")))
 
 
 def _holds(section: AloneSection, recipe: NoGains | None, setting: Setting) -> Outcome:
