@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.coordinates import Coordinates, Fields
@@ -239,6 +240,22 @@ class Suprema:
             effort = None if self.coordinates is None else self._fine  # it is no part of a ball
             found.append(self._root(self._over_tube(f"half width of {name}", entry, effort)))
         return tuple(found)
+
+    def shape_in(self, first: int, second: int) -> Shape:
+        """Bounds over the tube of the block of W that belongs to two states."""
+
+        def most(entry: Expression) -> float:
+            if entry.is_constant:
+                return fraction_bounds(entry.fraction)[1]
+            return self._over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
+
+        W = self.model.W
+        return Shape(
+            first=most(W[first][first]),
+            second=most(W[second][second]),
+            low=-most(-W[first][second]),
+            high=most(W[first][second]),
+        )
 
     # -- searches ----------------------------------------------------------------------------------------------
 
