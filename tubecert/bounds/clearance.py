@@ -4,8 +4,8 @@ In: the plan, an obstacle in the plane of two states, how far the tube reaches i
 enclosure of the clearance, with the time at which it is least; or a point of the obstacle that the tube contains.
 Trusted: yes. Implements: theory section 4c.
 
-At a time the tube lies in {x* + y: c'y <= s(c) for every c}. So it keeps away from a convex set O, in the direction c of
-length one, by at least c'x* - max over O of c'o - s(c). A polygon is the union of its edges and of its inside: a
+At a time the tube lies in {x* + y: c'y <= s(c) for every c}. So it keeps away from a convex set O, in the direction c
+of length one, by at least c'x* - max over O of c'o - s(c). A polygon is the union of its edges and of its inside: a
 connected set around x*(t) that meets no edge lies on one side of it, and that side does not change while t runs.
 """
 
@@ -22,7 +22,9 @@ from tubecert.model import TIME
 from tubecert.spec import Obstacle
 from tubecert.trajectory import Plan
 
-_QUARTER = 16  # directions in a quarter turn: the best of them loses at most 1 - cos(pi/64), .12 % of a distance
+_QUARTER = (
+    16  # directions in a quarter turn: the best of them loses at most 1 - cos(pi/64), .12 % of a distance
+)
 _FIRST = 64  # windows of time to begin with
 _MOST = 50_000  # windows
 _SHARP = 1e-3  # of the largest extent of the tube: how closely the clearance is enclosed
@@ -52,7 +54,11 @@ class Shape:
         """An upper bound of sup c'Wc, as its upper end."""
         x, y = map(Interval.of, c)
         turned = self.high if c[0] * c[1] > 0 else self.low
-        total = x * x * Interval(self.first) + y * y * Interval(self.second) + 2.0 * x * y * Interval(turned)
+        total = (
+            x * x * Interval.exact(self.first)
+            + y * y * Interval.exact(self.second)
+            + 2 * x * y * Interval.exact(turned)
+        )
         return Interval(np.zeros(()), np.maximum(total.hi, 0.0))
 
 
@@ -123,7 +129,9 @@ class _Gaps:
         """
         start = np.zeros(1)
         apart = bool(self.over(start, start).lo[0] > 0)
-        return apart and (self._obstacle.radius is not None or not _contains(self._obstacle.polygon, self.place(0.0)))
+        return apart and (
+            self._obstacle.radius is not None or not _contains(self._obstacle.polygon, self.place(0.0))
+        )
 
     def place(self, t: float) -> tuple[float, float]:
         """x* in the plane at a time, nearly."""
@@ -197,8 +205,8 @@ def _met(gaps: _Gaps, obstacle: Obstacle, section: Section, t: float) -> tuple[f
     """
     p, place = gaps.around(t), gaps.place(t)
     for y in _nearest(obstacle, place):
-        away = [Interval(y[i]) - p[i] for i in (0, 1)]
-        square = Interval(section.upper) * (away[0] ** 2 + away[1] ** 2)
+        away = [Interval.exact(y[i]) - p[i] for i in (0, 1)]
+        square = Interval.exact(section.upper) * (away[0] ** 2 + away[1] ** 2)
         if bool(square.hi < (section.reach * section.reach).lo) and _belongs(obstacle, y):
             return y
     return None

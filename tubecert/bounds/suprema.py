@@ -17,6 +17,7 @@ from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
@@ -250,11 +251,11 @@ class Suprema:
             return self._over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
 
         W = self.model.W
-        return Shape(
-            first=most(W[first][first]),
-            second=most(W[second][second]),
-            low=-most(-W[first][second]),
-            high=most(W[first][second]),
+        return Shape(  # what is printed is what is used
+            first=printable_above(most(W[first][first])),
+            second=printable_above(most(W[second][second])),
+            low=printable_below(-most(-W[first][second])),
+            high=printable_above(most(W[first][second])),
         )
 
     # -- searches ----------------------------------------------------------------------------------------------
