@@ -95,6 +95,9 @@ HARMLESS = [
     (r"decided_by\[\]", anything),  # any certified section may decide
     (r"overrides\b.*", anything),
     (r"(conditions_26|no_adaptation)\.shortfalls.*", anything),
+    (r"clearance\[\]\.(t|inside|clearance\[1\])", anything),
+    (r"clearance\[\]\.clearance\[0\]", verified),  # it is found to a thousandth of the width of the tube
+    (r"clearance\[\]\.shape\.\w+\[\]", verified),
 ]
 # geodesics of a constant metric are straight lines whatever is said of a test: the words of the assumption are the same
 OF_CONSTANT_METRICS = [(r"metric\.unique_geodesics(\..*)?", anything)]

@@ -21,6 +21,7 @@ from tubecert.enclosure.interval import Array, Interval, down, fraction_bounds, 
 from tubecert.model import TIME
 from tubecert.spec import Obstacle
 from tubecert.trajectory import Plan
+from tubecert.verdict import Verdict
 
 _QUARTER = (
     16  # directions in a quarter turn: the best of them loses at most 1 - cos(pi/64), .12 % of a distance
@@ -73,6 +74,13 @@ class Clearance:
     above: float
     t: float
     inside: tuple[float, float] | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Certified where there is clearance, refuted where a point of the obstacle lies in the tube."""
+        if self.below > 0:
+            return Verdict.CERTIFIED
+        return Verdict.UNDECIDED if self.inside is None else Verdict.REFUTED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -70,10 +70,8 @@ class Cleared:
 
     @property
     def verdict(self) -> Verdict:
-        """Certified where there is clearance, refuted where a point of the obstacle lies in the tube."""
-        if self.clearance.below > 0:
-            return Verdict.CERTIFIED
-        return Verdict.UNDECIDED if self.found.inside is None else Verdict.REFUTED
+        """On the clearance."""
+        return self.found.verdict
 
 
 @dataclass(frozen=True, kw_only=True)
