@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import isfinite
 
 from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
@@ -148,9 +149,17 @@ def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:
     tube, states = enclosed.tube, enclosed.question.spec.states
     first, second = (states.index(name) for name in obstacle.states)
     shape = enclosed.suprema.shape_in(first, second)
-    section = Section(columns=(first, second), reach=_reach(tube), shape=shape, upper=tube.upper.above)
+    section = Section(columns=(first, second), reach=_reach(tube), shape=shape, upper=_largest(tube))
     found = clearance(tube.plan, obstacle, section, enclosed.question.effort)
     return Cleared(obstacle=obstacle, shape=shape, found=found)
+
+
+def _largest(tube: TubeFound) -> float:
+    """A bound of lmax(M) in x over the tube: M = S'M_z S, so at most A times the sum of the squares of S."""
+    if tube.coordinates is None:
+        return tube.upper.above
+    square = sum(row[i] for i, row in enumerate(tube.coordinates.gram))
+    return fraction_bounds(Fraction(tube.upper.above) * square)[1]
 
 
 def _reach(tube: TubeFound) -> Interval:
