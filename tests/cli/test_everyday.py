@@ -61,11 +61,20 @@ def test_templates_certify_as_they_are(template, folder):
     made = run("init", "--template", template)
     assert (made.exit_code, made.stderr) == (0, "")
     assert f"tubecert certify {template}.yaml" in made.stdout
-    assert [path.name for path in folder.iterdir()] == [f"{template}.yaml"]
+    beside = {"csv": ["plan.csv"]}.get(template, [])
+    assert sorted(path.name for path in folder.iterdir()) == sorted([f"{template}.yaml", *beside])
     assert run("check", f"{template}.yaml", "--strict", "--no-cache").stdout.endswith("no errors\n")
     result = run("certify", f"{template}.yaml", "-q")
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith(f"certified {template}: ")
+
+
+def test_init_overwrites_no_plan_either(folder):
+    (folder / "plan.csv").write_text("mine")
+    result = run("init", "--template", "csv")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "plan.csv exists and is not overwritten" in result.stderr
+    assert [path.name for path in folder.iterdir()] == ["plan.csv"]
 
 
 def test_init_refuses_to_overwrite(folder):

@@ -10,7 +10,7 @@ import pytest
 import tubecert
 from tubecert import lint, pipeline
 from tubecert.findings import Finding, Severity
-from tubecert.spec import load_text
+from tubecert.spec import load, load_text
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
@@ -102,7 +102,7 @@ def test_nothing_is_said_of_the_base():
 
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
 def test_nothing_is_said_of_good_files(path):
-    assert found(path.read_text("utf-8")) == []
+    assert pipeline.inspect(load(str(path))) == []
 
 
 @pytest.mark.parametrize("name", list(CASES))

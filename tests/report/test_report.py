@@ -2,6 +2,7 @@
 
 import re
 from decimal import Decimal
+from fractions import Fraction
 from io import StringIO
 from types import SimpleNamespace
 
@@ -15,7 +16,7 @@ from tubecert.certificate import seal
 from tubecert.certificate.result import Certificate, Result
 from tubecert.findings import Finding, Location, Severity
 from tubecert.report import console, findings, progress
-from tubecert.report.numbers import down, exact, percent, short, up
+from tubecert.report.numbers import down, end, exact, percent, short, up
 from tubecert.report.terminal import Terminal
 
 RESULTS = {
@@ -261,3 +262,9 @@ def test_progress_in_words():
     assert progress.describe(step) == "feedback gain: 12,000 boxes, between 0.5 and 0.75"
     step = SimpleNamespace(name="metric", boxes=3, below=float("-inf"), above=0.75, unit="boxes")
     assert progress.describe(step) == "metric: 3 boxes"
+
+
+def test_an_end_of_a_range_is_exact_unless_it_is_a_multiple_of_pi():
+    assert end(Fraction(-1, 10)) == "-0.1"
+    assert end(Fraction(1, 3)) == "1/3"
+    assert end(Fraction("0.5235987755982988730771072305")) == "0.523598775598"

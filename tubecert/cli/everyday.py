@@ -71,6 +71,11 @@ class Template(StrEnum):
     REGULATION = "regulation"
     TRACKING = "tracking"
     PVTOL = "pvtol"
+    CAR = "car"
+    CRANE = "crane"
+    ARM2 = "arm2"
+    QUADROTOR = "quadrotor"
+    CSV = "csv"
 
 
 _Specs = Annotated[

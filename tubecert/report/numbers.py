@@ -10,6 +10,7 @@ from tubecert.records import exact_json
 
 Number = float | int | str | Fraction
 UNKNOWN: Final = "-"
+_LONG: Final = 16
 
 
 def short(value: Number | None, digits: int = 4) -> str:
@@ -34,6 +35,12 @@ def exact(value: Number | None) -> str:
     if isinstance(value, str) and "/" in value:
         return value
     return _shown(value, None, ROUND_HALF_EVEN)
+
+
+def end(value: Number | None) -> str:
+    """An end of a range: exact, but for multiples of pi, of which the certificate holds 30 digits."""
+    text = exact(value)
+    return text if len(text) <= _LONG else short(value, _LONG - 4)
 
 
 def percent(margin: float | None) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from tubecert.certificate.effective import Effective, Tree
 from tubecert.certificate.result import Certificate, Result
 from tubecert.records import to_json
-from tubecert.report.numbers import exact
+from tubecert.report.numbers import end, exact
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
 from tubecert.report.sections import family_words, safe_set
 
@@ -38,7 +38,7 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
         yield "parameters", Cell(text=_list(model.parameters))
     if model.units:
         yield "units", Cell(text=", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items())))
-    box = (f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in safe_set(result))
+    box = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in safe_set(result))
     yield "safe set", Cell(text=", ".join(box))
     if bounds := effective.uncertainty.bounds:
         yield "bounds declared", Cell(text=_list(bounds))

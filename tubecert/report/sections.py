@@ -20,7 +20,7 @@ from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
-from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
@@ -257,7 +257,7 @@ def _metric(result: Result, metric: MetricData) -> list[RenderableType]:
     if metric.margin is not None and metric.verdict is Verdict.CERTIFIED:
         body[0] += f" (margin {down(metric.margin.below, 3)} 1/s)"
     body += [f"{bounds} {words}" for words, bounds in metric_bounds(metric)]
-    sides = (f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in safe_set(result))
+    sides = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in safe_set(result))
     return [Text(line) for line in [*body, f"safe set: {', '.join(sides)}"]]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.report.layout import indented, plain_table, titled
-from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.sections import VERDICTS, place
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
@@ -82,7 +82,7 @@ def _failure(data: SynthesisData, states: Sequence[str]) -> list[RenderableType]
 
 def _proven(file: MetricFile) -> list[Text]:
     sides = ", ".join(
-        f"{name} in [{exact(low)}, {exact(high)}]" for name, (low, high) in file.verified_on.items()
+        f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in file.verified_on.items()
     )
     solver = file.solver
     depends = ", ".join(solver.variables) if solver.degree else ""

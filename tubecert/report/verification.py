@@ -13,7 +13,7 @@ from tubecert.claims import MetricKilling
 from tubecert.printable import printable_json, visible
 from tubecert.records import Json, to_json
 from tubecert.report.layout import indented
-from tubecert.report.numbers import down, exact, up
+from tubecert.report.numbers import down, end, exact, up
 from tubecert.report.sections import VERDICTS, place
 from tubecert.words.claims import sentence
 
@@ -50,7 +50,7 @@ def report(found: Sequence[tuple[str, Verified]], target: str | None) -> list[Re
 
 
 def _details(found: Verified) -> list[str]:
-    sides = ", ".join(f"{name} in [{exact(lo)}, {exact(hi)}]" for name, (lo, hi) in found.safe_set.items())
+    sides = ", ".join(f"{name} in [{end(lo)}, {end(hi)}]" for name, (lo, hi) in found.safe_set.items())
     if found.reason is None:
         return [f"C1-C3 hold on {sides}"]
     known = [part for part in (_supports(found), _condition(found)) if part]
