@@ -27,20 +27,35 @@ _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCo
 
 
 def run(
-    paths: Sequence[str], given: Mapping[str, Any], output: Output, *, skip_others: bool = False
+    paths: Sequence[str],
+    given: Mapping[str, Any],
+    output: Output,
+    *,
+    skip_others: bool = False,
+    family: str | None = None,
 ) -> ExitCode:
-    """Check every file; findings are the result and go to stdout."""
+    """Check every file, or against a family of plans; findings are the result and go to stdout."""
     format_ = _format(given, output)
     jobs, options = _options(given)
-    files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, skip_others)
-    results = _checked(files, options, jobs, output) if files else []
-    results = [*results, *_skipped(others)] or _nothing(paths)
+    if family is None:
+        files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, skip_others)
+        results = _checked(files, options, jobs, output) if files else []
+        results = [*results, *_skipped(others)] or _nothing(paths)
+    else:
+        results = _of_family(paths, family)
     write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
     if format_ == "github":
         from tubecert.report import github
 
         github.append_step_summary(results)
     return max((result.code for result in results), key=_WORST.index)
+
+
+def _of_family(paths: Sequence[str], family: str) -> list[Checked]:
+    """The results for plans: whether they belong to a family."""
+    from tubecert.cli.members import members
+
+    return members(paths, family)
 
 
 def _format(given: Mapping[str, Any], output: Output) -> str:

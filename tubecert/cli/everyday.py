@@ -95,6 +95,13 @@ def check(
     certify: Annotated[
         bool, typer.Option("--certify", help="Certify, too, and compare with the file's expect.")
     ] = False,
+    family: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Whether plans (CSV, or specifications) are of this family.",
+        ),
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings are errors.")] = False,
     skip_others: Annotated[
         bool, typer.Option("--skip-others", help="Leave YAML files that are no specifications alone.")
@@ -120,7 +127,7 @@ def check(
     with guarded(how):
         from tubecert.cli.check import run
 
-        code = run(specs, given, how, skip_others=skip_others)
+        code = run(specs, given, how, skip_others=skip_others, family=family)
     raise typer.Exit(code)
 
 

@@ -1,0 +1,184 @@
+"""Plans and families of plans: a member keeps to the boxes between its knots as well, and to the defect."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from proven import proven
+from typer.testing import CliRunner
+
+from tubecert.cli.app import app
+from tubecert.findings import Severity
+from tubecert.pipeline.membership import membership
+from tubecert.spec import load_text
+
+FAMILY = """
+tubecert: 1
+name: oscillator
+system: {states: [p, v], inputs: [u], f: [v, -p], B: [[0], [1]]}
+safe_set: {p: [-3, 3], v: [-3, 3]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: any, x: {p: [-1, 1], v: [-1.2, 1.2]}, u: {u: [-0.5, 0.5]}, defect: 0.05, horizon: 4}
+initial_state: {within: 0.1}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.2, rho_a: 0.2}
+"""
+OWN = FAMILY.split("trajectory: ")[1].split("\n", maxsplit=1)[0]
+
+
+def member(plan):
+    """What is found of a plan that is written as a trajectory."""
+    text = FAMILY.replace(OWN, plan).replace(
+        "initial_state: {within: 0.1}\n", "initial_state: {at: [0, 0]}\n"
+    )
+    return membership(load_text(text), load_text(FAMILY), "it")
+
+
+def codes(findings):
+    return [(item.code, item.severity) for item in findings]
+
+
+IS = [("TC411", Severity.NOTE)]
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 4}', ""),
+        (
+            '{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 5}',
+            "lasts longer than the 4 s",
+        ),
+        ('{kind: expressions, x: ["1.1*sin(t)", "1.1*cos(t)"], u: ["0"], horizon: 4}', "p* goes 0.1 beyond"),
+        (
+            '{kind: expressions, x: ["-1.1*sin(t)", "-1.1*cos(t)"], u: ["0"], horizon: 2}',
+            "p* goes 0.1 beyond",
+        ),
+        (
+            '{kind: expressions, x: ["0.4*sin(2*t)", "0.8*cos(2*t)"], u: ["-1.2*sin(2*t)"], horizon: 2}',
+            "u* goes 0.7",
+        ),
+        ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0.06"], horizon: 4}', "up to 0.06"),
+        ("{kind: equilibrium, at: [0.5, 0], input: [0.5], horizon: 4}", ""),
+        ("{kind: equilibrium, at: [0.5, 0], input: [0.5]}", "lasts longer"),
+        ("{kind: equilibrium, at: [0.6, 0], input: [0.6], horizon: 1}", "u* goes 0.1"),
+    ],
+)
+def test_expressions(plan, words):
+    findings = member(plan)
+    if words:
+        assert any(words in item.message for item in findings), findings
+        assert {item.severity for item in findings} == {Severity.ERROR}
+    else:
+        assert codes(findings) == IS
+
+
+def table(tmp_path, rows, **keys):
+    path = tmp_path / "plan.csv"
+    path.write_text("t,p,v,u\n" + "".join(",".join(map(str, row)) + "\n" for row in rows))
+    return path
+
+
+def sampled(a, w, count):
+    """Knots of p = a sin(w t) and its v, u; the defect between them is small."""
+    t = np.linspace(0, 2, count)
+    return [
+        (
+            f"{s:.6f}",
+            *(
+                f"{q:.9f}"
+                for q in (a * np.sin(w * s), a * w * np.cos(w * s), a * (1 - w * w) * np.sin(w * s))
+            ),
+        )
+        for s in t
+    ]
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+
+
+@pytest.fixture
+def family(tmp_path):
+    (tmp_path / "any.yaml").write_text(FAMILY)
+    return tmp_path / "any.yaml"
+
+
+def test_a_table_is_told_to_belong_or_why_not(tmp_path, family):
+    done = run("check", "--family", family, table(tmp_path, sampled(0.9, 1.0, 41)))
+    assert (done.exit_code, "is a plan of the family" in done.output) == (0, True), done.output
+    wide = run("check", "--family", family, table(tmp_path, sampled(1.1, 1.0, 41)))
+    assert (wide.exit_code, "p* goes" in wide.output) == (1, True), wide.output
+    coarse = run("check", "--family", family, table(tmp_path, sampled(0.9, 1.0, 2)))
+    assert (coarse.exit_code, "misses x' = f + B u" in coarse.output) == (1, True), coarse.output
+
+
+def test_between_knots_a_curve_may_leave_what_its_knots_keep(tmp_path, family):
+    """p = 0.99 at two knots, with slopes that carry it over 1 between them."""
+    rows = [(0, 0.99, 0.4, 0), (0.5, 0.99, -0.4, 0)]
+    done = run("check", "--family", family, table(tmp_path, rows))
+    assert done.exit_code == 1
+    assert "p* goes 0.04 beyond its range at t = 0.25 s" in done.output
+
+
+def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
+    table(tmp_path, [(0, 0.5, 0, 0.5), (1, 0.5, 0, 0.5), (2, 0.5, 0, 9)])
+    plan = tmp_path / "held.yaml"
+    own = FAMILY.replace(OWN, "{kind: csv, file: plan.csv, interpolation: HOW}").replace(
+        "initial_state: {within: 0.1}\n", ""
+    )
+    plan.write_text(own.replace("HOW", "hold"))
+    assert run("check", "--family", family, plan).exit_code == 0
+    plan.write_text(own.replace("HOW", "linear"))
+    done = run("check", "--family", family, plan)
+    assert (done.exit_code, "u* goes 8.5" in done.output) == (1, True)
+
+
+@settings(deadline=None, max_examples=25)
+@given(a=st.integers(1, 140), w=st.integers(5, 20))
+def test_the_answer_is_that_of_dense_samples(a, w):
+    """p = a sin(w t) and its derivatives, which satisfy the dynamics."""
+    a, w = Fraction(a, 100), Fraction(w, 10)
+    u = a * (1 - w * w)
+    plan = f'{{kind: expressions, x: ["{a}*sin({w}*t)", "{a * w}*cos({w}*t)"], u: ["{u}*sin({w}*t)"], horizon: 4}}'
+    t = np.linspace(0, 4, 4001)
+    waves = np.abs(np.sin(float(w) * t)).max()
+    room = min(1 - float(a) * waves, 1.2 - float(a * w), 0.5 - abs(float(u)) * waves)
+    found = member(plan)
+    if room > 1e-4:
+        assert codes(found) == IS
+    elif room < -1e-4:
+        assert {item.code for item in found} == {"TC411"}
+        assert {item.severity for item in found} == {Severity.ERROR}
+
+
+def test_what_touches_the_end_of_a_box_is_not_said_to_leave_it():
+    plan = '{kind: expressions, x: ["sin(t)", "cos(t)"], u: ["0"], horizon: 4}'
+    assert all(item.code != "TC411" or item.severity is Severity.NOTE for item in member(plan))
+
+
+def test_files_that_do_not_fit_are_told(tmp_path, family):
+    other = tmp_path / "other.yaml"
+    other.write_text(FAMILY.replace("f: [v, -p]", "f: [v, -2*p]"))
+    done = run("check", "--family", family, other)
+    assert (done.exit_code, "TC604" in done.output) == (2, True)
+    assert run("check", "--family", family, family).exit_code == 2
+    single = tmp_path / "one.yaml"
+    single.write_text(FAMILY.replace(OWN, "{kind: equilibrium, at: [0, 0], horizon: 4}"))
+    done = run("check", "--family", single, family)
+    assert (done.exit_code, "is about one plan" in done.output) == (2, True)
+    assert run("check", "--family", tmp_path / "none.json", family).exit_code == 2
+    assert run("check", "--family", family, tmp_path / "none.csv").exit_code == 2
+
+
+@pytest.mark.slow
+def test_the_family_of_a_certificate(tmp_path):
+    target = tmp_path / "any.certificate.json"
+    target.write_text(json.dumps(proven(FAMILY, conditions="distance")))
+    done = run("check", "--family", target, table(tmp_path, sampled(0.9, 1.0, 41)))
+    assert done.exit_code == 0, done.output

@@ -1,0 +1,152 @@
+"""Whether a plan belongs to a family of plans: x* and u* in its boxes, its defect, its horizon.
+
+Everything is proven over the whole horizon; nothing is decided at samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import isfinite
+
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
+from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.pencil import scalar
+from tubecert.expression import ZERO, Expression
+from tubecert.findings import Finding, Severity
+from tubecert.model import ControlAffineModel, build
+from tubecert.spec import Knots, Spec
+from tubecert.spec.types import Bundle
+from tubecert.trajectory import Plan
+from tubecert.trajectory.make import plan_of
+
+NO_MEMBER, UNDECIDED = "TC411", "TC412"
+_FINE = 1e-9  # relative to the range: how closely a curve is looked at
+_GAPS = (0.2, 0.01, 1e-4)  # of the defect, until it is decided
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Part:
+    """One thing that a member has to keep to; None where that could not be decided."""
+
+    kept: bool | None
+    words: str
+
+    def finding(self, name: str) -> Finding:
+        """That it is not kept, or could not be decided."""
+        if self.kept is False:
+            help = "make the boxes or the defect of the family larger and certify again, or plan within them"
+            return Finding(
+                code=NO_MEMBER, message=f"{name} is no plan of the family: {self.words}", help=help
+            )
+        help = "a box or a defect that is larger by a hair decides it"
+        return Finding(
+            code=UNDECIDED,
+            message=f"could not decide whether {name} is of the family: {self.words}",
+            help=help,
+        )
+
+
+def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None) -> list[Finding]:
+    """What keeps the plan of `spec` from being one of `family`, or a note that it is one.
+
+    Both have the same states and inputs; the dynamics are those of the family. Raises `ValueError` for a family that is
+    none, and for a plan that a planner has still to make.
+    """
+    bundle = family.trajectory.bundle
+    if bundle is None or spec.trajectory.task is not None or spec.trajectory.bundle is not None:
+        raise ValueError("a plan is compared with a family of plans")
+    model = build(replace(family, metric=None, synthesis=None))
+    plan = plan_of(spec, model)
+    if not plan.defined:
+        part = _Part(kept=None, words="f or B is not defined at one of its knots")
+        return [part.finding(name)]
+    parts = [*_horizon(plan, family), *_boxes(plan, family, bundle, effort or Effort())]
+    parts.append(_defect(plan, model, bundle.defect, effort or Effort()))
+    missed = [part.finding(name) for part in parts if not part.kept]
+    if missed:
+        return missed
+    defect = parts[-1].words
+    message = f"{name} is a plan of the family: {defect}"
+    help = f"the state must start within {float(family.within or 0):g} of where the plan starts"
+    return [Finding(code=NO_MEMBER, severity=Severity.NOTE, message=message, help=help)]
+
+
+def _horizon(plan: Plan, family: Spec) -> Iterator[_Part]:
+    limit = family.trajectory.horizon
+    if limit is not None and (plan.horizon is None or plan.horizon > limit):
+        words = f"it lasts longer than the {float(limit):g} s that the family is certified for"
+        yield _Part(kept=False, words=words)
+
+
+def _boxes(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[_Part]:
+    """Every state and every input, at both ends of its range."""
+    for name, curve, (low, high) in zip(family.states, plan.x, bundle.x, strict=True):
+        yield _stays(f"{name}*", curve, plan, high, effort)
+        yield _stays(f"{name}*", -curve, plan, -low, effort)
+    for j, (name, (low, high)) in enumerate(zip(family.inputs, bundle.u, strict=True)):
+        if plan.knots is None:
+            yield _stays(f"{name}*", plan.u[j], plan, high, effort)
+            yield _stays(f"{name}*", -plan.u[j], plan, -low, effort)
+        else:  # held or linear between knots: no further out than at one of them
+            yield _at_knots(f"{name}*", plan.knots, plan.horizon, [u[j] for u in plan.knots.u], high)
+            yield _at_knots(f"{name}*", plan.knots, plan.horizon, [-u[j] for u in plan.knots.u], -low)
+
+
+def _at_knots(
+    name: str, knots: Knots, horizon: Fraction | None, values: list[Fraction], limit: Fraction
+) -> _Part:
+    """Whether all values that are reached are at most a limit; the last one of a held input is not."""
+    held, end = knots.interpolation == "hold", knots.t[-1] if horizon is None else horizon
+    reached = [value for t, value in zip(knots.t, values, strict=True) if t < end or (t == end and not held)]
+    if max(reached) > limit:
+        return _exactly(name, max(reached), limit)
+    beyond = next((value for t, value in zip(knots.t, values, strict=True) if t > end), limit)
+    if beyond > limit and not held:  # the horizon cuts the way there
+        return _Part(kept=None, words=f"{name} leaves its range behind the horizon or before it")
+    return _Part(kept=True, words="")
+
+
+def _exactly(name: str, most: Fraction, limit: Fraction) -> _Part:
+    words = f"{name} goes {float(most - limit):.3g} beyond its range"
+    return _Part(kept=most <= limit, words=words)
+
+
+def _stays(name: str, curve: Expression, plan: Plan, limit: Fraction, effort: Effort) -> _Part:
+    """Whether a curve stays below a limit along the plan."""
+    if curve.is_constant:
+        return _exactly(name, curve.fraction, limit)
+    width = _FINE * max(1.0, abs(float(limit)))
+    fine = Effort(gap=_FINE, absolute=width, budget=effort.budget)
+    found = supremum(scalar(curve, plan.fixed), plan.domain, fine)
+    t = plan.moment(found.at)
+    where = "" if t is None else f" at t = {t:.4g} s"
+    return _Part(
+        kept=_kept(found, limit),
+        words=f"{name} goes {max(0.0, found.below - float(limit)):.3g} beyond its range{where}",
+    )
+
+
+def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction, effort: Effort) -> _Part:
+    p = plan.defect(model)
+    if all(row[0] is ZERO for row in p):
+        return _Part(kept=True, words="it satisfies the dynamics exactly")
+    objective = SumOfNorms([p], plan.fixed)
+    for gap in _GAPS:
+        found = supremum(objective, plan.domain, replace(effort, gap=gap, absolute=gap * float(limit)))
+        kept = _kept(found, limit)
+        if kept is not None:
+            break
+    t = plan.moment(found.at)
+    where = "" if t is None or kept else f" at t = {t:.4g} s"
+    size = found.above if kept else found.below
+    words = f"it misses x' = f + B u by {'at most' if kept else 'up to'} {size:.3g}{where}"
+    return _Part(kept=kept, words=f"{words}, {float(limit):.3g} is allowed")
+
+
+def _kept(found: Supremum, limit: Fraction) -> bool | None:
+    """Whether a supremum is at most a limit; None where that is not decided."""
+    if isfinite(found.above) and Fraction(found.above) <= limit:
+        return True
+    return False if isfinite(found.below) and Fraction(found.below) > limit else None
