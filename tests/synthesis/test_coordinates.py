@@ -93,14 +93,39 @@ def test_in_the_states_own_units_it_does():
     assert scaled_condition(JOINT, eight, **wanted) != pytest.approx(reference, rel=0.03)
 
 
-def test_a_cube_is_what_it_was():
+def test_scales_are_half_widths_or_none():
     spec = load_text(TURNING.format(a=1, b=1, c=1))
     family = metric_family(build(spec), degree=0, safe_set=spec.safe_set)
-    cube = [(Fraction(-3), Fraction(3))] * 3
-    for choice in ("auto", "identity"):
-        found = coordinates(choice, family, cube)
-        assert found.states.tolist() == [1, 1, 1]
-        assert found.columns.tolist() == [1, 1, 1]
+    box = [(Fraction(-3), Fraction(3)), (Fraction(0), Fraction(1)), (Fraction(-1), Fraction(3))]
+    assert coordinates("auto", family, box).states.tolist() == [3, 0.5, 2]
+    assert coordinates("auto", family, box, (Fraction(1), Fraction(2), Fraction(4))).states.tolist() == [
+        1,
+        2,
+        4,
+    ]
+    own = coordinates("identity", family, box, (Fraction(1), Fraction(2), Fraction(4)))
+    assert own.states.tolist() == own.columns.tolist() == [1, 1, 1]
+
+
+TUBE = """
+initial_state: {{at: [0, 0, 0, 0]}}
+tube: {{half_widths: {{q: 0.15*a, w: 1.2*b, th: 0.2*c, om: d}}}}
+"""
+
+
+@pytest.mark.slow
+def test_a_rate_that_is_searched_for_does_not_depend_on_units():
+    """Nor do the gains that it certifies with, in a tube of half-widths."""
+    text = JOINT.replace("h: [0]", 'h: ["0.2*sin(t) + 0.1*q/a"]') + TUBE
+    rates, tables = [], []
+    for units in (dict.fromkeys("abcd", 1), {"a": 1, "b": 8, "c": 57, "d": "1/10"}):
+        spec = load_text(text.format(**units))
+        found = pipeline.synthesise(spec, Synthesis(degree=0), Options(conditions="distance"))
+        plain = [row for row in found.rows if row.floor == "identity"]
+        rates.append(found.file.rate)
+        tables.append([(float(row.rate), row.bandwidth, row.adaptation_rate) for row in plain])
+    assert rates[0] == rates[1]
+    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=0.01)
 
 
 def test_the_default_is_free_of_units():

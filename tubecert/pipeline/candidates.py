@@ -18,7 +18,7 @@ from tubecert.kinds import DISTANCE
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
-from tubecert.pipeline.certification import plan
+from tubecert.pipeline.certification import plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
 from tubecert.search.proposers import LEAST, PROPOSERS
@@ -26,7 +26,6 @@ from tubecert.stages.bounded import Enclosed, enclose, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
-from tubecert.stages.tube import find_tube
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
@@ -46,10 +45,10 @@ def ending(question: Question, metric: VerifiedMetric) -> Ending:
     proven = _proven(question, metric)
     if isinstance(proven, Stopped):
         return _stopped(proven)
-    tube = find_tube(plan(proven))
-    if isinstance(tube, Stopped):
-        return _stopped(tube)
-    enclosed = enclose(tube)
+    found = tube(plan(proven))
+    if isinstance(found, Stopped):
+        return _stopped(found)
+    enclosed = enclose(found)
     if (broken := unmet(enclosed)) is not None:
         return _stopped(broken)
     return _judged(question, enclosed)
@@ -113,7 +112,10 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
 
 
 def _demand(pair: Pair, problem: TubeProblem) -> float:
-    """What a kind asks of the computer that adapts: the adaptation rate, or the sampling frequency; else the tube."""
+    """What a kind asks of the computer that adapts: Gamma |B|^2, or the sampling frequency; else the tube.
+
+    In a tube of its own coordinates Gamma is of these, and they are of the metric: |B|^2 in them makes it comparable.
+    """
     if pair.adaptation_rate is not None:
-        return float(pair.adaptation_rate)
+        return float(pair.adaptation_rate) * problem.constants.B.above**2
     return float(problem.rho) if pair.sample_time is None else 1 / float(pair.sample_time)

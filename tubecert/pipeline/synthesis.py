@@ -113,6 +113,7 @@ class SynthesisRun:
                 limit=self.limit,
                 solver=wanted.solver,
                 coordinates=wanted.coordinates,
+                half_widths=_half_widths(spec),
                 effort=self.effort,
                 progress=self._tell,
             )
@@ -399,6 +400,14 @@ class SynthesisRun:
         if self.progress is not None:
             self.said += 1
             self.progress(Step(name=f"synthesis, {words}", boxes=self.said, unit="steps"))
+
+
+def _half_widths(spec: Spec) -> tuple[Fraction, ...]:
+    """What the states are measured in: the tube's half-widths where all are asked for, else the safe set's."""
+    asked = dict(spec.tube.half_widths)
+    if all(name in asked for name in spec.states):
+        return tuple(asked[name] for name in spec.states)
+    return tuple((high - low) / 2 for low, high in spec.safe_set)
 
 
 def _solver(metric: VerifiedMetric) -> SolverData:

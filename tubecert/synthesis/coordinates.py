@@ -36,15 +36,18 @@ class Coordinates:
 
 
 def coordinates(
-    choice: Choice, family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]
+    choice: Choice,
+    family: MetricFamily,
+    safe_set: Sequence[tuple[Fraction, Fraction]],
+    half_widths: Sequence[Fraction] = (),
 ) -> Coordinates:
-    """S for a safe set: half-widths as shares of the largest one, so that cubes stay as they are; or ones."""
+    """S: half-widths (those of the safe set, if none are given), or ones."""
     n = len(safe_set)
     if choice == "identity":
         return Coordinates(np.ones(n), np.ones(n))
-    half = [(high - low) / 2 for low, high in safe_set]
-    states = np.array([float(width / max(half)) for width in half])
-    if family.flat or (states == 1).all():
+    half = half_widths or [(high - low) / 2 for low, high in safe_set]
+    states = np.array([float(width) for width in half])
+    if family.flat:
         return Coordinates(states, states)
     return Coordinates(states, 1 / np.linalg.norm(_frame(family, safe_set) / states[:, None], axis=0))
 

@@ -51,6 +51,7 @@ class Request:
     limit: float | None = None
     solver: str = "clarabel"
     coordinates: Choice = "identity"
+    half_widths: tuple[Fraction, ...] = ()
     thorough: bool = True
     rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
@@ -267,6 +268,7 @@ class Ladder:
             limit=1.05 * request.limit if request.limit is not None and plain else None,
             solver=request.solver,
             coordinates=request.coordinates,
+            half_widths=request.half_widths,
             rounds=None if request.rounds is None else request.rounds - self.rounds,
             progress=request.progress,
         )

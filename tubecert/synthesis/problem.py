@@ -24,8 +24,9 @@ class SynthesisProblem:
       `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well);
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
-    I is meant in the `coordinates`. W and the rate of `model` are not used. Above `limit` the answer is of no use, and
-    after so many `rounds` none is asked for. `progress` is told a route's steps.
+    I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
+    the rate of `model` are not used. Above `limit` the answer is of no use, and after so many `rounds` none is asked
+    for. `progress` is told a route's steps.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -36,13 +37,14 @@ class SynthesisProblem:
     limit: float | None = None
     solver: str = "clarabel"
     coordinates: Choice = "identity"
+    half_widths: tuple[Fraction, ...] = ()
     rounds: int | None = None
     progress: Callable[[str], None] | None = field(default=None, repr=False)
 
     @property
     def scaled(self) -> Coordinates:
         """The coordinates in which I is meant."""
-        return coordinates(self.coordinates, self.family, self.safe_set)
+        return coordinates(self.coordinates, self.family, self.safe_set, self.half_widths)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
