@@ -20,7 +20,7 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import ControlAffineModel, build
 from tubecert.spec import load, load_text
 from tubecert.spec.metric_file import with_metric
-from tubecert.synthesis import cegis, routes
+from tubecert.synthesis import cegis, routes, sos
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
 from tubecert.synthesis.ladder import Ladder, Request, digits_below, shrunk
@@ -424,3 +424,31 @@ def test_the_end_to_end_objective_compares_certificates(tmp_path):
     assert plot.read_text().startswith("<?xml")
     content = json.loads(done.stdout)
     assert content["rate"] == 1.5
+
+
+# -- condition numbers as small as they can be
+
+
+@pytest.mark.parametrize("route", ["cegis", "sos"])
+@pytest.mark.parametrize("rate", ["1.5", "1.742857"])
+def test_condition_numbers_are_within_a_thousandth_of_the_least(route, rate):
+    """The least is that of the two worst points: v'(f_x W + W f_x')v is affine in x2^2, which goes from 0 to 25."""
+    cvxpy = pytest.importorskip("cvxpy")
+    W, kappa, v = cvxpy.Variable((2, 2), symmetric=True), cvxpy.Variable(), np.array([2.0, 0.5])
+    conditions = [W >> np.eye(2), kappa * np.eye(2) >> W]
+    for square in (0, 25):
+        A = np.array([[-1, 2], [-3, 4 - 0.75 * square]])
+        conditions.append(v @ (A @ W + W @ A.T + 2 * float(rate) * W) @ v <= 0)
+    least = cvxpy.Problem(cvxpy.Minimize(kappa), conditions).solve(solver="CLARABEL")
+    proposers = {"cegis": cegis.propose, "sos": sos.propose_sos}
+    found = ladder(proposers[route], degree=0).metric(Fraction(rate))
+    assert least * (1 - 1e-6) <= found.condition_number.above <= 1.001 * least
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("choice", ["auto", "sos"])
+def test_the_three_state_metric_is_as_good_as_that_of_plain_sums_of_squares(choice):
+    """Degree 2 at rate .999: 1.4792 elsewhere."""
+    three = load(str(ROOT / "configs" / "three_state.yaml"))
+    request = Request(model=build(three), safe_set=three.safe_set, routes=routes.routes(choice), degree=2)
+    assert Ladder(request).metric(Fraction("0.999")).condition_number.above <= 1.4792 * 1.001

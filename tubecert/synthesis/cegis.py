@@ -34,6 +34,7 @@ ROUTE = "cegis"
 _ROUNDS = 60
 _GAP = 3e-3  # between kappa and its bound
 _FINE, _CHEAP = 1e-3, 40  # the same, for so few unknowns
+_SHARP = 3e-4  # the same, where .1 % is wanted
 _WIDER, _WIDEST = 3.0, 0.1  # where the solver's accuracy leaves no room
 _HOPELESS = 1e7  # a larger kappa is no metric
 _LOOSE = 0.2  # conditions that hold by so much, relatively, are dropped
@@ -74,6 +75,7 @@ class _Synthesis:
         self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in self.symmetries)]))
         self.attacker = Attacker.of(problem, self.forms, self.symmetries, self.generator)
         self.gap = _FINE if self.unknowns.count <= _CHEAP else _GAP
+        self.gap = min(self.gap, _SHARP) if problem.sharp else self.gap
         self.limit = min(problem.limit or _HOPELESS, _HOPELESS)
         self.bound, self.solver_seconds, self.rounds = 0.0, 0.0, 0
         self.extreme: Array | None = None  # the unknowns of least kappa

@@ -28,6 +28,9 @@ _LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
 _PAYS = 0.9  # a higher degree must lower the condition number to this share
 _SHARP = 1.01  # a searched rate is settled to this factor
 _LOOKS = 4  # for advice on what would work instead
+_POLISHES = 0.9997  # a back-off that is ten times smaller must lower kappa to this share
+_POLISH_BOXES = 20_000  # what its proof may cost
+_SMALL = 3  # states up to which metrics are polished in any coordinates
 _CHEAP_ROUNDS, _CHEAP_BOXES = 30, 20_000  # what advice may cost, if the search did not cost more
 
 Route = Callable[[SynthesisProblem], Proposal]
@@ -191,6 +194,35 @@ class Ladder:
             best = found if best is None else min(best, found, key=_kappa)
             if not pays or _kappa(best) <= enough:
                 break
+        return best if best is None or enough or not self._sharp else self._polished(best)
+
+    @property
+    def _sharp(self) -> bool:
+        """Whether the least condition number is wanted to .1 %: not for large systems as others published them."""
+        request = self.request
+        small = request.coordinates == "auto" or len(request.model.states) <= _SMALL
+        return small and request.thorough
+
+    def _polished(self, best: VerifiedMetric) -> VerifiedMetric:
+        """The metric again with smaller back-offs, as long as these lower kappa and can be proven cheaply."""
+        name = best.proposal.route
+        route = dict(self.request.routes).get(name, self.request.routes[0][1])
+        effort = self.request.effort
+        effort = replace(effort, budget=min(effort.budget, _POLISH_BOXES))
+        degree = best.family.degree
+        for back_off in _BACK_OFF[1:]:
+            problem = replace(self._problem(best.rate, best.floor, degree, back_off), sharp=True)
+            started = time.perf_counter()
+            proposal = _guarded(name, route, problem)
+            self.rounds += proposal.rounds
+            if not proposal.kappa < _POLISHES * _kappa(best):
+                break
+            outcome = shortest_proven(problem, proposal, best.rate, effort)
+            self._note(_attempt(problem, best.rate, proposal, outcome, time.perf_counter() - started))
+            if isinstance(outcome, Rejected):
+                break
+            self.proven.append(outcome)
+            best = min(best, outcome, key=_kappa)
         return best
 
     def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
@@ -230,21 +262,7 @@ class Ladder:
             proposal = _guarded(name, route, problem)
             self.rounds += proposal.rounds
             outcome = shortest_proven(problem, proposal, rate, self.request.effort)
-            self._note(
-                Attempt(
-                    rate=float(rate),
-                    degree=degree,
-                    floor=floor,
-                    route=proposal.route,
-                    outcome=Proven() if isinstance(outcome, VerifiedMetric) else outcome.outcome,
-                    condition_number=outcome.condition_number.above
-                    if isinstance(outcome, VerifiedMetric)
-                    else None,
-                    undecided=isinstance(outcome, Rejected) and outcome.undecided,
-                    seconds=time.perf_counter() - started,
-                    solver_seconds=proposal.solver_seconds,
-                )
-            )
+            self._note(_attempt(problem, rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, VerifiedMetric):
                 self.proven.append(outcome)
                 return outcome
@@ -289,6 +307,27 @@ class Ladder:
             number = attempt.condition_number
             words = attempt.outcome.tag if number is None else f"proven, condition number {number:.4g}"
             self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+
+
+def _attempt(
+    problem: SynthesisProblem,
+    rate: Fraction,
+    proposal: Proposal,
+    outcome: VerifiedMetric | Rejected,
+    seconds: float,
+) -> Attempt:
+    proven = outcome if isinstance(outcome, VerifiedMetric) else None
+    return Attempt(
+        rate=float(rate),
+        degree=problem.family.degree,
+        floor=problem.floor,
+        route=proposal.route,
+        outcome=outcome.outcome if isinstance(outcome, Rejected) else Proven(),
+        condition_number=None if proven is None else proven.condition_number.above,
+        undecided=isinstance(outcome, Rejected) and outcome.undecided,
+        seconds=seconds,
+        solver_seconds=proposal.solver_seconds,
+    )
 
 
 def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:

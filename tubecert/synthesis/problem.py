@@ -26,7 +26,7 @@ class SynthesisProblem:
 
     I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
     the rate of `model` are not used. Above `limit` the answer is of no use, and after so many `rounds` none is asked
-    for. `progress` is told a route's steps.
+    for. `sharp`: kappa is wanted to .1 %. `progress` is told a route's steps.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -39,6 +39,7 @@ class SynthesisProblem:
     coordinates: Choice = "identity"
     half_widths: tuple[Fraction, ...] = ()
     rounds: int | None = None
+    sharp: bool = False
     progress: Callable[[str], None] | None = field(default=None, repr=False)
 
     @property

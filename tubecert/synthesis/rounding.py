@@ -27,7 +27,7 @@ from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.verdict import Verdict
 
 _DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
-_WORTH = 1.005  # a shorter metric may have a condition number larger by this factor
+_WORTH, _SHARP = 1.005, 1.0002  # a shorter metric may have a condition number larger by this factor
 
 Coefficients = tuple[tuple[tuple[Fraction, ...], ...], ...]
 
@@ -95,11 +95,12 @@ def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction) -> 
         return attacker.attack(forms.inner(short), np.inf)
 
     most = _DIGITS[-1]
+    worth = _SHARP if problem.sharp else _WORTH
     with np.errstate(all="ignore"):
         full = sampled(most)
         for digits in _DIGITS[:-1]:
             found = sampled(digits)
-            if found.kappa <= _WORTH * full.kappa and found.shortfall <= 0.5 * min(full.shortfall, 0.0):
+            if found.kappa <= worth * full.kappa and found.shortfall <= 0.5 * min(full.shortfall, 0.0):
                 return [digits, most]
     return [most]
 
