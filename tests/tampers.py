@@ -69,12 +69,15 @@ HARMLESS = [
     (r"constants\.(?!(?:lower|input_gain_least)\.)\w+\.below", anything),
     (r"constants\.(lower|input_gain_least)\.above", anything),
     (r"conditions_26\.(least_adaptation\.)?margins\.26[abc]\[1\]", anything),
-    (r"(distance\.\w+|sampled)\.margin\[1\]", anything),
+    (r"(distance\.\w+|sampled|no_adaptation)\.margin\[1\]", anything),
+    (r"no_adaptation\.distance\[0\]", anything),
     (r"metric\.(margin|largest_rate|lower_on_set)\[1\]", anything),
     (r"metric\.(upper_on_set|unique_geodesics\.value)\[0\]", anything),
     # weaker claims, examined as they stand
     (r"conditions_26\.(least_adaptation\.)?margins\.26[abc]\[0\]", lower),
-    (r"(distance\.\w+|sampled)\.margin\[0\]", lower),
+    (r"(distance\.\w+|sampled|no_adaptation)\.margin\[0\]", lower),
+    (r"no_adaptation\.distance\[1\]", higher),
+    (r"no_adaptation\.uncertainty_limit", lower),
     (r"metric\.(margin|largest_rate|lower_on_set)\[0\]", lower),
     (r"metric\.upper_on_set\[1\]", higher),
     (r"metric\.unique_geodesics\.value\[1\]", higher),
@@ -91,7 +94,10 @@ HARMLESS = [
     (r"proof\.(distance|sampled)\.(speed|prediction_error|uncertainty)", verified),
     (r"decided_by\[\]", anything),  # any certified section may decide
     (r"overrides\b.*", anything),
-    (r"conditions_26\.shortfalls.*", anything),
+    (r"(conditions_26|no_adaptation)\.shortfalls.*", anything),
+    (r"clearance\[\]\.(t|inside|clearance\[1\])", anything),
+    (r"clearance\[\]\.clearance\[0\]", verified),  # it is found to a thousandth of the width of the tube
+    (r"clearance\[\]\.shape\.\w+\[\]", verified),
 ]
 # geodesics of a constant metric are straight lines whatever is said of a test: the words of the assumption are the same
 OF_CONSTANT_METRICS = [(r"metric\.unique_geodesics(\..*)?", anything)]

@@ -184,6 +184,15 @@ class ConditionHolds(Claim):
     predictor_gain: Fraction | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstacleCleared(Claim):
+    """The tube stays clear of obstacle number `obstacle` (from 1); `clearance` encloses by how much."""
+
+    tag: ClassVar[str] = "obstacle_cleared"
+    obstacle: int
+    clearance: Constant
+
+
 METRIC_CLAIMS = (MetricDefinite, MetricContraction, MetricKilling)
 
 

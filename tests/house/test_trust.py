@@ -37,6 +37,7 @@ TRUSTED_ROOMS = {
 }
 SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
 ALSO_SAY = {  # of one claim each, no gains
+    "bounds/clearance.py": "the tube keeps away from an obstacle",
     "enclosure/branch_and_bound.py": "an objective stays below a threshold",
     "model.py": "the rank of a B with a minor that is a constant",
     "metric/verify.py": "C1-C3",
@@ -125,6 +126,7 @@ _BOUND = "the safe side of a constant, which is a float by definition"
 _ENDS = "ends of an interval, put in for a variable that a formula is monotone in"
 _POINT = "a point that was chosen: it need not be near anything"
 TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant, and not near it
+    "bounds/clearance.py": f"{_BOUND}; {_POINT}",
     "bounds/compute.py": _BOUND,
     "bounds/level.py": _BOUND,
     "bounds/start.py": f"{_BOUND}; 0; the congruence T, any will do",

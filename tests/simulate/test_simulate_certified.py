@@ -107,11 +107,13 @@ def test_simulate_and_recheck_have_one_judge():
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC604")
 
 
-def test_obstacles_and_simulation_are_no_part_of_the_system():
+def test_simulation_is_no_part_of_the_system_and_obstacles_are():
     spec = load(str(CONFIGS / "two_state.yaml"))
     _, result = certified("two_state", "0.4")
-    bare = replace(spec, obstacles=(), simulation=None, name="other")
+    bare = replace(spec, simulation=None, name="other")
     assert adopted(bare, result).name == "other"
+    _, finding = refused(adopted, replace(spec, obstacles=()), result)
+    assert "obstacles differ" in finding.message
 
 
 @pytest.mark.parametrize(("verdict", "code"), [("refuted", 1), ("undecided", 4)])

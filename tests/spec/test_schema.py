@@ -22,7 +22,7 @@ from tubecert.bounds.constants import DERIVED, TABLE
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
 from tubecert.records import to_json
-from tubecert.spec.load import load, load_text
+from tubecert.spec.load import load, load_system, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.spec.reader import Field
 
@@ -194,18 +194,21 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     metric = tmp_path / "metric.json"
     metric.write_text(json.dumps({"format": "tubecert-metric/1", "rate": 1, "dual_metric": [[1]]}))
     with_metric(full, str(metric))
+    load_system(str(GOOD[0]))
     unmet = {
         site
         for site in sites()
         if not any(n == site[0] and site[1] <= line <= site[2] for n, line in asked.lines)
     }
     assert not unmet, "a section that no example file of tests/specs/ok has"
-    box = {"tube.half_widths"}  # its keys are the states
+    # their keys are states or inputs
+    box = {"tube.half_widths", "trajectory.x", "trajectory.u"}
     for (path, kind), known in asked.known.items():
-        if path in box:
+        if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
             continue
         schema = subschema(path, kind)
-        assert set(schema["properties"]) == known, (path, kind)
+        named = path == "uncertainty.bounds"  # beside its own keys, those of the inputs
+        assert set(schema["properties"]) == (known & {"h", "h_x", "h_t"} if named else known), (path, kind)
         depends = "anyOf" in schema or path == "uncertainty.bounds"  # on other keys
         if not depends:
             assert set(schema.get("required", ())) == asked.required[(path, kind)], (path, kind)

@@ -12,10 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
+from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
@@ -239,6 +241,22 @@ class Suprema:
             effort = None if self.coordinates is None else self._fine  # it is no part of a ball
             found.append(self._root(self._over_tube(f"half width of {name}", entry, effort)))
         return tuple(found)
+
+    def shape_in(self, first: int, second: int) -> Shape:
+        """Bounds over the tube of the block of W that belongs to two states."""
+
+        def most(entry: Expression) -> float:
+            if entry.is_constant:
+                return fraction_bounds(entry.fraction)[1]
+            return self._over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
+
+        W = self.model.W
+        return Shape(  # what is printed is what is used
+            first=printable_above(most(W[first][first])),
+            second=printable_above(most(W[second][second])),
+            low=printable_below(-most(-W[first][second])),
+            high=printable_above(most(W[first][second])),
+        )
 
     # -- searches ----------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from tubecert.records import from_json
 from tubecert.spec import Spec, canonical
 from tubecert.spec.types import Table
 
-_IDLE = ("name", "expect", "simulation", "obstacles", "system.units", "trajectory.file")
+_IDLE = ("name", "expect", "simulation", "system.units", "trajectory.file")
 
 
 class ForeignError(SpecError):

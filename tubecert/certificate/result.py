@@ -249,6 +249,29 @@ class SynthesisData:
     reason: Reason | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeData:
+    """Bounds over the tube of the block of W in a plane: of its diagonal, and [low, high] of what is beside it."""
+
+    diagonal: tuple[float, float]
+    beside: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearanceData:
+    """An obstacle of the specification, in its order: the clearance of the tube, and the time at which it is least.
+
+    `inside`: a point of the obstacle that the tube contains then.
+    """
+
+    verdict: Verdict
+    decides: bool
+    clearance: Constant
+    t: float
+    shape: ShapeData
+    inside: tuple[float, float] | None = None
+
+
 def _sections() -> dict[str, type[SectionData]]:
     return {kind.key: kind.form for kind in KINDS}
 
@@ -287,6 +310,7 @@ class Result:
     synthesis: SynthesisData | None = None
     metric: MetricData | None = None
     tube: TubeData | None = None
+    clearance: tuple[ClearanceData, ...] = ()
     constants: Mapping[str, Bound] = field(default_factory=dict)
     sections: Mapping[str, SectionData] = field(default_factory=dict, metadata=keyed(_sections))
     elasticities: Mapping[str, Mapping[str, float]] | None = None

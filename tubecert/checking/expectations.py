@@ -60,9 +60,11 @@ def outcome(result: Result) -> Outcome:
 
 
 def _numbers(result: Result) -> Iterator[tuple[str, float]]:
-    """rho, and the gains of the first certificate that decides; the sample time is that of C."""
+    """rho, the least clearance, and the gains of the first certificate that decides; the sample time is that of C."""
     if result.tube is not None:
         yield "rho", float(result.tube.rho)
+    if result.clearance:
+        yield "clearance", min(each.clearance.below for each in result.clearance)
     pair = next(iter(result.deciding().values()), None)
     if pair is not None:
         if pair.bandwidth is not None:
@@ -88,6 +90,9 @@ def _claims(result: Result) -> Iterator[Claim]:
     of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in result.reasons)
     if result.metric is not None and not of_metric:
         yield Claim(name="metric", verdict=result.metric.verdict)
+    for number, each in enumerate(result.clearance, start=1):
+        if each.decides and each.verdict is Verdict.CERTIFIED:
+            yield Claim(name=f"clearance from obstacle {number}", verdict=each.verdict)
     for section in result.decided_by:
         if section in result.sections and section not in named:
             yield Claim(name=SECTIONS[section], verdict=result.sections[section].verdict)

@@ -8,7 +8,7 @@ from tubecert.conditions import alone
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
-from tubecert.enclosure.constant import Constant
+from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.kernel import judge
 from tubecert.kinds import ALONE
 from tubecert.kinds.data import Pair, SectionData, margin_data, missing_data
@@ -65,8 +65,9 @@ class Alone(Kind[NoGains]):
 
     def section(self, problem: TubeProblem, proposal: Proposal[NoGains]) -> AloneSection:
         """The section; the proposal is always the same."""
+        limit = alone.uncertainty_limit(problem)
         return AloneSection(
             judgement=judge(problem, self.theorem, proposal),
-            distance=margin_data(alone.distance(problem)),
-            uncertainty_limit=alone.uncertainty_limit(problem),
+            distance=margin_data(alone.distance(problem)).printable(),
+            uncertainty_limit=None if limit is None else printable_below(limit),
         )

@@ -11,18 +11,23 @@ from fractions import Fraction
 from math import inf
 from typing import Any
 
+import numpy as np
+
 from tubecert.claims import (
     ConditionHolds,
     HalveConstant,
+    ObstacleCleared,
     RaiseBudget,
     Reason,
+    ReduceRadii,
     Relax,
     ShrinkTube,
 )
 from tubecert.conditions.verdict import Shortfall, Verdict
-from tubecert.enclosure.constant import Constant
+from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Section
+from tubecert.stages.bounded import Bounded, Cleared
 
 _OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
 _NOTABLE = 0.995  # a factor above it is not worth a word
@@ -35,6 +40,31 @@ def reasons(section: Section[Any], halved: Mapping[str, float]) -> list[Reason]:
     if section.verdict is Verdict.CERTIFIED:
         return [_certified(section, halved)]
     return _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
+
+
+def obstacle_reasons(bounded: Bounded) -> list[Reason]:
+    """Obstacles that the tube is asked to keep away from, and is not proven to."""
+    return [
+        Reason(
+            claim=ObstacleCleared(obstacle=number, clearance=each.clearance),
+            verdict=each.verdict,
+            at=_witness(bounded, each),
+            relax=(ReduceRadii(),),
+        )
+        for number, each in enumerate(bounded.clearances, start=1)
+        if each.obstacle.decides and each.verdict is not Verdict.CERTIFIED
+    ]
+
+
+def _witness(bounded: Bounded, cleared: Cleared) -> Witness:
+    """The plan where it is nearest, moved to the point of the obstacle that was found."""
+    t, states = cleared.found.t, bounded.question.spec.states
+    centre, _ = bounded.enclosed.tube.plan.enclose(np.array([t]), np.array([t]))
+    x = [float(value) for value in centre.mid[0]]
+    if cleared.found.inside is not None:
+        for name, value in zip(cleared.obstacle.states, cleared.found.inside, strict=True):
+            x[states.index(name)] = value
+    return Witness(t=t, x=tuple(x))
 
 
 def _certified(section: Section[Any], halved: Mapping[str, float]) -> Reason:

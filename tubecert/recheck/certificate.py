@@ -16,6 +16,7 @@ from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Section
 from tubecert.recheck.kinds.table import KEYS, KINDS
+from tubecert.recheck.obstacles import Cleared, read_cleared
 from tubecert.recheck.orientation import elasticities, run, synthesis
 from tubecert.recheck.plans import Plan, read_plan
 from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_reason
@@ -159,6 +160,7 @@ class Result:
     synthesised: Wanted | None
     metric: MetricSection | None
     tube: TubeSection | None
+    clearance: tuple[Cleared, ...]
     constants: dict[str, Enclosure] | None
     sections: Sections | None
 
@@ -195,7 +197,7 @@ def read_result(node: Node) -> Result:
         "declared",
         "reasons",
         "proof",
-        optional=("synthesis", "metric", *last),
+        optional=("synthesis", "metric", "clearance", *last),
     )
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
@@ -224,6 +226,7 @@ def read_result(node: Node) -> Result:
         synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, states)),
+        clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
         constants=own.get("constants", lambda item: _constants(item, own)),
         sections=_sections(own, len(states)) if searched else None,
     )

@@ -9,7 +9,7 @@ from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import claimed, consistency, geodesics, metric, planned, start
+from tubecert.recheck import claimed, clearances, consistency, geodesics, metric, planned, start
 from tubecert.recheck.balls import exact
 from tubecert.recheck.certificate import (
     INFIMA,
@@ -145,6 +145,7 @@ def of_certified(case: Case) -> Iterator[Claim]:
     yield Claim("assumptions are complete", None, lambda: consistency.assumptions(result, case.system))
     yield from _on_set(case)
     yield from _tube(case)
+    yield from _clearances(case)
     yield from _constants(case)
     yield from _gains(case)
 
@@ -239,6 +240,24 @@ def _radius(case: Case) -> Outcome:
     if case.result.specification.half_widths:
         return metric.stated(width <= case.place.rho, "it is smaller than epsilon + rho_a")
     return start.radius(case.place, width, case.bound("lower"), case.bound("upper"))
+
+
+def _clearances(case: Case) -> Iterator[Claim]:
+    place, lower = case.place, case.bound_if_any("lower")
+    pairs = zip(case.result.specification.obstacles, case.result.clearance, strict=False)
+    for k, (obstacle, own) in enumerate(pairs, start=1):
+        if own.verdict != "certified" or lower is None or own.clearance.below is None:
+            continue
+        yield Claim(
+            f"W in the plane of {', '.join(obstacle.states)}",
+            (*case.over_tube, obstacle.states, own.shape),
+            lambda obstacle=obstacle, own=own: clearances.shaped(place, obstacle, own.shape),  # type: ignore[misc]
+        )
+        yield Claim(
+            f"clearance from obstacle {k} >= {float(own.clearance.below):.6g}",
+            (*case.over_tube, obstacle, own, lower),
+            lambda obstacle=obstacle, own=own: clearances.keeps_away(place, obstacle, own, lower),  # type: ignore[misc]
+        )
 
 
 def _constants(case: Case) -> Iterator[Claim]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tubecert.recheck import clearances
 from tubecert.recheck.certificate import Geodesics, Result, TubeSection
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
@@ -159,6 +160,7 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     for name, section in sections.by_key.items():
         whole = section.verdict != "certified" or not section.shortfalls
         yield whole, f"{name} is certified and lists shortfalls"
+    yield from clearances.agrees(result.specification.obstacles, result.clearance)
     for reason in result.reasons:
         yield reason.verdict == "certified", f"{_CLAIMS_ONLY} a reason says otherwise"
         yield reason.claim == "gains_suffice", f"{_CLAIMS_ONLY} a reason is not that gains suffice"

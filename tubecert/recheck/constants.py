@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 
-from tubecert.recheck.balls import Ball, exact, sharp_norm
+from tubecert.recheck.balls import exact, sharp_norm
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.branches import norms_below, slopes_below
 from tubecert.recheck.coordinates import Fields
@@ -192,7 +192,7 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
 
 def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     s = place.system
-    if name in s.declared and not _declared(place, name) <= exact(limit):
+    if name in s.declared and not _covers(limit, place, name):
         return stated(False, f"it is below the declared {float(s.declared[name]):g}")
     if s.h is None:
         return stated(name in s.declared, "it is neither declared nor derived")
@@ -204,12 +204,13 @@ def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     return _norms(place, [s.h], limit)
 
 
-def _declared(place: Place, name: str) -> Ball:
-    """A declared bound; a Lipschitz constant in x is one in z, times |S^-1|."""
-    own = exact(place.system.declared[name])
+def _covers(limit: Fraction, place: Place, name: str) -> bool:
+    """Whether a declared bound is at most this; a Lipschitz constant in x is one in z, times |S^-1|."""
+    own = place.system.declared[name]
     if name != "h_x" or place.coordinates is None:
-        return own
-    return own * sharp_norm([[exact(q) for q in row] for row in place.coordinates.inverse])
+        return own <= limit
+    stretch = sharp_norm([[exact(q) for q in row] for row in place.coordinates.inverse])
+    return bool(exact(own) * stretch <= exact(limit))
 
 
 _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {

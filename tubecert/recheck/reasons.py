@@ -121,6 +121,7 @@ _CLAIMS: Mapping[str, Form] = {
     ),
     "constant_bounded": ({"constant": Node.text}, {}),
     "uncertainty_bound": ({"constant": Node.text, "declared": Node.number, "reaches": maybe}, {}),
+    "obstacle_cleared": ({"obstacle": Node.count, "clearance": enclosure}, {}),
     "gains_suffice": (
         {"section": Node.text, "margins": _margins},
         {"binds": Node.text, "below_twice_rate": Node.flag, "predictor_gain": Node.decimal},

@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.grammar import Owed, is_name
+from tubecert.recheck.obstacles import Obstacle, read_obstacle
 from tubecert.recheck.reading import TIME, Column, Reader
 from tubecert.recheck.terms import Matrix
 
@@ -22,7 +23,7 @@ Rows = tuple[Numbers, ...]
 _IDLE = ("name", "expect", "simulation", "obstacles")
 _MOST_STATES = 32
 _MOST_WIDE = 10  # sides of a box of starts: all its corners are examined
-_LOCKED = ("rho", "bandwidth", "adaptation_rate", "sample_time")
+_LOCKED = ("rho", "clearance", "bandwidth", "adaptation_rate", "sample_time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +165,7 @@ class Specification:
     coordinates: bool  # whether the tube has coordinates of its own
     half_widths: dict[str, Fraction]  # at most; empty if none are asked for
     loop: Loop
+    obstacles: tuple[Obstacle, ...]
     hash: str
     content: str
 
@@ -200,6 +202,9 @@ def read_specification(node: Node) -> Specification:
         coordinates="coordinates" in tube,
         half_widths=tube.get("half_widths", _widths) or {},
         loop=_loop(own["adaptation"], own["conditions"], n),
+        obstacles=tuple(read_obstacle(item, plant.states) for item in own["obstacles"].entries())
+        if "obstacles" in own
+        else (),
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in _IDLE}),
     )
@@ -484,14 +489,6 @@ def _idle(own: Members, plant: Plant) -> None:
         locked.get("verdict", Node.text)
         for key in _LOCKED:
             locked.get(key, lambda item: _several(item, 2))
-    for item in own["obstacles"].entries() if "obstacles" in own else ():
-        obstacle = item.closed("states", optional=("polygon", "disc"))
-        obstacle["states"].texts()
-        obstacle.get("polygon", lambda rows: [_several(row, 2) for row in rows.entries()])
-        disc = obstacle.get("disc", lambda at: at.closed("center", "radius"))
-        if disc is not None:
-            _several(disc["center"], 2)
-            _positive(disc["radius"])
     if "simulation" in own:
         numbers, texts = ("runs", "seed", "duration", "control_rate"), ("controllers", "plane", "h")
         simulation = own["simulation"].closed(optional=("gains", *numbers, *texts))

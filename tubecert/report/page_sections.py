@@ -175,6 +175,8 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
         yield "epsilon, by state", Cell(text=f"at most {sections.in_states(result, tube, tube.epsilon)}")
     if tube.half_widths:
         yield "half-widths", Cell(text=sections.half_widths(result, tube.half_widths))
+    for line in sections.clearances(result):
+        yield "obstacles", Cell(text=line)
     yield "claimed", Cell(text=sections.span(result))
     for words, rest in sections.long_run(result):
         yield f"in the long run, {words}", Cell(text=rest)

@@ -183,6 +183,7 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.coordinates is not None:
         lines[0] += " (lengths in the metric)"
         lines.append(f"a length of epsilon in the metric is at most {in_states(result, tube, tube.epsilon)}")
+    lines += clearances(result)
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
 
@@ -199,6 +200,20 @@ def in_states(result: Result, tube: TubeData, length: Fraction) -> str:
     """What a length in the metric is in each state: that part of the half-widths."""
     share = float(length / tube.rho)
     return half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
+
+
+def clearances(result: Result) -> Iterator[str]:
+    """How far the tube keeps from each obstacle."""
+    for number, (obstacle, own) in enumerate(
+        zip(result.spec.effective.obstacles, result.clearance, strict=False), start=1
+    ):
+        where = f"obstacle {number} ({', '.join(obstacle.states)})"
+        when = f"nearest at t = {short(own.t, 4)} s"
+        if own.verdict is Verdict.CERTIFIED:
+            yield f"clear of {where} by at least {down(own.clearance.below)}; {when}"
+        else:
+            told = "the tube meets it" if own.verdict is Verdict.REFUTED else "the tube may meet it"
+            yield f"{where}: {told}; {when}" + ("" if own.decides else " (does not decide)")
 
 
 def radii(tube: TubeData) -> str:

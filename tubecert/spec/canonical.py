@@ -157,6 +157,8 @@ def _tube(tube: Tube) -> dict[str, Any]:
 
 def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     shown: dict[str, Any] = {"states": list(obstacle.states)}
+    if not obstacle.decides:
+        shown["decide"] = False
     if obstacle.radius is None:
         return shown | {"polygon": _matrix(obstacle.polygon)}
     return shown | {"disc": {"center": _numbers(obstacle.center), **_given(radius=obstacle.radius)}}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from typing import Final
 
@@ -12,7 +13,7 @@ from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.types import Obstacle, Vector
 
-KEYS: Final = ("states", "polygon", "disc")
+KEYS: Final = ("states", "polygon", "disc", "decide")
 DISC_KEYS: Final = ("center", "radius")
 MAX_OBSTACLES: Final = 1_000
 MAX_VERTICES: Final = 200
@@ -45,10 +46,12 @@ def _obstacle(field: Field, names: Names) -> Obstacle | None:
         help = "write polygon: [[...], ...], or disc: {center: [...], radius: r}"
         field.fail(codes.MISSING_KEY, message, help)
         return None
+    decides = entries["decide"].word(("true", "false")) != "false" if "decide" in entries else True
     if "polygon" in entries:
         corners = _polygon(entries["polygon"], names)
-        return Obstacle(states=plane, polygon=corners) if plane and corners else None
-    return _disc(entries["disc"], plane, names)
+        return Obstacle(states=plane, polygon=corners, decides=decides) if plane and corners else None
+    disc = _disc(entries["disc"], plane, names)
+    return None if disc is None else replace(disc, decides=decides)
 
 
 def read_plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] | None:

@@ -198,12 +198,16 @@ class Expectation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
-    """A simple polygon with corners (K, 2), or a disc, in the plane of two states."""
+    """A simple polygon with corners (K, 2), or a disc, in the plane of two states.
+
+    `decides`: whether the verdict asks for clearance from it.
+    """
 
     states: tuple[str, str]
     polygon: Matrix = ()
     center: Vector = ()
     radius: Fraction | None = None
+    decides: bool = True
 
     def __post_init__(self) -> None:
         assert (len(self.polygon) >= 3) == (self.radius is None)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import isfinite
 
+from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
 from tubecert.bounds.compute import bound_constants
 from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.suprema import Suprema
@@ -27,6 +29,7 @@ from tubecert.enclosure.objective import SumOfNorms
 from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
+from tubecert.spec import Obstacle
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.stages.tube import TubeFound
@@ -54,6 +57,25 @@ class Enclosed:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Cleared:
+    """An obstacle, and what is proven of the clearance of the tube from it."""
+
+    obstacle: Obstacle
+    shape: Shape
+    found: Clearance
+
+    @property
+    def clearance(self) -> Constant:
+        """The clearance as it is printed."""
+        return Constant(below=self.found.below, above=self.found.above).printable()
+
+    @property
+    def verdict(self) -> Verdict:
+        """On the clearance."""
+        return self.found.verdict
+
+
+@dataclass(frozen=True, kw_only=True)
 class Bounded:
     """What every kind needs is bounded, and what was declared holds.
 
@@ -63,6 +85,7 @@ class Bounded:
     enclosed: Enclosed
     half_widths: Mapping[str, float]
     geodesics: GeodesicTest
+    clearances: tuple[Cleared, ...] = ()
 
     def __post_init__(self) -> None:
         if _endless(self.enclosed) is not None:
@@ -113,7 +136,35 @@ def unmet(enclosed: Enclosed) -> Stopped | None:
 
 
 def _bounded(enclosed: Enclosed) -> Bounded:
-    return Bounded(enclosed=enclosed, half_widths=_half_widths(enclosed), geodesics=_geodesics(enclosed))
+    return Bounded(
+        enclosed=enclosed,
+        half_widths=_half_widths(enclosed),
+        geodesics=_geodesics(enclosed),
+        clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
+    )
+
+
+def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:
+    """How far the tube keeps from an obstacle."""
+    tube, states = enclosed.tube, enclosed.question.spec.states
+    first, second = (states.index(name) for name in obstacle.states)
+    shape = enclosed.suprema.shape_in(first, second)
+    section = Section(columns=(first, second), reach=_reach(tube), shape=shape, upper=_largest(tube))
+    found = clearance(tube.plan, obstacle, section, enclosed.question.effort)
+    return Cleared(obstacle=obstacle, shape=shape, found=found)
+
+
+def _largest(tube: TubeFound) -> float:
+    """A bound of lmax(M) in x over the tube: M = S'M_z S, so at most A times the sum of the squares of S."""
+    if tube.coordinates is None:
+        return tube.upper.above
+    square = sum(row[i] for i, row in enumerate(tube.coordinates.gram))
+    return fraction_bounds(Fraction(tube.upper.above) * square)[1]
+
+
+def _reach(tube: TubeFound) -> Interval:
+    """dbar = sqrt(a) rho, from below what the distance cannot reach."""
+    return sqrt(Interval.exact(tube.lower.below)) * Interval.of(tube.rho)
 
 
 def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> TubeProblem:
@@ -186,8 +237,7 @@ def _half_widths(enclosed: Enclosed) -> dict[str, float]:
     states = tube.question.spec.states
     if tube.sides is not None:
         return dict(zip(states, map(printable_above, tube.sides), strict=True))
-    reach = sqrt(Interval.exact(tube.lower.below)) * Interval.of(tube.rho)
-    most = fraction_bounds(tube.rho)[1]
+    reach, most = _reach(tube), fraction_bounds(tube.rho)[1]
     return {
         name: printable_above(min(float((Interval.exact(width.above) * reach).hi), most))
         for name, width in zip(states, enclosed.suprema.half_widths(), strict=True)

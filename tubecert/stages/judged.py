@@ -47,7 +47,8 @@ class Judged:
         """The worst of those that decide."""
         if self.as_printed:
             return Verdict.UNDECIDED
-        return overall([self.sections[key].verdict for key in self.deciding])
+        obstacles = [each.verdict for each in self.bounded.clearances if each.obstacle.decides]
+        return overall([*(self.sections[key].verdict for key in self.deciding), *obstacles])
 
     def derived(self) -> dict[str, tuple[Constant, Meaning]]:
         """Constants at the gains found, that the certificate lists beside those of the tube."""

@@ -12,12 +12,14 @@ from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.certificate.result import (
     Bound,
+    ClearanceData,
     Geodesics,
     MetricData,
     Overrides,
     PlanData,
     Recipes,
     Result,
+    ShapeData,
     Source,
     TubeData,
     Work,
@@ -35,7 +37,7 @@ from tubecert.expression import number_text
 from tubecert.metric.verify import MetricProof
 from tubecert.printable import visible
 from tubecert.spec import Spec, canonical
-from tubecert.stages.bounded import Bounded, Enclosed
+from tubecert.stages.bounded import Bounded, Cleared, Enclosed
 from tubecert.stages.judged import Judged
 from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.options import Options
@@ -97,6 +99,7 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         synthesis=question.synthesis,
         metric=_metric(reached),
         tube=_tube(reached),
+        clearance=() if bounded is None else tuple(map(clearance_data, bounded.clearances)),
         constants=_constants(reached),
         sections={} if judged is None else {key: each.data() for key, each in judged.sections.items()},
         elasticities=None if judged is None else why.elasticities,
@@ -196,6 +199,19 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
     own = {name: constant_data(value, meaning) for name, value, meaning in enclosed.constants.items()}
     derived = {} if judged is None else judged.derived()
     return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
+
+
+def clearance_data(found: Cleared) -> ClearanceData:
+    """An obstacle, as it is written."""
+    shape = found.shape
+    return ClearanceData(
+        verdict=found.verdict,
+        decides=found.obstacle.decides,
+        clearance=found.clearance,
+        t=found.found.t,
+        shape=ShapeData(diagonal=(shape.first, shape.second), beside=(shape.low, shape.high)),
+        inside=found.found.inside,
+    )
 
 
 def _recipes(judged: Judged | None) -> dict[str, Any]:

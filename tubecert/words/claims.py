@@ -27,6 +27,7 @@ from tubecert.claims import (
     NotProven,
     NotProvenAsWritten,
     NotWritable,
+    ObstacleCleared,
     Outcome,
     PlanBounded,
     RankOfB,
@@ -59,6 +60,8 @@ def title(claim: Claim) -> str:
             return f"bound of {claim.constant}"
         case UncertaintyBound():
             return f"declared bound of {claim.constant}"
+        case ObstacleCleared():
+            return f"clearance from obstacle {claim.obstacle}"
         case _:
             return _NAMES[type(claim)]
 
@@ -182,6 +185,14 @@ def unbounded(constant: str) -> str:
     """That a constant has no finite bound."""
     meaning = TABLE[constant]
     return f"{meaning.words} ({meaning.symbol}) could not be bounded within the budget of boxes"
+
+
+def _cleared(claim: ObstacleCleared, reason: Reason) -> str:
+    low, high = claim.clearance.below, claim.clearance.above
+    if reason.verdict is Verdict.REFUTED:
+        return "the tube contains a point of the obstacle"
+    told = f"the tube keeps away from it by {low:.4g} at least" if low > 0 else "the tube may meet it"
+    return f"{told}; at its nearest by {high:.4g}"
 
 
 # -- gains
@@ -331,5 +342,6 @@ _MESSAGES: Mapping[type[Claim], Callable[[Any, Reason], str]] = {
     ConstantBounded: lambda claim, reason: unbounded(claim.constant),
     UncertaintyBound: _uncertainty_bound,
     GainsSuffice: _suffice,
+    ObstacleCleared: _cleared,
     ConditionHolds: _condition,
 }

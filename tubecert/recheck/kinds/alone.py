@@ -14,7 +14,7 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
+from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least
 from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section
 from tubecert.recheck.metric import stated
 
@@ -76,6 +76,8 @@ class Alone(Kind[AloneSection, NoGains]):
                 (section, recipe),
                 lambda: _holds(section, recipe, setting),
             )
+        else:
+            yield ground.claim("0: what is told of it", (section,), lambda: _told(section, setting))
         if top is not None:
             yield ground.claim(
                 f"0: sup D <= {float(top):.6g} without adaptation",
@@ -129,6 +131,17 @@ def _holds(section: AloneSection, recipe: NoGains | None, setting: Setting) -> O
         return own
     last = settled(setting, setting.n.h) / root(setting.n.lower)
     return all_of((own, at_most(last, radius, "the ultimate radius")))
+
+
+def _told(section: AloneSection, setting: Setting) -> Outcome:
+    """The margin of a section that is not certified; it has no radius in the long run."""
+    below = None if section.margin is None else section.margin.below
+    if section.ultimate_radius is not None:
+        return stated(False, "a radius is stated of a tube that is not certified")
+    if below is None:
+        return stated(True, "")
+    own = margin(setting, supremum(setting, setting.n.h))
+    return at_least(own, below, "the distance without adaptation")
 
 
 def _serves(limit: Fraction, setting: Setting) -> Outcome:

@@ -81,6 +81,10 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
                 (section, recipe),
                 lambda: _holds(section, pair, recipe, setting),
             )
+        if section.verdict != "certified":
+            alone = section.ultimate_radius is None
+            why = "a radius is stated of a tube that is not certified"
+            yield ground.claim("C: what is told of it", (alone,), lambda: stated(alone, why))
         yield ground.claim(
             "C: the curve is feasible", (curve, pair), lambda: _curve_holds(curve, pair, setting)
         )

@@ -1,0 +1,107 @@
+"""What is stated of obstacles is proven again; planted faults are refused."""
+
+import copy
+
+import pytest
+import yaml
+from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
+
+from tubecert.errors import TubecertError
+
+ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text("utf-8")
+CLEAR = [
+    {"states": ["x1", "x2"], "disc": {"center": [3, 0], "radius": "0.4"}},
+    {"states": ["x2", "x1"], "polygon": [[2, -1], [3, -1], [3, 1], ["2.5", 0]]},
+]
+MET = [{"states": ["x1", "x2"], "disc": {"center": [1, 1], "radius": "0.3"}}]
+
+
+def with_obstacles(obstacles):
+    return ORBIT + yaml.safe_dump({"obstacles": obstacles})
+
+
+def refused(document):
+    try:
+        return bool(failing(examine(sealed(document))))
+    except TubecertError:
+        return True
+
+
+@pytest.fixture(scope="module")
+def clear():
+    return certified(with_obstacles(CLEAR), conditions="distance")
+
+
+@pytest.mark.slow
+def test_clearance_is_confirmed(clear):
+    result = clear["result"]
+    assert result["verdict"] == "certified"
+    assert [own["verdict"] for own in result["clearance"]] == ["certified", "certified"]
+    assert not failing(examine(clear))
+
+
+def grow(result, by=1.01):  # it was found to a thousandth of the width of the tube
+    low, high = result["clearance"][0]["clearance"]
+    result["clearance"][0]["clearance"] = [low * by, high * by]
+
+
+FAULTS = {
+    "a larger clearance": grow,
+    "a thinner tube": lambda r: r["clearance"][0]["shape"].update(
+        diagonal=[0.999 * v for v in r["clearance"][0]["shape"]["diagonal"]]
+    ),
+    "a tube turned": lambda r: r["clearance"][0]["shape"].update(
+        beside=[-v for v in reversed(r["clearance"][0]["shape"]["beside"])]
+    ),
+    "an entry removed": lambda r: r["clearance"].pop(),
+    "the list removed": lambda r: r.pop("clearance"),
+    "entries exchanged": lambda r: r["clearance"].reverse(),
+    "no clearance": lambda r: r["clearance"][0].update(clearance=[0.0, 1.0]),
+    "another verdict": lambda r: r["clearance"][0].update(verdict="undecided"),
+    "it does not decide": lambda r: r["clearance"][0].update(decides=False, verdict="undecided"),
+    "an unknown member": lambda r: r["clearance"][0].update(obstacle=1),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_refused(clear, fault):
+    forged = copy.deepcopy(clear)
+    FAULTS[fault](forged["result"])
+    assert refused(forged)
+
+
+MOVES = {
+    "nearer": lambda s: s["obstacles"][0]["disc"].update(center=["2.5", "0"]),
+    "larger": lambda s: s["obstacles"][0]["disc"].update(radius="0.9"),
+    "around the plan": lambda s: s["obstacles"][1].update(
+        polygon=[["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]]
+    ),
+    "in another plane": lambda s: s["obstacles"][0].update(
+        states=["x2", "x1"], disc={"center": ["1", "1"], "radius": "1"}
+    ),
+    "in no plane": lambda s: s["obstacles"][0].update(states=["x1", "x1"]),
+    "one more": lambda s: s["obstacles"].append(s["obstacles"][0]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("move", MOVES)
+def test_an_obstacle_elsewhere_is_noticed(clear, move):
+    try:
+        forged = respecified(clear, MOVES[move])
+    except TubecertError:
+        return
+    assert refused(forged)
+
+
+@pytest.mark.slow
+def test_an_obstacle_that_is_met_refutes_unless_it_does_not_decide():
+    met = certified(with_obstacles(MET), conditions="distance")["result"]
+    assert met["verdict"] == "refuted"
+    assert met["distance"]["verdict"] == "certified"
+    assert met["reasons"][-1]["claim"] == "obstacle_cleared"
+    told = certified(with_obstacles([{**MET[0], "decide": False}]), conditions="distance")
+    assert told["result"]["verdict"] == "certified"
+    assert told["result"]["clearance"][0]["verdict"] == "refuted"
+    assert not failing(examine(told))
