@@ -17,6 +17,7 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.interval import Interval
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.expression import parse, symbol
 from tubecert.model import ControlAffineModel
@@ -182,16 +183,16 @@ def test_the_domain_is_sharp_in_every_direction():
 
 def test_a_factor_that_promises_too_much_is_given_up(monkeypatch):
     """What stands for S is proven to be no larger; a proposal that is larger is not believed."""
-    sections._factor.cache_clear()
+    sections.factor.cache_clear()
     honest = sections._proposed
     monkeypatch.setattr(sections, "_proposed", lambda *args: 1.5 * honest(*args))
     try:
-        assert not sections._factor(SKEWED, (0, 1)).hi.any()
-        sections._factor.cache_clear()
+        assert not sections.factor(SKEWED, (0, 1)).hi.any()
+        sections.factor.cache_clear()
         monkeypatch.setattr(sections, "_proposed", lambda *args: 1.1 * honest(*args))
-        assert sections._factor(SKEWED, (0, 1)).hi == pytest.approx(0.7 * 1.1 * honest(SKEWED, (0, 1)))
+        assert sections.factor(SKEWED, (0, 1)).hi == pytest.approx(0.7 * 1.1 * honest(SKEWED, (0, 1)))
     finally:
-        sections._factor.cache_clear()
+        sections.factor.cache_clear()
 
 
 def test_a_moving_plan_carries_the_ellipsoid():
@@ -424,3 +425,61 @@ def test_the_identity_by_the_new_path_is_the_old_path():
             name
         )  # both enclose the same number
         assert found.above == pytest.approx(old.above, rel=0.011, abs=1e-12), name
+
+
+# -- vectors that are affine in some states
+
+
+LINKS = ("x2", "2*x1 + x3 - 3*sin(x1)", "0.5*x2 - x3 + x1**2")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "f",
+    [LINKS, ("1 + x2", "4*x3", "x1 - x2"), ("x2 + sin(t)", "x1**3", "x3")],
+    ids=["links", "affine", "time"],
+)
+def test_what_is_affine_needs_no_search(f):
+    """The norm over the rest of the states, exactly: as by boxes in all of them, and as by samples."""
+    own = model(W=CONSTANT_W)
+    names = {name: symbol(name) for name in (*NAMES, "t")}
+    v = tuple((parse(text, symbols=names).expression,) for text in f)
+    start = suprema(own, SKEWED, gap=0.01, budget=200_000).with_radius(Fraction(3, 10), (Fraction(9),) * 3)
+    moved = start.fields.of_vector(v)
+    whole = start._over_rest([moved])
+    assert whole is not None
+    assert len(set(whole.variables) - {"t"}) < 3
+    found = start.norms("f", [moved])
+    boxes = supremum(
+        SumOfNorms([moved]),
+        Tube(start.plan, start.section, states=NAMES, inputs=(), time=start.time),
+        start.effort,
+    )
+    assert max(found.below, boxes.below) <= min(found.above, boxes.above)
+    x = CENTRE + points(SKEWED, 0.3, np.full(3, 9.0), 40_000)
+    S = np.array(SKEWED.rows, dtype=float)
+    x1, x2, x3 = x.T
+    largest = 0.0
+    for t in np.linspace(0, 7, 60) if f[0].endswith("sin(t)") else (0.0,):
+        own_f = {
+            LINKS: (x2, 2 * x1 + x3 - 3 * np.sin(x1), 0.5 * x2 - x3 + x1**2),
+            ("1 + x2", "4*x3", "x1 - x2"): (1 + x2, 4 * x3, x1 - x2),
+            ("x2 + sin(t)", "x1**3", "x3"): (x2 + np.sin(t), x1**3, x3),
+        }[f]
+        largest = max(largest, float(np.linalg.norm(np.stack(own_f, axis=1) @ S.T, axis=1).max()))
+    assert largest <= found.above
+    assert found.above <= 1.015 * largest
+    # and it is attained where the certificate says so, at a point of the tube
+    at = np.array(found.at.x)
+    assert np.linalg.norm(S @ (at - CENTRE)) <= 0.3 * (1 + 1e-9)
+    moment = {"x1": at[0], "x2": at[1], "x3": at[2], "t": found.at.t or 0.0}
+    value = [eval(text, {"sin": np.sin}, moment) for text in f]
+    assert np.linalg.norm(S @ value) >= found.below * (1 - 1e-9)
+
+
+def test_half_widths_that_cut_the_ellipsoid_are_searched():
+    start = suprema(model(), SKEWED).with_radius(
+        Fraction(3, 10), (Fraction(9), Fraction(1, 100), Fraction(9))
+    )
+    v = tuple((parse(text, symbols={name: symbol(name) for name in NAMES}).expression,) for text in LINKS)
+    assert start._over_rest([v]) is None

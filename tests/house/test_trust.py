@@ -126,6 +126,7 @@ _BOUND = "the safe side of a constant, which is a float by definition"
 _ENDS = "ends of an interval, put in for a variable that a formula is monotone in"
 _POINT = "a point that was chosen: it need not be near anything"
 TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant, and not near it
+    "bounds/affine.py": "0; rho, a bound; s, any will do",
     "bounds/clearance.py": f"{_BOUND}; {_POINT}",
     "bounds/compute.py": _BOUND,
     "bounds/level.py": _BOUND,

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tubecert.bounds.affine import NormOverRest
 from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
@@ -41,6 +42,7 @@ from tubecert.trajectory.family import starred
 from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
+_SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
 Report = Callable[[str, int, float, float], None]
 
 
@@ -122,9 +124,28 @@ class Suprema:
     def norms(self, name: str, matrices: list[Matrix]) -> Constant:
         """sup over the tube of the sum of spectral norms."""
         objective = SumOfNorms(matrices)
-        return (
-            Constant.exactly(0.0) if objective.is_zero else self._constant(self._over_tube(name, objective))
-        )
+        if objective.is_zero:
+            return Constant.exactly(0.0)
+        whole = self._over_rest(matrices)
+        if whole is None:
+            return self._constant(self._over_tube(name, objective))
+        found = self._over_tube(name, whole)
+        return self._constant(replace(found, at={**found.at, **whole.completed(found.at)}))
+
+    def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
+        """The norm of one vector as a function of fewer states, where those that it is affine in need no search."""
+        still = self.plan.is_constant and self.plan.allowance is None
+        if self.coordinates is None or not still or len(matrices) > 1 or len(matrices[0][0]) > 1:
+            return None
+        spread = self.coordinates.spread
+        sides = self.sides or (np.inf,) * len(spread)
+        reach = [self.rho * float(row[i]) ** 0.5 * (1 - _SAME) for i, row in enumerate(spread)]
+        if any(side < far for side, far in zip(sides, reach, strict=True)):  # half-widths count, too
+            return None
+        try:
+            return NormOverRest(matrices[0], self.model.states, self.plan.x, self.coordinates, self.rho)
+        except ValueError:
+            return None
 
     def drift_on_plan(self) -> Constant:
         """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
@@ -306,19 +327,12 @@ class Suprema:
             t = 0.0
         moment = np.array([0.0 if t is None else t])
         centre, _ = self.plan.enclose(moment, moment)
-        x = np.array(
-            [
-                found.at.get(name, found.at.get(starred(name), centre.mid[0, i]))
-                for i, name in enumerate(self.model.states)
-            ]
-        )
-        if isinstance(self.section, Ellipsoid):  # the others are such that the point lies in it
-            which = [i for i, name in enumerate(self.model.states) if name in found.at]
-            x = (
-                centre.mid[0]
-                if not which
-                else centre.mid[0] + self.section.completed(which, x[None, which] - centre.mid[0, which])[0]
-            )
+        states = self.model.states
+        origin = np.array([found.at.get(starred(name), centre.mid[0, i]) for i, name in enumerate(states)])
+        x = np.array([found.at.get(name, origin[i]) for i, name in enumerate(states)])
+        which = [i for i, name in enumerate(states) if name in found.at]
+        if isinstance(self.section, Ellipsoid) and which:  # the others are such that the point lies in it
+            x = origin + self.section.completed(which, (x - origin)[None, which])[0]
         return Witness(t=t, x=tuple(map(float, x)))
 
 

@@ -118,7 +118,7 @@ class Ellipsoid:
         y = Interval(np.maximum(offset.lo, -extent), np.minimum(offset.hi, extent))
         alive = np.all(y.lo <= y.hi, axis=1)
         y = Interval(np.minimum(y.lo, extent), np.maximum(y.hi, -extent))  # what is empty, too, stays finite
-        R = _factor(self._coordinates, tuple(which))
+        R = factor(self._coordinates, tuple(which))
         terms, rest = _rows(R, y)
         gap = np.maximum(0.0, down(np.square(rest.mignitude)))
         others = gap @ (1.0 - np.eye(len(which)))
@@ -155,7 +155,7 @@ class Ellipsoid:
         blurred = Interval.exact(moved) - centre
         lo[:, which], hi[:, which] = blurred.lo, blurred.hi
         y = Interval(lo, hi)
-        _, z = _rows(_enclosed(self._coordinates.rows), y)
+        _, z = _rows(enclosed(self._coordinates.rows), y)
         total = up(np.square(z.magnitude)).sum(axis=1) * (1 + _SLACK)
         inside = (total <= down(np.square(self._rho))) & np.all(
             y[:, which].magnitude <= self._sides[which], axis=1
@@ -167,7 +167,7 @@ class Ellipsoid:
         if not which:
             return np.zeros(len(lo), dtype=bool)
         offset = Interval(lo, hi) - centre
-        _, z = _rows(_factor(self._coordinates, tuple(which)), offset)
+        _, z = _rows(factor(self._coordinates, tuple(which)), offset)
         beyond = np.any(offset.magnitude > self._sides[which], axis=1)
         crossing: NDArray[np.bool_] = beyond | (np.sum(z.magnitude**2, axis=1) > self._rho**2)
         return crossing
@@ -196,17 +196,18 @@ def _without(total: Array, own: Array, terms: Interval, sign: int) -> Array:
     return up(total - own + slack) if sign > 0 else down(total - own - slack)
 
 
-def _enclosed(rows: Rows) -> Interval:
+def enclosed(rows: Rows) -> Interval:
+    """A rational matrix, rounded outward."""
     ends = np.array([[fraction_bounds(value) for value in row] for row in rows])
     return Interval(ends[..., 0], ends[..., 1])
 
 
 @lru_cache(maxsize=256)
-def _factor(coordinates: Coordinates, which: tuple[int, ...]) -> Interval:
+def factor(coordinates: Coordinates, which: tuple[int, ...]) -> Interval:
     """R (K, k) with |R y| <= |S x| for all x with the components y = x[which]: S itself for all states."""
     n = len(coordinates.rows)
     if len(which) == n:
-        return _enclosed(tuple(tuple(row[i] for i in which) for row in coordinates.rows))
+        return enclosed(tuple(tuple(row[i] for i in which) for row in coordinates.rows))
     R = _proposed(coordinates, which)
     for share in _SHARES:
         rows = R * (1 - share)
