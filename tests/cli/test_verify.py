@@ -78,6 +78,24 @@ def test_many_files_and_the_worst_exit_code(folder):
     assert run(folder / "fast.yaml", "--rate", "1.7").exit_code == 0
 
 
+def test_verdicts_are_told_one_after_the_other(folder, monkeypatch):
+    """What is decided is known when the next one takes for ever."""
+    from tubecert.pipeline import verification
+
+    honest, calls = verification.verify, []
+
+    def endless(spec, effort, progress):
+        calls.append(spec)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        return honest(spec, effort, progress)
+
+    monkeypatch.setattr(verification, "verify", endless)
+    done = run(folder / "own.yaml", folder / "own.yaml")
+    assert done.exit_code == 130
+    assert done.stdout.startswith("certified")
+
+
 def test_what_cannot_be_decided_is_undecided(folder):
     edge = run(folder / "bent.yaml", _json(folder, {"coefficients": ONE, "rate": 1}), "--rate", "1.5")
     assert edge.exit_code == 4  # v = (1, 0): -1 - 0.5 = -1.5 exactly

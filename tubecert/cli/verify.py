@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Numbers, Output
-from tubecert.cli.presenting import present
 from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
@@ -60,17 +59,25 @@ def run(given: Given, output: Output) -> ExitCode:
         spare(target, {"input": cases[0].file, "specification": cases[0].spec.path})
     from tubecert.enclosure.branch_and_bound import Effort
     from tubecert.pipeline.verification import verify
-    from tubecert.report import progress
+    from tubecert.report import progress, verification
 
     effort = Effort(gap=float(gap or _GAP), budget=budget or _BUDGET)
     terminal = Terminal.stderr(color=output.color)
+    shown = Terminal.stdout(color=output.color)
     found: list[tuple[str, Verified]] = []
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
-        for case in cases:
-            found.append((case.file, verify(case.spec, effort, show)))
+    for case in cases:
+        with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
+            verified = verify(case.spec, effort, show)
+        found.append((case.file, verified))
+        if not output.json:  # one after the other: many metrics take their time
+            one = [verification.line(case.file, verified)]
+            write_stdout(shown.text(one if output.quiet else verification.report(case.file, verified)))
     if target is not None and found[0][1].file is not None:
         certificate.write(target, found[0][1].file.to_json())
-    _show(found, target, output)
+    if output.json:
+        write_stdout(verification.as_json(found))
+    elif not output.quiet and (said := verification.summary(found, target)):
+        write_stdout(shown.text(said))
     return _code([verified for _, verified in found])
 
 
@@ -114,15 +121,3 @@ def _code(found: Sequence[Verified]) -> ExitCode:
     """The worst: refuted, then undecided."""
     codes = [verified.verdict.exit_code for verified in found]
     return next((c for c in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED) if c in codes), ExitCode.CERTIFIED)
-
-
-def _show(found: Sequence[tuple[str, Verified]], target: str | None, output: Output) -> None:
-    from rich.text import Text
-
-    from tubecert.report import verification
-
-    if output.json:
-        write_stdout(verification.as_json(found))
-        return
-    lines = Text("\n").join(verification.line(file, verified) for file, verified in found)
-    present(output, lines, lambda: verification.report(found, target))

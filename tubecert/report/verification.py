@@ -34,12 +34,14 @@ def line(file: str, found: Verified) -> Text:
     return shown.append(", ".join(part for part in parts if part))
 
 
-def report(found: Sequence[tuple[str, Verified]], target: str | None) -> list[RenderableType]:
-    """A few lines for each metric, and how many there are of each verdict."""
+def report(file: str, found: Verified) -> list[RenderableType]:
+    """A few lines for one metric."""
+    return [line(file, found), *(indented(Text(text)) for text in _details(found))]
+
+
+def summary(found: Sequence[tuple[str, Verified]], target: str | None) -> list[RenderableType]:
+    """How many there are of each verdict, and where a metric was written."""
     parts: list[RenderableType] = []
-    for file, verified in found:
-        parts.append(line(file, verified))
-        parts += [indented(Text(text)) for text in _details(verified)]
     if len(found) > 1:
         verdicts = [verified.verdict for _, verified in found]
         counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
