@@ -5,10 +5,16 @@ from __future__ import annotations
 import copy
 
 import pytest
-from rechecked import certified, examine, failing, respecified, sealed
+from flint import arb
+from rechecked import certified, examine, failing, respecified, sealed, terms
 from systems import SMALL
 
+from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
+from tubecert.expression import parse, symbol
+from tubecert.recheck.grammar import read
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import variable
 
 FRICTION = """
 tubecert: 1
@@ -98,3 +104,49 @@ def test_a_box_of_another_form_is_refused(box):
     with pytest.raises(TubecertError) as raised:
         examine(respecified(document, other))
     assert raised.value.findings[0].code == "TC603"
+
+
+OWED = {
+    "log(x)": 1,
+    "asin(x) + acos(y)": 2,
+    "0*asin(x)": 1,
+    "tanh(x) + atan(y) + sinh(x)*cosh(y)": 0,
+    "log(x)/y": 2,
+    "sqrt(acos(x))": 2,
+}
+
+
+@pytest.mark.parametrize("text", OWED)
+def test_both_readers_owe_the_same(text):
+    """Each by its own rules: kind by kind, and at points where the arguments are the same numbers."""
+    names = {name: symbol(name) for name in "xy"}
+    theirs = parse(text, symbols=names).obligations
+    ours = read(text, {name: variable(name) for name in "xy"})[1]
+    assert len(ours) == len(theirs) == OWED[text]
+    found = [(item.kind, Tape([item.argument], "xy").run_floats([0.3, 0.7], ())[0]) for item in theirs]
+    own = [
+        (item.kind, float(Program([item.argument], "xy").run([arb(0.3), arb(0.7)])[0].mid())) for item in ours
+    ]
+    for (kind, value), (other, number) in zip(sorted(own), sorted(found), strict=True):
+        assert kind == other
+        assert value == pytest.approx(number)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("asin(2 + x)", None),
+        ("log(x - 1)", None),
+        ("acos(x - 2)", None),
+        ("tanh(100*x)", 1.0),
+        ("atan(x)", 1.0),
+    ],
+)
+def test_what_is_not_defined_on_a_ball_bounds_nothing(text, value):
+    """x in [-1, 1]: outside of its domain a function has no enclosure; where it has one it is as tight as its ends."""
+    (term,) = terms([text], "x")
+    found = Program([term], "x").run([arb(0, 1)])[0]
+    if value is None:
+        assert not found.is_finite()
+    else:
+        assert float(found.abs_upper()) <= value * (1 + 1e-8)  # a radius has 30 bits
