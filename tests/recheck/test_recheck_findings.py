@@ -184,3 +184,31 @@ def test_what_was_asked_of_a_synthesis_survives_reading():
         changed["synthesis"]["asked"] = asked
         with pytest.raises(FormError):
             Result.from_json(changed)
+
+
+def not_certified(document, key, **told):
+    """A section that does not decide says that it is not certified, and tells of gains all the same."""
+    document = copy.deepcopy(document)
+    result = document["result"]
+    other = next(name for name in ("distance", "sampled") if name != key)
+    result |= {"decided_by": [other], "reasons": []}
+    result["proof"].pop(key, None)
+    result[key] |= {"verdict": "undecided", **told}
+    return names(examine(sealed(document), 1_000))
+
+
+NOT_CERTIFIED = {
+    "A": ("conditions_26", {"adaptation_rate": 1.0, "ultimate_radius": None}),
+    "C": ("sampled", {"sample_time": 10.0, "ultimate_radius": None}),
+    "C, a radius": ("sampled", {"margin": [-1.0, 0.5], "ultimate_radius": 0.001}),
+    "0, a radius": ("no_adaptation", {"ultimate_radius": 0.001}),
+    "0, a margin": ("no_adaptation", {"margin": [0.9, 0.95], "ultimate_radius": None}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", NOT_CERTIFIED)
+def test_what_is_not_certified_is_not_told_as_if_it_were(case):
+    """An attack: gains that do not serve, with the margins of gains that do, in a section that is not certified."""
+    key, told = NOT_CERTIFIED[case]
+    assert f"{case[0]}: what is told of it" in not_certified(certified(SMALL), key, **told)

@@ -59,6 +59,13 @@ def ultimate(radius: Fraction, setting: Setting, gains: Gains, proof: DistancePr
     return at_most(bound.ultimate() / root(setting.n.lower), radius, "the ultimate radius")
 
 
+def not_shown_to_hold(margins: Iterable[Enclosure]) -> Outcome:
+    """Gains that are not certified: their margins do not say that every condition holds."""
+    ends = [margin.below for margin in margins]
+    holds = any(below is None or below <= 0 for below in ends)
+    return stated(holds, "by its margins it holds, and yet it is not certified")
+
+
 def words(at: Gains) -> str:
     """Gains, to name a claim by."""
     return f"omega = {float(at.bandwidth):.6g}, Gamma = {float(at.adaptation_rate):.6g}"

@@ -16,7 +16,14 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_least, margin_at_least, ultimate, words
+from tubecert.recheck.kinds.bounds import (
+    all_of,
+    at_least,
+    margin_at_least,
+    not_shown_to_hold,
+    ultimate,
+    words,
+)
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import stated
@@ -116,6 +123,11 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         for k, (name, pair) in enumerate(section.pairs.items()):
             decides = k == 0
             if name == "asked" and not certified:
+                yield ground.claim(
+                    "B: what is told of it",
+                    (pair,),
+                    lambda pair=pair: not_shown_to_hold([pair.margin]),  # type: ignore[misc]
+                )
                 continue
             yield _pair_claim(pair, recipe, ground, by_recipe=decides and certified)
             if decides:

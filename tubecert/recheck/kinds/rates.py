@@ -13,7 +13,15 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least, ultimate, words
+from tubecert.recheck.kinds.bounds import (
+    all_of,
+    at_least,
+    at_most,
+    margin_at_least,
+    not_shown_to_hold,
+    ultimate,
+    words,
+)
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import CONFIRMED, stated
@@ -219,6 +227,8 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
         yield ground.claim(
             "A: its recipe", (pair, recipe), lambda: stated(recipe == at, "it is for other gains")
         )
+    else:
+        yield ground.claim("A: what is told of it", (pair,), lambda: not_shown_to_hold(pair.margins.values()))
     if radius is not None:
         yield ground.claim(
             "A: ultimate radius",

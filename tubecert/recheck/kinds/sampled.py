@@ -14,7 +14,7 @@ from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
+from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.sampling import SampledGains, sampled_margin
@@ -82,9 +82,7 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
                 lambda: _holds(section, pair, recipe, setting),
             )
         if section.verdict != "certified":
-            alone = section.ultimate_radius is None
-            why = "a radius is stated of a tube that is not certified"
-            yield ground.claim("C: what is told of it", (alone,), lambda: stated(alone, why))
+            yield ground.claim("C: what is told of it", (section,), lambda: _told(section))
         yield ground.claim(
             "C: the curve is feasible", (curve, pair), lambda: _curve_holds(curve, pair, setting)
         )
@@ -136,6 +134,13 @@ def _holds(
     value, ultimate = sampled_margin(setting, at, exact(recipe.speed))
     found = margin_at_least(value, shown, "the distance with sampled adaptation")
     return at_most(ultimate, radius, "the ultimate radius") if found.holds and radius is not None else found
+
+
+def _told(section: SampledSection) -> Outcome:
+    """Gains that are not certified: no radius in the long run, and no margin that says that they serve."""
+    if section.ultimate_radius is not None:
+        return stated(False, "a radius is stated of a tube that is not certified")
+    return not_shown_to_hold([section.margin]) if section.margin is not None else CONFIRMED
 
 
 def _curve_holds(
