@@ -263,6 +263,33 @@ def test_a_tube_in_coordinates_of_its_own():
         assert failing(examine(changed(made, less))) != [], name
 
 
+@pytest.mark.slow
+def test_every_plan_of_a_family_keeps_away_from_an_obstacle():
+    """A disc beside a corner of the box: sampled over the box, and a hair more is not confirmed."""
+    disc = "obstacles: [{states: [x1, x2], disc: {center: [3, 3], radius: 0.5}}]\n"
+    made = proven(FAMILY + disc, conditions="distance")
+    assert failing(examine(made)) == []
+    below, above = made["result"]["clearance"][0]["clearance"]
+    W = np.array([[4.25828, -0.93423], [-0.93423, 3.76692]])
+    reach = np.sqrt(made["result"]["constants"]["lower"]["below"]) * made["result"]["tube"]["rho"]
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    edge = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(W).T
+    true = min(
+        np.linalg.norm(np.array([3, 3]) - (np.array([x, y]) + edge), axis=1).min()
+        for x in (-1, 1)
+        for y in (-0.5, 0.5)
+    )
+    assert below <= true - 0.5 <= above
+    assert below > (true - 0.5) * 0.98
+
+    def more(result):
+        result["clearance"][0]["clearance"] = [below * 1.02, above]
+
+    assert failing(examine(changed(made, more))) != []
+    inside = proven(FAMILY + disc.replace("[3, 3]", "[0.9, 0.4]"), conditions="distance")["result"]
+    assert inside["verdict"] != "certified"
+
+
 LIES = {
     "u_star": lambda c: c["u_star"].update(above=0.98, below=0.97),
     "phi": lambda c: c["drift_on_plan"].update(above=c["drift_on_plan"]["above"] * 0.98, below=1.0),

@@ -16,7 +16,6 @@ from tubecert.recheck.curve import Curve, Segment
 from tubecert.recheck.metric import CONFIRMED, stated, together
 from tubecert.recheck.obstacles import Cleared, Obstacle, Point, Shape
 from tubecert.recheck.place import Place
-from tubecert.recheck.program import Program
 from tubecert.recheck.statements import NotNegative
 from tubecert.recheck.terms import number
 
@@ -70,25 +69,28 @@ class _Test:
         self._curve: Curve = place.curve
         self._obstacle = obstacle
         self._least = least
-        self._c = [(exact(c), exact(s)) for c, s in _turned()]
+        self._c = list(_turned())
         extents = [reach * root(exact(max(Fraction(0), _square(shape, c)))) for c in _turned()]
         self._beyond = [
             [exact(top) + extent for top, extent in zip(tops, extents, strict=True)]
             for tops in _tops(obstacle)
         ]
 
-    def _apart(self, x: Ball, y: Ball, least: Ball) -> bool:
-        """Whether every part is kept away from, by the least distance, from anywhere in a box."""
-        along = [c * x + s * y for c, s in self._c]
+    def _apart(self, x: tuple[Ball, Ball], y: tuple[Ball, Ball], least: Ball) -> bool:
+        """Whether every part is kept away from, by the least distance, from anywhere in a box, given by its ends.
+
+        A direction is least at a corner. (A ball around a wide box would know its ends to nine digits only.)
+        """
+        along = [exact(c) * x[c < 0] + exact(s) * y[s < 0] for c, s in self._c]
         return all(
             any(value - top >= least for value, top in zip(along, tops, strict=True)) for tops in self._beyond
         )
 
     def outside(self) -> bool:
-        """x*(0) lies outside: the ball around it meets no edge, so its middle tells for all of it."""
-        start = Program(list(self._curve.start), ()).run([])
+        """An x* lies outside: the ball around it meets no edge, so its middle tells for all of it."""
+        start = self._curve.somewhere()
         x, y = (start[column] for column in self._columns)
-        if not self._apart(x, y, exact(0)):
+        if not self._apart((x, x), (y, y), exact(0)):
             return False
         middle = (_fraction(x), _fraction(y))
         return self._obstacle.radius is not None or not _contains(self._obstacle.corners, middle)
@@ -100,7 +102,7 @@ class _Test:
             if not waiting:
                 return CONFIRMED
             segment = waiting.pop()
-            x, y = (exact_box(segment.x[column]) for column in self._columns)
+            x, y = (_ends(segment.x[column]) for column in self._columns)
             if self._apart(x, y, self._least):
                 continue
             halves = segment.halves
@@ -112,9 +114,8 @@ class _Test:
         return Outcome(verdict="undecided", why="the clearance could not be shown within the budget")
 
 
-def exact_box(ends: tuple[float, float]) -> Ball:
-    """Everything between two floats."""
-    return exact(Fraction(ends[0])).union(exact(Fraction(ends[1])))
+def _ends(ends: tuple[float, float]) -> tuple[Ball, Ball]:
+    return exact(Fraction(ends[0])), exact(Fraction(ends[1]))
 
 
 def _fraction(x: Ball) -> Fraction:

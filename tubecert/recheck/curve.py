@@ -48,6 +48,10 @@ class Curve:
         """Variables of x* and u* beside s: none for a plan that is known."""
         return {}
 
+    def somewhere(self) -> list[Ball]:
+        """An x* of a plan: x*(0). All others are connected with it."""
+        return Program(list(self.start), ()).run([])
+
     @cached_property
     def moves(self) -> bool:
         """Whether it is more than a point."""

@@ -33,6 +33,10 @@ class Everyone(Curve):
         """P and U."""
         return self.named
 
+    def somewhere(self) -> list[Ball]:
+        """The centre of P, a box: all others are connected with it."""
+        return [exact((low + high) / 2) for low, high in self.boxes[0]]
+
     @cached_property
     def slope(self) -> list[Term]:
         """Not known; raises `ValueError`."""
