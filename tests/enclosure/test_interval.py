@@ -231,8 +231,8 @@ UNARY = {
     **{name: function for name, (function, _, _) in DOMAINS.items()},
     "square": lambda a: a**2,
     "cube": lambda a: a**3,
-    "inverse": lambda a: 1.0 / a,
-    "affine": lambda a: a * 3.0 - 2.0,
+    "inverse": lambda a: 1 / a,
+    "affine": lambda a: a * 3 - 2,
 }
 
 
