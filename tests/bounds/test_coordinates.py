@@ -483,3 +483,27 @@ def test_half_widths_that_cut_the_ellipsoid_are_searched():
     )
     v = tuple((parse(text, symbols={name: symbol(name) for name in NAMES}).expression,) for text in LINKS)
     assert start._over_rest([v]) is None
+
+
+@pytest.mark.slow
+def test_what_is_affine_needs_no_search_along_a_plan_either():
+    t = symbol("t")
+    names = {name: symbol(name) for name in (*NAMES, "t")}
+    x = tuple(parse(text, symbols=names).expression for text in ("0.5*t", "sin(2*t)", "0.2 - t**2"))
+    plan = Plan(x, (t, 1 - t), Fraction(1))
+    own = model(
+        f=["x2", "2*x1 + x3 - 3*sin(x1)", "0.5*x2 - x3 + x1**2"],
+        B=[["0", "0"], ["1", "0"], ["0", "2"]],
+        W=CONSTANT_W,
+    )
+    start = Suprema(own, plan, 0.0, None, Effort(gap=0.01, budget=200_000), coordinates=SKEWED)
+    start = start.with_radius(Fraction(3, 10), (Fraction(9),) * 3)
+    found = start.drift_on_plan()
+    assert start._over_rest([start.fields.drift_on_plan()]).variables == ("t", "u1", "u2", "x1")
+    S, largest = np.array(SKEWED.rows, dtype=float), 0.0
+    y = points(SKEWED, 0.3, np.full(3, 9.0), 20_000)
+    for now in np.linspace(0, 1, 60):
+        x1, x2, x3 = (np.array([0.5 * now, np.sin(2 * now), 0.2 - now**2]) + y).T
+        f = np.stack([x2, 2 * x1 + x3 - 3 * np.sin(x1) + now, 0.5 * x2 - x3 + x1**2 + 2 * (1 - now)], axis=1)
+        largest = max(largest, float(np.linalg.norm(f @ S.T, axis=1).max()))
+    assert largest <= found.above <= 1.03 * largest

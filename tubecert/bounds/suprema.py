@@ -136,8 +136,8 @@ class Suprema:
 
     def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
         """The norm of one vector as a function of fewer states, where those that it is affine in need no search."""
-        still = self.plan.is_constant and self.plan.allowance is None
-        if self.coordinates is None or not still or len(matrices) > 1 or len(matrices[0][0]) > 1:
+        written = self.plan.spans is None and self.plan.allowance is None  # x* by expressions of t
+        if self.coordinates is None or not written or len(matrices) > 1 or len(matrices[0][0]) > 1:
             return None
         spread = self.coordinates.spread
         sides = self.sides or (np.inf,) * len(spread)
