@@ -54,8 +54,8 @@ def split(v: Matrix, states: Sequence[str]) -> Split:
 class NormOverRest:
     """|v| over |S (x - x*)| <= rho, as a function of the states N and of what else v contains.
 
-    `centre` (n,) is x*(t), constant or by expressions; the half-widths of the states L are not used. Raises `ValueError`
-    if v is affine in no state, or floats are too coarse for S.
+    `centre` (n,) is x*(t), constant or by expressions; the half-widths of the states L are not used. Raises
+    `ValueError` if v is affine in no state, or floats are too coarse for S.
     """
 
     def __init__(
