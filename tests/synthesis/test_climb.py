@@ -106,6 +106,8 @@ def test_a_certificate_that_says_so_is_read_and_rechecked(tmp_path):
 class Valley:
     """Metrics whose demand falls with the rate, up to where the tube leaves the safe set."""
 
+    bandwidth = 10
+
     def __init__(self, least, most, reach=1e9):
         self.least, self.most, self.reach, self.asked = least, most, reach, []
 
@@ -122,7 +124,7 @@ class Valley:
             condition_number=float(rate),
             verdict=Verdict.CERTIFIED if fits else Verdict.REFUTED,
             claim=claim,
-            bandwidth=1e12,
+            bandwidth=self.bandwidth * float(rate),
             demand=1 / float(rate) if fits else np.inf,
             metric=None,
         )
@@ -140,6 +142,16 @@ def test_the_climb_finds_the_edge_of_what_fits(most, start):
     assert reach / 1.3 < climb.best.rate <= most
     assert len(valley.asked) < 40
     assert not climb.limits().faster or climb.limits().faster.cause == "overshoot"
+
+
+def test_it_hurries_where_the_filter_is_much_faster_than_the_contraction():
+    slow, fast = Valley(0, 100), Valley(0, 100)
+    fast.bandwidth = 100
+    for valley in (slow, fast):
+        climb = Climb(valley, "adaptation")
+        climb.run(Fraction(1, 10))
+        assert 100 / 1.5 < climb.best.rate <= 100
+    assert len(fast.asked) < len(slow.asked) - 2
 
 
 def test_what_is_refuted_is_never_the_best():

@@ -104,7 +104,7 @@ class Climb:
                 overshoots += 1
                 if overshoots == _WORSE:
                     return
-            rate *= 2
+            rate *= 4 if row.far else 2
 
     def _down(self, start: Fraction) -> None:
         above = self.tried.get(start)

@@ -21,6 +21,8 @@ from tubecert.synthesis.problem import Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
+_FAR = 50
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
@@ -55,6 +57,11 @@ class Row:
     def idle(self) -> bool:
         """Whether the filter that it needs is slower than its own contraction: what is gained beyond is not needed."""
         return self.bandwidth is not None and self.bandwidth < self.rate
+
+    @property
+    def far(self) -> bool:
+        """Whether the filter is so much faster than the contraction that a rate of twice this one is too slow still."""
+        return self.counts and self.bandwidth is not None and self.bandwidth > _FAR * self.rate
 
     def score(self, objective: str) -> tuple[float, ...]:
         """Smaller is better: certified, then by B alone, then not at all."""
