@@ -94,6 +94,17 @@ def test_a_plan_with_a_goal_ends_there():
     assert "the plan serves its task" in names(found)
 
 
+@pytest.mark.slow
+def test_inputs_that_do_not_lead_along_the_states_are_a_defect():
+    """R6: the plan is what its knots define; other inputs are another plan, with a defect of its own."""
+    document = planned()
+    knots = document["result"]["plan"]["knots"]
+    knots["u"] = [[number_text(Fraction(u) * Fraction(99, 100)) for u in row] for row in knots["u"]]
+    found = names(examine(sealed(document), 20))
+    assert any(name.startswith(("plan_defect <=", "plan_defect_metric <=")) for name in found)
+    assert "the plan serves its task" not in found
+
+
 def test_a_plan_begins_where_its_task_does():
     document = planned()
     document["result"]["spec"]["effective"]["trajectory"]["start"] = ["3.4", "-2.3"]

@@ -43,6 +43,7 @@ def replaced(text, *changes):
 
 
 H, START = 'h: ["0.1*sin(t) + 0.05*x"]', "initial_state: {at: [0.05, 0]}"
+TUBE = "tube: {epsilon: 0.2, rho_a: 0.1}"
 PLAN, LOOP = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}", "A_m: -10"
 WIGGLE = (
     'trajectory: {kind: expressions, horizon: 3, x: ["0.1*sin(2*t)", "0.2*sin(t)*cos(t) + 0.2*cos(2*t)"], '
@@ -64,6 +65,14 @@ KINDS = {
     "a kink in time": (SMALL, (H, 'h: ["0.1*abs(sin(t))*abs(x) + 0.02*x"]')),
     "the paper's kernel": (SMALL, (LOOP, LOOP + "}\nconditions: {kernel: paper")),
     "declared bounds of the metric": (SMALL, ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1.2}, ")),
+    "coordinates of the tube": (SMALL, (TUBE, "tube: {epsilon: 0.2, rho_a: 0.1, coordinates: auto}")),
+    "half-widths": (SMALL, (TUBE, "tube: {half_widths: {x: 0.3}}")),
+    "half-widths, a start within a radius, declared bounds": (
+        SMALL,
+        (TUBE, "tube: {half_widths: {x: 0.3, y: 0.4}}"),
+        (START, "initial_state: {within: 0.03}"),
+        (H, "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}"),
+    ),
     "a plan of expressions": (
         SMALL,
         (

@@ -1,4 +1,10 @@
-"""A plan through knots: that it is the plan its task asks for, and that what is drawn of a plan lies on it."""
+"""A plan through knots: that it is the plan its task asks for, and that what is drawn of a plan lies on it.
+
+A plan *is* what its knots define: u* between the inputs at knots (held, or linear), x* the cubic pieces whose slopes at
+their ends are f(x*) + B(x*) u*. Nothing is believed of how the knots were found: that the inputs lead along the states
+is no premise, because what they miss by is the defect, which is bounded for this very curve. So of a planner's knots
+only what the task promises is left to examine: start, horizon, and with a goal the target. Input limits are no claim.
+"""
 
 from __future__ import annotations
 
