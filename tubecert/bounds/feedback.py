@@ -57,6 +57,7 @@ def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:
     tangent = _narrow(lo, hi)
     ends = np.concatenate([lo, hi], axis=1)
     middle = np.where(tangent, 0.5 * (lo + hi), 1.0)
+    # a difference, two quotients and the last product are rounded, 4 u; 1e-15 > 9 u
     slope = (2 * middle - ends) / middle / middle * (1 - 1e-15)  # 1/m + (m - mu)/m^2, rounded down
     return np.ones_like(ends), np.where(tangent, slope, _inverse(hi)), np.where(tangent, ends, lo)
 
@@ -137,6 +138,7 @@ class ClosedFormGain:
             )
         smallest = eigenvalues_midrad(*G).lo[:, 0] * scaled.lo[:, 0]
         valid = (least_g > 0) & (smallest > 0) & (scaled.lo[:, 0] > 0)
+        # squares, a sum, quotients and a root of bounds, and what `smallest` and `cross` are made of: below 20 u; 1e-13 > 900 u
         value = np.sqrt((cross**2 + push**2 / 4) / np.where(valid, smallest, np.nan)) * (1 + 1e-13)
         return np.where(valid & ~np.isnan(value), value, np.inf)
 

@@ -261,6 +261,7 @@ def _range(t: Array, denominator: Ball) -> tuple[Array, Array]:
     """Bounds of the eigenvalues of T D T' from below and above, (N, V)."""
     mid, rad = congruence(t, *denominator)
     # the difference is rounded once, by u of itself; the sum with `rad` by less than the room left in `congruence`
+    # the difference from I is rounded once, by u of itself; 1e-15 > 9 u
     departure = norm_bound(np.abs(mid - np.eye(mid.shape[-1])) * (1 + 1e-15) + rad)
     least, greatest = np.nextafter(1 - departure, -np.inf), np.nextafter(1 + departure, np.inf)
     far = ~(departure < _CLOSE)

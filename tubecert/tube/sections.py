@@ -60,9 +60,11 @@ class Ball:
         gap = np.maximum(0.0, np.maximum(down(lo - centre.hi), down(centre.lo - hi)))
         square = np.maximum(0.0, down(gap * gap))
         square = np.where(np.isfinite(square), square, 0.0)
-        others = square @ (1.0 - np.eye(lo.shape[1]))  # the gaps in all other coordinates
+        # the gaps in all other coordinates: sums of at most 32 terms, each a bound, 32 u < 90 u <= 1e-14
+        others = square @ (1.0 - np.eye(lo.shape[1]))
         room = up(up(np.square(self._rho)) - down(others * (1 - 1e-14)))
         alive = np.all(room >= 0, axis=1)
+        # a root and a product are rounded, 2 u; 1e-15 > 9 u
         reach = up(np.sqrt(up(np.maximum(room, 0.0))) * (1 + 1e-15))
         return np.maximum(lo, down(centre.lo - reach)), np.minimum(hi, up(centre.hi + reach)), alive
 
@@ -76,6 +78,7 @@ class Ball:
         scale = np.minimum(1.0, reach / np.maximum(length, 1e-300))
         moved = centre.mid + scale * offset
         distance = (Interval.exact(moved) - centre) ** 2
+        # a sum of at most 32 terms that are bounds already, as in `cut`
         total = distance.hi.sum(axis=1) * (1 + 1e-14)
         return moved, total <= down(np.square(self._rho))
 
