@@ -153,8 +153,8 @@ def test_the_answer_is_that_of_dense_samples(a, w):
     if room > 1e-4:
         assert codes(found) == IS
     elif room < -1e-4:
-        assert {item.code for item in found} == {"TC411"}
-        assert {item.severity for item in found} == {Severity.ERROR}
+        assert ("TC411", Severity.ERROR) in codes(found)  # beside what may be undecided
+        assert IS[0] not in codes(found)
 
 
 def test_what_touches_the_end_of_a_box_is_not_said_to_leave_it():

@@ -138,7 +138,7 @@ class ClosedFormGain:
             )
         smallest = eigenvalues_midrad(*G).lo[:, 0] * scaled.lo[:, 0]
         valid = (least_g > 0) & (smallest > 0) & (scaled.lo[:, 0] > 0)
-        # squares, a sum, quotients and a root of bounds, and what `smallest` and `cross` are made of: below 20 u; 1e-13 > 900 u
+        # roundings of bounds, here and in what `smallest` and `cross` are made of: below 20 u; 1e-13 > 900 u
         value = np.sqrt((cross**2 + push**2 / 4) / np.where(valid, smallest, np.nan)) * (1 + 1e-13)
         return np.where(valid & ~np.isnan(value), value, np.inf)
 
