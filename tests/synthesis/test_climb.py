@@ -55,6 +55,21 @@ def test_a_metric_for_nothing_but_the_equations_certifies(name):
 
 
 @pytest.mark.slow
+def test_certify_finds_a_metric_by_itself_and_recheck_confirms_it(tmp_path):
+    spec, target = str(ROBOTS / "pendulum.yaml"), str(tmp_path / "p.json")
+    for arguments in (
+        ["certify", spec, "--conditions", "B", "--no-progress", "-o", target],
+        ["recheck", target, "--spec", spec],
+        ["report", target, "-o", str(tmp_path / "p.html")],
+    ):
+        done = CliRunner().invoke(app, arguments, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+    found = json.loads(Path(target).read_text())["result"]["synthesis"]
+    assert found["limits"]["slower"]["cause"] == "distance"
+    assert found["asked"]["coordinates"] == "auto"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["26", "sampled"])
 def test_the_kind_that_decides_is_what_a_metric_is_chosen_for(kind):
     options = replace(BY_B, conditions=kind)
@@ -152,6 +167,20 @@ def test_it_hurries_where_the_filter_is_much_faster_than_the_contraction():
         climb.run(Fraction(1, 10))
         assert 100 / 1.5 < climb.best.rate <= 100
     assert len(fast.asked) < len(slow.asked) - 2
+
+
+def test_a_narrower_tube_has_to_be_worth_a_slower_rate():
+    """The tube narrows for ever, by less and less, while what is needed for it grows without bound."""
+
+    class Narrowing(Valley):
+        def __call__(self, rate, floor, full):
+            row = super().__call__(rate, floor, full)
+            return row and replace(row, rho=1 + float(rate) / 10, ultimate_radius=1 / float(rate))
+
+    climb = Climb(Narrowing(0, 1e9), "tube")
+    climb.run(Fraction(1))
+    assert 0.02 < climb.best.rate < 0.2
+    assert climb.limits() is None
 
 
 def test_what_is_refuted_is_never_the_best():

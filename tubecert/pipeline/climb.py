@@ -76,9 +76,9 @@ class Climb:
             self._try(rate, floor, full=True)
 
     def limits(self) -> RateLimits | None:
-        """What is against a slower and against a faster rate than the best."""
+        """What is against a slower and against a faster rate than the best; told of gains, not of the tube's width."""
         best = self.best
-        if best is None:
+        if best is None or self.objective == "tube":
             return None
         slower = max((rate for rate in self.tried if rate < best.rate), default=None)
         faster = min((rate for rate in self.tried if rate > best.rate), default=None)

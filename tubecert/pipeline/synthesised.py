@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import inf, isfinite
+from math import inf, log
 from typing import Literal
 
 from tubecert.certificate.effective import Asked
@@ -22,6 +22,7 @@ from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
 _FAR = 50
+_NARROWER = 0.01  # of the tube, in its logarithm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,10 @@ class Row:
         """Smaller is better: certified, then by B alone, then not at all."""
         rank = 0 if self.verdict is Verdict.CERTIFIED else 1 if self.served else 2
         if objective == "tube":
-            return (rank, _or_inf(self.rho), _or_inf(self.ultimate_radius), self.condition_number)
+            rho = (
+                inf if self.rho is None else log(self.rho) // _NARROWER
+            )  # a slower metric has to be worth it
+            return (rank, rho, self.demand, self.condition_number)
         if self.idle:
             return (rank, 1, float(self.rate), self.condition_number)
         return (rank, 0, self.demand, self.condition_number)
@@ -132,7 +136,3 @@ def _attempt(attempt: Attempt) -> AttemptData:
         outcome=attempt.outcome,
         condition_number=attempt.condition_number,
     )
-
-
-def _or_inf(value: float | None) -> float:
-    return inf if value is None or not isfinite(value) else value
