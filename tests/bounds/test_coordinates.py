@@ -218,8 +218,8 @@ def test_half_widths_of_a_constant_metric_are_exact():
     coordinates, proposed = propose(own, start.plan, wish)
     found = greatest_level(replace(start, coordinates=coordinates), BOX, wish.asked, proposed)
     W = np.array(CONSTANT_W, dtype=float)
-    assert found.lower.below == pytest.approx(1, abs=1e-6)
-    assert found.upper.above == pytest.approx(1, abs=1e-6)
+    assert found.upper.above == pytest.approx(found.lower.below, rel=1e-6)  # no overshoot
+    assert float(found.rho) == pytest.approx(1, rel=1e-6)  # |z| = 1 at the rim
     assert [float(side) for side in found.sides] == pytest.approx(
         0.15 * np.sqrt(np.diag(W) / W[0, 0]), rel=1e-6
     )

@@ -165,6 +165,18 @@ def test_a_radius_of_the_command_line_splits_the_tube():
         certify(spec, Options(epsilon=Fraction(1, 20)))
 
 
+def test_the_scale_of_the_metric_changes_no_gain():
+    """W and 64 W are one metric: the same tube, the same gains."""
+    base = PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")
+    larger = base.replace("[0.3, -0.6], [-0.6, 2.4]", "[19.2, -38.4], [-38.4, 153.6]")
+    assert larger != base
+    one, other = certify(load_text(base), COARSE), certify(load_text(larger), COARSE)
+    assert one.tube.half_widths == pytest.approx(other.tube.half_widths, rel=1e-6)
+    own = gains(one)
+    assert own
+    assert gains(other) == pytest.approx(own, rel=2e-3)
+
+
 def test_a_start_takes_its_part_of_the_tube():
     at_rest = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")), COARSE)
     moved = PENDULUM.replace("TUBE", "half_widths: {q: 0.3}") + "initial_state: {at: [0.1, 0]}\n"
@@ -173,8 +185,9 @@ def test_a_start_takes_its_part_of_the_tube():
     assert found.verdict is Verdict.CERTIFIED
     M = np.linalg.inv(np.array([[0.3, -0.6], [-0.6, 2.4]]))
     assert found.constants["initial_distance"].above == pytest.approx(0.1 * np.sqrt(M[0, 0]), rel=1e-6)
+    taken = 0.1 * np.sqrt(M[0, 0]) / np.sqrt(found.metric.lower.below)  # d0/sqrt(a)
     assert float(found.tube.epsilon + found.tube.rho_a) == pytest.approx(
-        float(found.tube.rho) - 0.1 * np.sqrt(M[0, 0]), rel=1e-5
+        float(found.tube.rho) - taken, rel=1e-5
     )
     beyond = certify(load_text(moved.replace("[0.1, 0]", "[0.35, 0]")), COARSE)
     assert beyond.verdict is not Verdict.CERTIFIED

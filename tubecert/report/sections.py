@@ -181,8 +181,8 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.half_widths:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
     if tube.coordinates is not None:
-        lines[0] += " (lengths in the metric)"
-        lines.append(f"a length of epsilon in the metric is at most {in_states(result, tube, tube.epsilon)}")
+        lines[0] += " (lengths in the coordinates of the tube)"
+        lines.append(f"a length of epsilon is at most {in_states(result, tube, tube.epsilon)}")
     lines += clearances(result)
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
@@ -197,7 +197,7 @@ def extent(result: Result) -> str:
 
 
 def in_states(result: Result, tube: TubeData, length: Fraction) -> str:
-    """What a length in the metric is in each state: that part of the half-widths."""
+    """What a length in the coordinates of the tube is in each state: that part of the half-widths."""
     share = float(length / tube.rho)
     return half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
 

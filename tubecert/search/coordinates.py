@@ -71,9 +71,12 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
         around = _values(dual, _samples(centres, S, level, level * widths, wish.box))
         candidates = [around.mean(axis=0), *_values(dual, centres[:: max(1, len(centres) // 4)])]
         S = min(map(_factor, candidates), key=lambda each: _condition(around, each))
-    least = sqrt(_spectrum(around, S)[0])
-    coordinates = Coordinates(tuple(tuple(map(_short, row)) for row in S * least))
+    S = S * sqrt(_spectrum(around, S)[0])
     sides = tuple(Fraction(float(side)) for side in level * widths)
+    if wish.asked is not None:
+        # |z| = 1 at the rim of the tube: Gamma, which has a meaning with P = S'S only, is then the same for c W
+        S, level = S / level, 1.0
+    coordinates = Coordinates(tuple(tuple(map(_short, row)) for row in S))
     return coordinates, Proposed(rho=_short(level), sides=sides)
 
 
