@@ -188,8 +188,8 @@ def test_sup_D_rises_with_every_size_and_intervals_include(low, extra, lam, omeg
     names = ("d0", "beta", "H0", "S", "e", "delta")
     high = [x + y for x, y in zip(low, extra, strict=True)]
     rates = {"lam": Interval.exact(lam), "omega": Interval.exact(omega)}
-    below = DistanceBound(**dict(zip(names, map(Interval, low), strict=True)), **rates).supremum()
-    above = DistanceBound(**dict(zip(names, map(Interval, high), strict=True)), **rates).supremum()
+    below = DistanceBound(**dict(zip(names, map(Interval.exact, low), strict=True)), **rates).supremum()
+    above = DistanceBound(**dict(zip(names, map(Interval.exact, high), strict=True)), **rates).supremum()
     hull = DistanceBound(**{k: Interval(a, b) for k, a, b in zip(names, low, high, strict=True)}, **rates)
     wide = hull.supremum()
     assert below.lo <= above.hi

@@ -3,6 +3,7 @@
 import math
 from fractions import Fraction
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tubecert.bounds.feedback import tangents
+from tubecert.coordinates import Fields
 from tubecert.enclosure import branch_and_bound as bnb
 from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
@@ -266,11 +268,14 @@ def test_polynomials_against_a_grid():
 # -- objectives ----------------------------------------------------------------------------------------------
 
 
+IN_X = Fields(SimpleNamespace(states=("x", "y")), None)  # no coordinates of the tube's own
+
+
 def test_lipschitz_constants_are_tight_where_a_norm_vanishes():
     h = constant(2) + norm([x, y]) * Fraction(1, 10)
     from tubecert.bounds.suprema import _lipschitz
 
-    found = supremum(_lipschitz((h,), ("x", "y")), ball(0.5, 0, 0), Effort())
+    found = supremum(_lipschitz((h,), IN_X), ball(0.5, 0, 0), Effort())
     assert abs(found.above - 0.1) < 1e-6
     assert found.below <= 0.1
 
@@ -278,7 +283,7 @@ def test_lipschitz_constants_are_tight_where_a_norm_vanishes():
 def test_nested_norms_have_the_product_of_their_slopes():
     from tubecert.bounds.suprema import _lipschitz
 
-    objective = _lipschitz((norm([3 * norm([x, y]), 2 * x]),), ("x", "y"))
+    objective = _lipschitz((norm([3 * norm([x, y]), 2 * x]),), IN_X)
     assert isinstance(objective, Lipschitz)
     found = supremum(objective, ball(0.5, 2, 0), Effort())
     # |(3 r, 2 x)| <= sqrt(13) r along the axis; the gradient there is (sqrt(13), 0)

@@ -43,6 +43,10 @@ def sleeping(item: int) -> int:
 
 
 def nobody_is_left() -> bool:
+    """Whether all workers are gone: they were told to, and may take a moment on a machine that is busy."""
+    end = time.monotonic() + 10
+    while multiprocessing.active_children() and time.monotonic() < end:
+        time.sleep(0.01)
     return not multiprocessing.active_children()
 
 
