@@ -495,7 +495,7 @@ def test_what_is_affine_needs_no_search_along_a_plan_either():
         B=[["0", "0"], ["1", "0"], ["0", "2"]],
         W=CONSTANT_W,
     )
-    start = Suprema(own, plan, 0.0, None, Effort(gap=0.01, budget=200_000), coordinates=SKEWED)
+    start = Suprema(own, plan, 0.0, None, Effort(gap=0.05, budget=200_000), coordinates=SKEWED)
     start = start.with_radius(Fraction(3, 10), (Fraction(9),) * 3)
     found = start.drift_on_plan()
     assert start._over_rest([start.fields.drift_on_plan()]).variables == ("t", "u1", "u2", "x1")
@@ -505,4 +505,4 @@ def test_what_is_affine_needs_no_search_along_a_plan_either():
         x1, x2, x3 = (np.array([0.5 * now, np.sin(2 * now), 0.2 - now**2]) + y).T
         f = np.stack([x2, 2 * x1 + x3 - 3 * np.sin(x1) + now, 0.5 * x2 - x3 + x1**2 + 2 * (1 - now)], axis=1)
         largest = max(largest, float(np.linalg.norm(f @ S.T, axis=1).max()))
-    assert largest <= found.above <= 1.03 * largest
+    assert largest <= found.above <= 1.08 * largest
