@@ -124,3 +124,18 @@ def test_a_piece_of_w_beside_the_diagonal_counts_on_its_worse_side():
     wide = Shape(first=1.0, second=4.0, low=-0.5, high=0.5)
     for c in ((Fraction(3, 5), Fraction(4, 5)), (Fraction(3, 5), Fraction(-4, 5))):
         assert float(wide.square(c).hi) == pytest.approx(0.36 + 4 * 0.64 + 2 * 0.48 * 0.5, rel=1e-12)
+
+
+class Unbounded:
+    """A plan that is not bounded for a while."""
+
+    is_constant, time = False, {"t": (Fraction(0), Fraction(1))}
+
+    def enclose(self, lo, hi, span=None):
+        bad = (lo <= 0.5) & (hi >= 0.4)
+        x = np.where(bad[:, None], np.nan, np.zeros((len(lo), 2)))
+        return Interval(x, x), Interval(x[:, :1], x[:, :1])
+
+
+def test_where_the_plan_is_not_bounded_nothing_is_proven():
+    assert clearance(Unbounded(), disc(5, 0, 1), section(), EFFORT).below <= 0

@@ -128,7 +128,9 @@ class _Gaps:
         along = self._c[0] * p[:, :1] + self._c[1] * p[:, 1:]  # (N, directions)
         low = down(along.lo[:, None, :] - self._beyond).max(axis=2).min(axis=1)
         high = up(along.hi[:, None, :] - self._beyond).max(axis=2).min(axis=1)
-        return Interval(low, high)
+        # where the curve is not bounded, nothing is known
+        known = ~np.isnan(low) & ~np.isnan(high)
+        return Interval(np.where(known, low, -np.inf), np.where(known, high, np.inf))
 
     def starts_outside(self) -> bool:
         """Whether x*(0) is proven to lie outside of the obstacle, if the tube meets none of its edges.
