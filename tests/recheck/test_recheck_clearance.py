@@ -1,12 +1,14 @@
 """What is stated of obstacles is proven again; planted faults are refused."""
 
 import copy
+from fractions import Fraction
 
 import pytest
 import yaml
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
 
 from tubecert.errors import TubecertError
+from tubecert.recheck.obstacles import is_simple
 
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text("utf-8")
 CLEAR = [
@@ -105,3 +107,33 @@ def test_an_obstacle_that_is_met_refutes_unless_it_does_not_decide():
     assert told["result"]["verdict"] == "certified"
     assert told["result"]["clearance"][0]["verdict"] == "refuted"
     assert not failing(examine(told))
+
+
+@pytest.mark.parametrize(
+    ("corners", "simple"),
+    [
+        ([(0, 0), (2, 0), (2, 2), (0, 2)], True),
+        ([(0, 0), (2, 0), (1, 1), (2, 2), (0, 2)], True),  # not convex
+        ([(0, 0), (2, 0), (2, 2), (0, 2)] * 2, False),  # listed twice: even-odd would call its inside outside
+        ([(0, 0), (2, 2), (2, 0), (0, 2)], False),  # a bow
+        ([(0, 3), (2, -2), (-3, 1), (3, 1), (-2, -2)], False),  # a pentagram
+        ([(0, 0), (2, 0), (2, 0), (0, 2)], False),  # an edge without length
+        ([(0, 0), (2, 0), (1, 0), (0, 2)], False),  # an edge that turns back
+        ([(0, 0), (2, 0)], False),
+    ],
+)
+def test_only_simple_polygons_have_an_inside(corners, simple):
+    exact = [tuple(map(Fraction, corner)) for corner in corners]
+    for k in range(len(exact)):
+        turned = (*exact[k:], *exact[:k])
+        assert is_simple(turned) is simple
+        assert is_simple(turned[::-1]) is simple
+
+
+@pytest.mark.slow
+def test_a_polygon_around_the_plan_listed_twice_is_refused(clear):
+    forged = respecified(
+        clear,
+        lambda s: s["obstacles"][1].update(polygon=[["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]] * 2),
+    )
+    assert refused(forged)

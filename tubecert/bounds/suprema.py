@@ -132,11 +132,13 @@ class Suprema:
         found = self._over_tube(name, whole)
         # recheck proves it by boxes in all states: to be sharper than was asked for would cost it minutes
         above = max(found.above, found.below * (1 + self.effort.gap))
-        return self._constant(replace(found, above=above, at={**found.at, **whole.completed(found.at)}))
+        at = {**found.at, **whole.completed(found.at)} if found.at else {}
+        return self._constant(replace(found, above=above, at=at))
 
     def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
         """The norm of one vector as a function of fewer states, where those that it is affine in need no search."""
-        written = self.plan.spans is None and self.plan.allowance is None  # x* by expressions of t
+        # x* by expressions of t alone: not through knots, whose coefficients are data, nor anywhere in boxes
+        written = self.plan.spans is None and self.plan.knots is None and self.plan.allowance is None
         if self.coordinates is None or not written or len(matrices) > 1 or len(matrices[0][0]) > 1:
             return None
         spread = self.coordinates.spread

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import chain, pairwise
+from math import isfinite
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor, root
 from tubecert.recheck.cover import Outcome, prove
@@ -102,8 +103,10 @@ class _Test:
             if not waiting:
                 return CONFIRMED
             segment = waiting.pop()
-            x, y = (_ends(segment.x[column]) for column in self._columns)
-            if self._apart(x, y, self._least):
+            sides = [segment.x[column] for column in self._columns]
+            # a segment that is not bounded is halved
+            x, y = sides
+            if all(map(isfinite, chain(x, y))) and self._apart(_ends(x), _ends(y), self._least):
                 continue
             halves = segment.halves
             if not halves:

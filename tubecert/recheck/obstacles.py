@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import combinations, pairwise
 
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -53,8 +54,8 @@ def read_obstacle(node: Node, states: Sequence[str]) -> Obstacle:
         raise own["decide"].refused("is there only where it is false")
     disc = own.get("disc", lambda at: at.closed("center", "radius"))
     corners = own.get("polygon", lambda rows: tuple(_point(row) for row in rows.entries())) or ()
-    if disc is None and len(corners) < 3:
-        raise node.refused("must have three corners")
+    if disc is None and not is_simple(corners):
+        raise node.refused("must be a polygon whose edges meet at common corners only")
     radius = None if disc is None else disc["radius"].exact()
     if radius is not None and radius <= 0:
         raise node.refused("must have a positive radius")
@@ -88,3 +89,49 @@ def read_cleared(node: Node) -> Cleared:
         clearance=enclosure(own["clearance"]),
         shape=Shape(diagonal, beside),
     )
+
+
+# -- polygons: what lies inside is only clear for those whose edges meet at common corners, and nowhere else
+
+
+def is_simple(corners: Sequence[Point]) -> bool:
+    """Whether a closed chain of edges does not touch itself, decided exactly."""
+    edges = list(pairwise((*corners, *corners[:1])))
+    if len(corners) < 3 or any(a == b for a, b in edges):
+        return False
+    last = len(edges) - 1
+    for i, j in combinations(range(len(edges)), 2):
+        if j == i + 1 or (i, j) == (0, last):
+            first, second = (edges[i], edges[j]) if j == i + 1 else (edges[j], edges[i])
+            if _turns_back(*first, second[1]):
+                return False
+        elif _touch(edges[i], edges[j]):
+            return False
+    return True
+
+
+def _area(a: Point, b: Point, c: Point) -> Fraction:
+    """Twice the signed area of a triangle."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _turns_back(a: Point, b: Point, c: Point) -> bool:
+    """Whether the edge from b to c lies upon the one from a to b."""
+    along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
+    return _area(a, b, c) == 0 and along < 0
+
+
+def _touch(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
+    """Whether two edges have a point in common."""
+    (a, b), (c, d) = one, other
+    sides = _area(a, b, c), _area(a, b, d), _area(c, d, a), _area(c, d, b)
+    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
+        return True
+    ends = ((c, one), (d, one), (a, other), (b, other))
+    return any(side == 0 and _spans(edge, p) for side, (p, edge) in zip(sides, ends, strict=True))
+
+
+def _spans(edge: tuple[Point, Point], p: Point) -> bool:
+    """Whether a point on the line of an edge lies on the edge."""
+    (a, b) = edge
+    return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in (0, 1))

@@ -73,6 +73,11 @@ def _cosh(args: list[Ball], index: int) -> Ball:
     return between(args[0].abs_lower().cosh(), args[0].abs_upper().cosh())
 
 
+def _known(kernel: Callable[[list[Ball], int], Ball]) -> Callable[[list[Ball], int], Ball]:
+    """The kernel, which knows nothing of what is not a number: flint's asin and acos of it are thin balls."""
+    return lambda args, index: arb("nan") if any(x.is_nan() for x in args) else kernel(args, index)
+
+
 _KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
     "div": lambda a, _: a[0] / a[1],
     "pow": lambda a, n: power(a[0], n),
@@ -80,8 +85,8 @@ _KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
     "sin": lambda a, _: a[0].sin(),
     "cos": lambda a, _: a[0].cos(),
     "tan": lambda a, _: a[0].tan(),
-    "asin": _increasing(Ball.asin),
-    "acos": lambda a, _: between(a[0].upper().acos(), a[0].lower().acos()),
+    "asin": _known(_increasing(Ball.asin)),
+    "acos": _known(lambda a, _: between(a[0].upper().acos(), a[0].lower().acos())),
     "atan": _increasing(Ball.atan),
     "sinh": _increasing(Ball.sinh),
     "cosh": _cosh,

@@ -32,13 +32,16 @@ def of_others(case: Case) -> Iterator[Claim]:
     """What can be examined of a verdict that is not `certified`."""
     if case.result.verdict != "refuted":
         return
-    for reason in case.result.reasons:
-        if reason.verdict == "refuted":
-            yield Claim(
-                f"refuted: {reason.claim}",
-                (*case.whole, case.knots, repr(reason), repr(case.result.tube), repr(case.result.sections)),
-                lambda reason=reason: _refutation(case, reason),  # type: ignore[misc]
-            )
+    reasons = [reason for reason in case.result.reasons if reason.verdict == "refuted"]
+    if not reasons:
+        why = "nothing is named that is refuted"
+        yield Claim("refuted", None, lambda: Outcome(verdict="undecided", why=why))
+    for reason in reasons:
+        yield Claim(
+            f"refuted: {reason.claim}",
+            (*case.whole, case.knots, repr(reason), repr(case.result.tube), repr(case.result.sections)),
+            lambda reason=reason: _refutation(case, reason),  # type: ignore[misc]
+        )
 
 
 def _refutation(case: Case, reason: Reason) -> Outcome:

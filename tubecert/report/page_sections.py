@@ -89,7 +89,7 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
         yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
     if result.metric is not None:
-        yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric)))
+        yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric, result.tube)))
     if result.constants:
         yield Section(key="constants", title="Constants over the tube", blocks=tuple(_constants(result)))
     yield Section(key="system", title="The specification", blocks=tuple(system(result)))
@@ -170,9 +170,9 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
     if tube.coordinates is not None:
         yield (
             "measured by",
-            Cell(text="the metric: rho, rho_a and epsilon are lengths in it, whatever the units of states"),
+            Cell(text="z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states"),
         )
-        yield "epsilon, by state", Cell(text=f"at most {sections.in_states(result, tube, tube.epsilon)}")
+        yield "epsilon, by state", Cell(text=sections.in_states(result, tube, tube.epsilon, "epsilon"))
     if tube.half_widths:
         yield "half-widths", Cell(text=sections.half_widths(result, tube.half_widths))
     for line in sections.clearances(result):
@@ -188,14 +188,14 @@ def _rests_on(result: Result) -> Iterator[Block]:
     yield Items(title="Assumed, not proven", items=tuple(map(assumed, result.assumptions)))
 
 
-def _metric(metric: MetricData) -> Iterator[Block]:
+def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
     facts = [
         ("verdict", Cell(text=metric.verdict, kind="verdict")),
         ("rate", Cell(text=f"{exact(metric.rate)} 1/s")),
     ]
     if metric.largest_rate is not None:
         facts.append(("supports rates up to", Cell(text=f"{down(metric.largest_rate.below, 7)} 1/s")))
-    facts += [(words, Cell(text=bounds)) for words, bounds in sections.metric_bounds(metric)]
+    facts += [(words, Cell(text=bounds)) for words, bounds in sections.metric_bounds(metric, tube)]
     for i, row in enumerate(metric.dual_metric):
         for j, entry in enumerate(row[i:], start=i):
             facts.append((f"W[{i + 1},{j + 1}]", Cell(text=entry, kind="code")))

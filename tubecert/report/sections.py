@@ -20,7 +20,7 @@ from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
-from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
+from tubecert.report.numbers import UNKNOWN, down, end, exact, percent, short, up
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
@@ -182,7 +182,7 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
     if tube.coordinates is not None:
         lines[0] += " (lengths in the coordinates of the tube)"
-        lines.append(f"a length of epsilon is at most {in_states(result, tube, tube.epsilon)}")
+        lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
     lines += clearances(result)
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
@@ -196,10 +196,11 @@ def extent(result: Result) -> str:
     return f"the half-widths {half_widths(result, tube.half_widths)}"
 
 
-def in_states(result: Result, tube: TubeData, length: Fraction) -> str:
-    """What a length in the coordinates of the tube is in each state: that part of the half-widths."""
+def in_states(result: Result, tube: TubeData, length: Fraction, name: str) -> str:
+    """What a share of dbar is in each state: a distance within it keeps |x_i - x_i*| within that share."""
     share = float(length / tube.rho)
-    return half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
+    widths = half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
+    return f"{name} is {percent(share)} of the tube; a distance of that share of dbar is at most {widths}"
 
 
 def clearances(result: Result) -> Iterator[str]:
@@ -256,7 +257,7 @@ def _metric(result: Result, metric: MetricData) -> list[RenderableType]:
         body[0] += f"; the metric supports rates up to {down(metric.largest_rate.below, 7)} 1/s"
     if metric.margin is not None and metric.verdict is Verdict.CERTIFIED:
         body[0] += f" (margin {down(metric.margin.below, 3)} 1/s)"
-    body += [f"{bounds} {words}" for words, bounds in metric_bounds(metric)]
+    body += [f"{bounds} {words}" for words, bounds in metric_bounds(metric, result.tube)]
     sides = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in safe_set(result))
     return [Text(line) for line in [*body, f"safe set: {', '.join(sides)}"]]
 
@@ -268,14 +269,15 @@ def safe_set(result: Result) -> Iterator[tuple[str, tuple[Fraction, Fraction]]]:
             yield name, result.safe_set[name]
 
 
-def metric_bounds(metric: MetricData) -> Iterator[tuple[str, str]]:
-    """Where the metric is bounded, and by what."""
-    for words, a, A in (
-        ("over the tube", metric.lower, metric.upper),
-        ("on the safe set", metric.lower_on_set, metric.upper_on_set),
+def metric_bounds(metric: MetricData, tube: TubeData | None) -> Iterator[tuple[str, str]]:
+    """Where the metric is bounded, and by what; over a tube with coordinates, by S'S."""
+    unit = "I" if tube is None or tube.coordinates is None else "S'S"
+    for words, a, A, of in (
+        ("over the tube", metric.lower, metric.upper, unit),
+        ("on the safe set", metric.lower_on_set, metric.upper_on_set, "I"),
     ):
         if a is not None and A is not None:
-            yield words, f"{down(a.below)} I <= M <= {up(A.above)} I"
+            yield words, f"{down(a.below)} {of} <= M <= {up(A.above)} {of}"
 
 
 def _constants(result: Result) -> Table:

@@ -80,7 +80,7 @@ def _disc(field: Field, plane: tuple[str, str] | None, names: Names) -> Obstacle
     if entries is None:
         return None
     center = entries["center"].numbers(2, names.values) if "center" in entries else None
-    radius = entries["radius"].number(names.values, above=0) if "radius" in entries else None
+    radius = entries["radius"].number(names.values, above=0, side="above") if "radius" in entries else None
     if plane is None or center is None or radius is None:
         return None
     return Obstacle(states=plane, center=center, radius=radius)
