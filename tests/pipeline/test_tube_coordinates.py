@@ -20,7 +20,7 @@ from tubecert.simulate.integrator import integrate
 from tubecert.simulate.layout import slices
 from tubecert.simulate.monte_carlo import case, disturbance_of
 from tubecert.simulate.setting import Choice, loop_of, setting_of
-from tubecert.spec import load_text
+from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -242,3 +242,26 @@ def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
     T[y.xtilde, y.xtilde] = T[y.v, y.v] = S
     assert T @ L @ np.linalg.inv(T) == pytest.approx(L_z)
     assert pytest.approx(E_z) == T @ E
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("between", ["hold", "linear"])
+def test_a_plan_through_knots_has_a_tube_in_coordinates(tmp_path, between):
+    """x* is a polynomial in the time since a knot, not in t: what is affine in some states is searched all the same."""
+    rows = "t,x1,x2,u\n0,0,0,0\n1,0.05,0.05,0.1\n2,0.1,0.1,0.2\n"
+    (tmp_path / "plan.csv").write_text(rows, encoding="utf-8")
+    (tmp_path / "spec.yaml").write_text(
+        f"""tubecert: 1
+name: knots
+system: {{states: [x1, x2], inputs: [u], f: [-x1 + x2, "-2*x2 + 0.1*sin(x1)"], B: [[0], [1]]}}
+safe_set: {{x1: [-5, 5], x2: [-5, 5]}}
+uncertainty: {{h: ["0.1*sin(t) + 0.01*x1"]}}
+trajectory: {{kind: csv, file: plan.csv, interpolation: {between}}}
+metric: {{rate: 0.5, dual_metric: [[1, 0], [0, 1]]}}
+tube: {{half_widths: {{x1: 1, x2: 1}}}}
+conditions: {{decides: B}}
+""",
+        encoding="utf-8",
+    )
+    found = certify(load(str(tmp_path / "spec.yaml")), COARSE)
+    assert found.verdict is Verdict.CERTIFIED
