@@ -132,7 +132,8 @@ class Suprema:
         found = self._over_tube(name, whole)
         # recheck proves it by boxes in all states: to be sharper than was asked for would cost it minutes
         above = max(found.above, found.below * (1 + self.effort.gap))
-        at = {**found.at, **whole.completed(found.at)} if found.at else {}
+        known = set(whole.variables) <= set(found.at)  # or no point was found
+        at = {**found.at, **whole.completed(found.at)} if known else {}
         return self._constant(replace(found, above=above, at=at))
 
     def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
