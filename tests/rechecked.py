@@ -10,6 +10,7 @@ from typing import Any
 
 import proven
 
+from tubecert.errors import TubecertError
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import Case
 from tubecert.recheck.document import Node
@@ -68,6 +69,14 @@ def examine(document: Document, budget: int = 20_000, memory: Any = None, **opti
 
 def failing(found: Recheck) -> list[tuple[str, str]]:
     return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
+
+
+def unconfirmed(document: Document) -> bool:
+    """Whether a forged certificate, sealed again, is not confirmed: not of the form, or a claim that does not hold."""
+    try:
+        return bool(failing(examine(sealed(document))))
+    except TubecertError:
+        return True
 
 
 def case_of(document: Document, budget: int = 400) -> Case:

@@ -145,8 +145,7 @@ class _Gaps:
 
     def place(self, t: float) -> tuple[float, float]:
         """x* in the plane at a time, nearly."""
-        x, _ = self._plan.enclose(np.array([t]), np.array([t]))
-        first, second = (float(x.mid[0, column]) for column in self._columns)
+        first, second = map(float, self.around(t).mid)
         return first, second
 
     def around(self, t: float) -> Interval:
