@@ -20,10 +20,10 @@ Range = tuple[Fraction, Fraction]
 Numbers = tuple[Fraction, ...]
 Rows = tuple[Numbers, ...]
 
-_IDLE = ("name", "expect", "simulation", "obstacles")
+_IDLE = ("name", "expect", "simulation", "obstacles", "limits")
 _MOST_STATES = 32
 _MOST_WIDE = 10  # sides of a box of starts: all its corners are examined
-_LOCKED = ("rho", "clearance", "bandwidth", "adaptation_rate", "sample_time")
+_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +166,7 @@ class Specification:
     half_widths: dict[str, Fraction]  # at most; empty if none are asked for
     loop: Loop
     obstacles: tuple[Obstacle, ...]
+    limits: dict[str, Range]  # by input, of some of them
     hash: str
     content: str
 
@@ -205,6 +206,7 @@ def read_specification(node: Node) -> Specification:
         obstacles=tuple(read_obstacle(item, plant.states) for item in own["obstacles"].entries())
         if "obstacles" in own
         else (),
+        limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in _IDLE}),
     )
@@ -421,6 +423,14 @@ def _tube(node: Node, plant: Plant) -> Members:
     if "epsilon" in own or not widths.mapping():
         raise node.refused("must have epsilon, or half-widths of some states")
     return own
+
+
+def _limits(node: Node, inputs: Sequence[str]) -> dict[str, Range]:
+    """Limits of some of the inputs, in their order."""
+    own = node.closed(optional=inputs)
+    if not node.mapping():
+        raise node.refused("must have limits of an input")
+    return {name: _ends(own[name]) for name in inputs if name in own}
 
 
 def _widths(node: Node) -> dict[str, Fraction]:

@@ -47,6 +47,8 @@ def canonical(spec: Spec) -> dict[str, Any]:
             data["expect"]["verdict"] = spec.expect.verdict
     if spec.obstacles:
         data["obstacles"] = [_obstacle(obstacle) for obstacle in spec.obstacles]
+    if spec.limits:
+        data["limits"] = {name: _numbers(ends) for name, ends in spec.limits}
     if spec.simulation is not None:
         data["simulation"] = _simulation(spec.simulation)
     return data

@@ -8,6 +8,7 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
+from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
@@ -46,6 +47,7 @@ _OPTIONAL = (
     "conditions",
     "expect",
     "obstacles",
+    "limits",
     "simulation",
 )
 
@@ -156,10 +158,13 @@ def _read_named(
     kernel, _ = read_kernel(entries.get("conditions"))
     expect = read_expectation(entries.get("expect"), names)
     obstacles = read_obstacles(entries.get("obstacles"), names)
+    limits = read_limits(entries.get("limits"), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
-    if plan is None or x0 is None or tube is None or adaptation is None or obstacles is None:
+    if plan is None or x0 is None or tube is None or adaptation is None:
+        return None
+    if obstacles is None or limits is None:
         return None
     return Spec(
         name=name,
@@ -186,6 +191,7 @@ def _read_named(
         decides=read_decides(entries.get("conditions")),
         expect=expect,
         obstacles=obstacles,
+        limits=limits,
         simulation=simulation,
         locations=Places(reader.places),
     )

@@ -39,10 +39,10 @@ T = TypeVar("T")
 
 _GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
 
-_LIMITS = "input limits are no part of a specification: no claim is made about them (simulate shows the largest |u|)"
 _OTHER_KEYS = {
     **dict.fromkeys(
-        ("saturation", "saturations", "input_limits", "limits", "u_max", "u_min", "actuators"), _LIMITS
+        ("saturation", "saturations", "input_limits", "u_max", "u_min", "actuators"),
+        "limits of the inputs are the key limits: {NAME: [low, high]}",
     ),
     **dict.fromkeys(("x0", "start", "initial", "initial_condition"), "write initial_state: {at: [...]}"),
     **dict.fromkeys(("reference", "path", "setpoint", "desired"), "the plan is the key trajectory"),

@@ -283,6 +283,7 @@ class Spec:
     decides: str | None
     expect: Expectation | None
     obstacles: tuple[Obstacle, ...] = ()
+    limits: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()  # by input, of some of them
     simulation: Simulation | None = None
     locations: Places = field(repr=False, compare=False, hash=False)
 
