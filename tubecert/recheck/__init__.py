@@ -16,7 +16,7 @@ formula or rounding in the producer must not pass both.
 | `cover` | a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
 | `document`, `spelling`, `reading` | JSON and expressions, read and checked for form |
-| `specification`, `certificate` | closed types of all that a certificate may say |
+| `specification` with its parts in `specified`, `certificate` | closed types of all that a certificate may say |
 | `plans`, `enclosures`, `reasons`, `orientation` | their parts |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |

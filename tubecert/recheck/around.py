@@ -15,7 +15,7 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, length, root
 from tubecert.recheck.coordinates import Coordinates, inverted, product
-from tubecert.recheck.specification import Numbers, Rows
+from tubecert.recheck.specified.numbers import Numbers, Rows
 
 Ranges = list[tuple[float, float]]
 

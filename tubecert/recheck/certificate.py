@@ -20,15 +20,10 @@ from tubecert.recheck.obstacles import Cleared, read_cleared
 from tubecert.recheck.orientation import elasticities, run, synthesis
 from tubecert.recheck.plans import Plan, read_plan
 from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_reason
-from tubecert.recheck.specification import (
-    Range,
-    Rows,
-    Specification,
-    Start,
-    Wanted,
-    read_specification,
-    read_start,
-)
+from tubecert.recheck.specification import Specification, read_specification
+from tubecert.recheck.specified.metric import Wanted
+from tubecert.recheck.specified.numbers import Range, Rows
+from tubecert.recheck.specified.start import Start, read_start
 
 MEASURED = (
     "lower",

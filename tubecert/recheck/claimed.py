@@ -9,7 +9,8 @@ from __future__ import annotations
 from tubecert.recheck.certificate import Claim, Plans, Result
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated
-from tubecert.recheck.specification import AnyPlan, Resting, Specification
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.trajectory import AnyPlan, Resting
 from tubecert.recheck.times import period_of
 
 TUBE = "tube"

@@ -30,7 +30,7 @@ from tubecert.recheck.kinds.kind import Ground
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.specification import Expressed, Planned
+from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.times import time_range
 

@@ -14,7 +14,9 @@ from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
-from tubecert.recheck.specification import Metric, Planned, Specification, Tabled, Wanted
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.metric import Metric, Wanted
+from tubecert.recheck.specified.trajectory import Planned, Tabled
 from tubecert.recheck.system import System
 
 _CLAIMS_ONLY = "the verdict is certified, but"

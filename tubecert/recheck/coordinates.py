@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from tubecert.recheck.specification import Rows
+from tubecert.recheck.specified.numbers import Rows
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import (
     Matrix,

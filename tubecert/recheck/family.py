@@ -16,7 +16,7 @@ from flint import arb
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.cover import Range
 from tubecert.recheck.curve import Curve, Ends, Part, Segment
-from tubecert.recheck.specification import AnyPlan
+from tubecert.recheck.specified.trajectory import AnyPlan
 from tubecert.recheck.terms import Term, variable
 
 

@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from tubecert.recheck.document import Node
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.reasons import read_outcome, read_reason
-from tubecert.recheck.specification import Wanted, read_wanted
+from tubecert.recheck.specified.metric import Wanted, read_wanted
 
 NOT_EXAMINED = (
     "effort",

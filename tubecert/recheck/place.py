@@ -16,7 +16,7 @@ from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import CLOCK, Curve, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.specification import Numbers
+from tubecert.recheck.specified.numbers import Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable

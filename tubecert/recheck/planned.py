@@ -16,7 +16,7 @@ from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.plans import Plan
-from tubecert.recheck.specification import Planned
+from tubecert.recheck.specified.trajectory import Planned
 
 _MISS = Fraction(1, 1000)  # of 1 + |target|: how far from its target a planned curve may end
 _DRAWN = Fraction(1, 10**5)  # of 1 + |x|: how far from the plan what is drawn of it may lie

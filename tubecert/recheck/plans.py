@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tubecert.recheck.document import Node
-from tubecert.recheck.specification import AnyPlan, Numbers, Resting, Rows, Specification, Tabled
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.numbers import Numbers, Rows
+from tubecert.recheck.specified.trajectory import AnyPlan, Resting, Tabled
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure, maybe
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
-from tubecert.recheck.specification import Numbers
+from tubecert.recheck.specified.numbers import Numbers
 
 Reads = Callable[[Node], object]
 Form = tuple[Mapping[str, Reads], Mapping[str, Reads]]  # members that must be there, and those that may

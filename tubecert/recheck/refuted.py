@@ -22,7 +22,8 @@ from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
-from tubecert.recheck.specification import AnyPlan, Metric
+from tubecert.recheck.specified.metric import Metric
+from tubecert.recheck.specified.trajectory import AnyPlan
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
 
 _AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")

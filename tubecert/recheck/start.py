@@ -20,7 +20,7 @@ from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.specification import Numbers, Range
+from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import NOUGHT, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube

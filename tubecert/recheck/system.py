@@ -13,17 +13,11 @@ from tubecert.recheck.family import everyone
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.reading import TIME, upright
-from tubecert.recheck.specification import (
-    AnyPlan,
-    Expressed,
-    Metric,
-    Numbers,
-    Range,
-    Resting,
-    Rows,
-    Specification,
-    Uncertainty,
-)
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.metric import Metric
+from tubecert.recheck.specified.numbers import Numbers, Range, Rows
+from tubecert.recheck.specified.plant import Uncertainty
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
 from tubecert.recheck.terms import (
     Matrix,
     all_zero,

@@ -13,7 +13,7 @@ from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.cover import Range
 from tubecert.recheck.grammar import PI
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.specification import Uncertainty
+from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.terms import Term, in_order, names, number_of, slopes
 
 _WAVES = ("sin", "cos", "tan")

@@ -18,7 +18,10 @@ from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.reading import upright
-from tubecert.recheck.specification import Planned, Plant, Resting, Specification, Wanted
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.metric import Wanted
+from tubecert.recheck.specified.plant import Plant
+from tubecert.recheck.specified.trajectory import Planned, Resting
 from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, matrix_slopes, number, number_of
 
 

@@ -9,7 +9,7 @@ from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure
 from tubecert.recheck.kinds.kind import Shortfall
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.specification import Numbers
+from tubecert.recheck.specified.numbers import Numbers
 
 GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
 

@@ -26,7 +26,7 @@ from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, 
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.specification import Rows
+from tubecert.recheck.specified.numbers import Rows
 from tubecert.recheck.system import System
 
 CONDITIONS = ("26a", "26b", "26c")

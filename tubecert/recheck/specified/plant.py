@@ -1,0 +1,95 @@
+"""The system on its safe set, and the uncertainty h."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.recheck.document import Node
+from tubecert.recheck.grammar import Owed, is_name
+from tubecert.recheck.reading import TIME, Column, Reader
+from tubecert.recheck.specified.numbers import Range, ends, not_negative
+from tubecert.recheck.terms import Matrix
+
+_MOST_STATES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """x' = f + B u on a box; all exact, with what the expressions owe there."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    f: Column
+    B: Matrix
+    safe_set: dict[str, Range]
+    duties: tuple[Owed, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """h as expressions of t and x, or declared bounds (h, h_x, h_t), or both; never neither."""
+
+    h: Column | None
+    declared: dict[str, Fraction]
+    duties: tuple[Owed, ...]
+
+    @property
+    def words(self) -> str:
+        """What the claim covers: the expression, everything within the bounds, or either.
+
+        Beside an expression the bounds count only if |h| itself is declared: else H0 is that of the expression.
+        """
+        if self.h is None:
+            return "bounds"
+        return "expression_or_bounds" if "h" in self.declared else "expression"
+
+
+def read_plant(node: Node, box: Node) -> Plant:
+    """`system` on the `safe_set`."""
+    own = node.closed("states", "inputs", "units", "parameters", "f", "B")
+    states, inputs = own["states"].texts(), own["inputs"].texts()
+    n, m = len(states), len(inputs)
+    if not (0 < m <= n <= _MOST_STATES):
+        raise node.refused(f"must name 1 to {_MOST_STATES} states, and at most as many inputs")
+    _names(node, [*states, *inputs])
+    own["units"].closed(optional=(*states, *inputs))
+    for _, unit in own["units"].items():
+        unit.text()
+    for _, value in own["parameters"].items():
+        value.exact()  # expressions are written with the values: they have no parameters
+    _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping()])
+    reader = Reader.of(states)
+    sides = box.closed(*states)
+    return Plant(
+        states=states,
+        inputs=inputs,
+        f=reader.column(own["f"], n),
+        B=reader.matrix(own["B"], n, m),
+        safe_set={name: ends(sides[name]) for name in states},
+        duties=tuple(reader.duties),
+    )
+
+
+def _names(node: Node, names: Sequence[str]) -> None:
+    """Names that mean one thing each: not a constant, a function or a word of the grammar, and all different."""
+    for name in names:
+        if not is_name(name):
+            raise node.refused(f"has the name {name[:60]!r}, which may not be used")
+    if len(set(names)) != len(names):
+        raise node.refused("uses a name twice")
+
+
+def read_uncertainty(node: Node, plant: Plant) -> Uncertainty:
+    """`uncertainty`."""
+    own = node.closed(optional=("h", "bounds"))
+    reader = Reader.of((*plant.states, TIME), kinks=True)
+    h = own.get("h", lambda item: reader.column(item, len(plant.inputs)))
+    declared: dict[str, Fraction] = {}
+    if "bounds" in own:
+        own["bounds"].closed(optional=("h", "h_x", "h_t"))
+        declared = {key: not_negative(value) for key, value in own["bounds"].items()}
+    if h is None and len(declared) < 3:
+        raise node.refused("must give h, or bounds for h, h_x and h_t")
+    return Uncertainty(h, declared, tuple(reader.duties))

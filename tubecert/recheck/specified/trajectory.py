@@ -1,0 +1,145 @@
+"""The plan that a specification names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.recheck.document import Node
+from tubecert.recheck.grammar import Owed
+from tubecert.recheck.reading import TIME, Column, Reader
+from tubecert.recheck.specified.numbers import (
+    Numbers,
+    Range,
+    not_negative,
+    positive,
+    several,
+    span,
+    square,
+    whole,
+)
+from tubecert.recheck.specified.plant import Plant
+
+
+@dataclass(frozen=True, slots=True)
+class Resting:
+    """A plan that stays at a point: for ever, or until the horizon."""
+
+    at: Numbers
+    input: Numbers
+    horizon: Fraction | None
+    kind: str = "equilibrium"
+
+
+@dataclass(frozen=True, slots=True)
+class Expressed:
+    """x* and u* as expressions of t on [0, horizon]."""
+
+    x: Column
+    u: Column
+    horizon: Fraction
+    duties: tuple[Owed, ...]
+    kind: str = "expressions"
+
+
+@dataclass(frozen=True, slots=True)
+class Tabled:
+    """A plan from a file: its knots are in the certificate."""
+
+    held: bool
+    horizon: Fraction
+    kind: str = "csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A plan from `start` that the planner made: its knots are in the certificate; with a goal it ends in `target`."""
+
+    start: Numbers
+    target: Numbers
+    goal: bool
+    held: bool
+    horizon: Fraction
+    kind: str = "ilqr"
+
+
+@dataclass(frozen=True, slots=True)
+class AnyPlan:
+    """Every plan with x* and u* in boxes, by name, and |x*' - f - B u*| <= `defect`."""
+
+    x: dict[str, Range]
+    u: dict[str, Range]
+    defect: Fraction
+    horizon: Fraction | None
+    kind: str = "any"
+
+
+Trajectory = Resting | Expressed | Tabled | Planned | AnyPlan
+
+
+def read_trajectory(node: Node, plant: Plant) -> Trajectory:
+    """`trajectory`, by its kind."""
+    kind, n, m = node.mapping().get("kind"), len(plant.states), len(plant.inputs)
+    if kind == "any":
+        return _any(node, plant)
+    readers: dict[object, Callable[[Node, int, int], Trajectory]] = {
+        "equilibrium": _resting,
+        "expressions": _expressed,
+        "csv": _tabled,
+        "ilqr": _planned,
+    }
+    if not isinstance(kind, str) or kind not in readers:
+        raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}, any")
+    return readers[kind](node, n, m)
+
+
+def _resting(node: Node, n: int, m: int) -> Resting:
+    own = node.closed("kind", "at", "input", optional=("horizon",))
+    return Resting(several(own["at"], n), several(own["input"], m), own.get("horizon", positive))
+
+
+def _expressed(node: Node, n: int, m: int) -> Expressed:
+    own = node.closed("kind", "x", "u", "horizon")
+    reader = Reader.of((TIME,))
+    x, u = reader.column(own["x"], n), reader.column(own["u"], m)
+    return Expressed(x, u, positive(own["horizon"]), tuple(reader.duties))
+
+
+def _any(node: Node, plant: Plant) -> AnyPlan:
+    own = node.closed("kind", "x", "u", "defect", optional=("horizon",))
+    x, u = (
+        {name: span(ends[name]) for name in names}
+        for names, ends in (
+            (plant.states, own["x"].closed(*plant.states)),
+            (plant.inputs, own["u"].closed(*plant.inputs)),
+        )
+    )
+    return AnyPlan(x, u, not_negative(own["defect"]), own.get("horizon", positive))
+
+
+def _held(node: Node) -> bool:
+    return node.word("hold", "linear") == "hold"
+
+
+def _tabled(node: Node, n: int, m: int) -> Tabled:
+    del n, m
+    own = node.closed("kind", "file", "interpolation", "horizon")
+    own["file"].text()
+    return Tabled(_held(own["interpolation"]), positive(own["horizon"]))
+
+
+def _planned(node: Node, n: int, m: int) -> Planned:
+    keys = ("kind", "start", "target", "knots", "Q", "R", "goal", "interpolation", "horizon")
+    own = node.closed(*keys, optional=("input",))
+    own.get("input", lambda item: several(item, m))
+    square(own["Q"], n)
+    square(own["R"], m)
+    whole(own["knots"])
+    return Planned(
+        start=several(own["start"], n),
+        target=several(own["target"], n),
+        goal=own["goal"].word("true", "false") == "true",
+        held=_held(own["interpolation"]),
+        horizon=positive(own["horizon"]),
+    )
