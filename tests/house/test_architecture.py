@@ -49,6 +49,7 @@ ROOMS = [
     "pipeline",
     "checking",
     "report",
+    "library",
     "cli",
 ]
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -8,7 +8,7 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 | `process` | signals, and an exit code that nobody else decides on |
 | `app` | the commands and their options |
 | `options` | the options that every command shares; numbers from the command line |
-| `targets`, `places` | files that commands write; places on the command line |
+| `targets` | files that commands write |
 | `guard`, `presenting` | every way a command can end -> one exit code and no traceback; reports or data |
 | `everyday`, `synthesising`, `simulating` | commands beside certify: their options |
 | `certify`, `check`, `simulate`, `version`, ... | what each command does |

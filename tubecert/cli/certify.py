@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output, flag
+from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, read_certificate, write_pages
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
 from tubecert.libraries import versions
+from tubecert.library.numbers import Numbers
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 

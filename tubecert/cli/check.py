@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Severity
+from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal

@@ -1,4 +1,4 @@
-"""What every command shares: how to report, and how a number on the command line is read."""
+"""What every command shares: how to report, and the options that hold numbers."""
 
 from __future__ import annotations
 
@@ -7,16 +7,9 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, Final, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import typer
-
-from tubecert.errors import SpecError
-
-if TYPE_CHECKING:
-    from fractions import Fraction
-
-    from tubecert.findings import Finding
 
 
 class Color(StrEnum):
@@ -35,7 +28,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-_MODERATE: Final = 60  # powers of ten: the conditions hold products of gains, and floats end at 1e308
 _Version = Annotated[
     bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
 ]
@@ -51,7 +43,7 @@ def flag(name: str) -> str:
 
 
 def number_option(flag: str, help: str) -> object:
-    """An option whose text is read as an exact number (see `Numbers`)."""
+    """An option whose text is read as an exact number (see `library.numbers`)."""
     return typer.Option(flag, metavar="NUMBER", help=help)
 
 
@@ -112,83 +104,3 @@ def with_output(command: Callable[..., None]) -> Callable[..., None]:
     ]
     whole.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     return whole
-
-
-class Numbers:
-    """Reads numbers as the specification's are read, and keeps what is wrong with them."""
-
-    def __init__(self) -> None:
-        self.findings: list[Finding] = []
-
-    def positive(
-        self,
-        option: str,
-        text: str | None,
-        *,
-        below: int | None = None,
-        wanted: str = "positive",
-        remedy: str = "> 0",
-    ) -> Fraction | None:
-        """The exact number, > 0 (and < `below`); None if the option is absent or wrong."""
-        if text is None:
-            return None
-        from tubecert.expression import ExpressionError, parse_number
-
-        try:
-            value = parse_number(text)
-        except ExpressionError as error:
-            place = {"offset": error.offset, "width": error.width}
-            self._fail("TC108", option, text, message=error.message, help=error.help, **place)
-            return None
-        if value <= 0:
-            self._range(option, text, wanted, remedy)
-        elif below is not None and value >= below:
-            self._range(option, text, f"below {below}", f"< {below}")
-        else:
-            return value
-        return None
-
-    def gain(self, option: str, text: str | None) -> Fraction | None:
-        """A positive number that is so moderate that what follows from it can be computed."""
-        value = self.positive(option, text)
-        if value is None or text is None or 10**-_MODERATE < value < 10**_MODERATE:
-            return value
-        self._range(
-            option, text, "a gain that anything can have", f"between 1e-{_MODERATE} and 1e{_MODERATE}"
-        )
-        return None
-
-    def count(
-        self, option: str, text: str | None, *, wanted: str = "positive", remedy: str = "> 0"
-    ) -> int | None:
-        """A positive whole number; None if the option is absent or wrong (then `wanted` tells what is right)."""
-        value = self.positive(option, text, wanted=wanted, remedy=remedy)
-        if value is None or text is None:
-            return None
-        if value.denominator != 1:
-            self._range(option, text, "a whole number", "without a fraction")
-            return None
-        return int(value)
-
-    def whole(self, option: str, text: str | None) -> int | None:
-        """A whole number, 0 or more; None if the option is absent or wrong."""
-        if text is not None and text.strip() == "0":
-            return 0
-        return self.count(option, text, wanted="0 or more", remedy="that is 0 or more")
-
-    def check(self) -> None:
-        """Raises `SpecError` with every problem met so far."""
-        if self.findings:
-            raise SpecError(self.findings)
-
-    def _range(self, option: str, text: str, wanted: str, remedy: str) -> None:
-        shown = text if len(text) <= 40 else f"{text[:40]}..."
-        self._fail("TC112", option, text, message=f"{shown} is not {wanted}", help=f"write a number {remedy}")
-
-    def _fail(self, code: str, option: str, text: str, **what: Any) -> None:
-        from tubecert.cli.places import OptionPlace
-        from tubecert.findings import Finding
-
-        column, width = what.pop("offset", 0) + 1, what.pop("width", len(text))
-        place = OptionPlace(file=option, line=1, column=column, source=text, width=width)
-        self.findings.append(Finding(code=code, location=place, **what))

@@ -11,9 +11,10 @@ from typing import Any
 from tubecert.certificate import KIND, unreadable
 from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
+from tubecert.library.numbers import Numbers
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck

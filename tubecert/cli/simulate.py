@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output, flag
+from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import open_certificate, read_certificate
 from tubecert.errors import ExitCode, SpecError
@@ -21,6 +21,7 @@ from tubecert.expression import suggestion
 from tubecert.findings import Finding
 from tubecert.letters import DISTANCE, name_of
 from tubecert.libraries import versions
+from tubecert.library.numbers import Numbers
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Never
 
 from tubecert import certificate
-from tubecert.cli.options import Numbers, Output, flag
-from tubecert.cli.places import OptionPlace
+from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding
 from tubecert.kinds import DISTANCE
+from tubecert.library.numbers import NamedPlace, Numbers
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.synthesis import solver_name
@@ -135,7 +135,7 @@ def _names(system: Spec, text: str) -> tuple[str, ...]:
 
 
 def _refuse(option: str, text: str, message: str) -> Never:
-    place = OptionPlace(file=option, line=1, column=1, source=text, width=len(text))
+    place = NamedPlace(file=option, line=1, column=1, source=text, width=len(text))
     raise SpecError([Finding(code="TC112", message=message, location=place)])
 
 

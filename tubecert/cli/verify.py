@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Numbers, Output
+from tubecert.cli.options import Output
 from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
+from tubecert.library.numbers import Numbers
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:

@@ -1,0 +1,9 @@
+"""The library: what `import tubecert` offers, and what commands share with it.
+
+In: specifications as files, mappings or texts. Out: frozen values with arrays and units. Trusted: no; what is certified
+was made so by the pipeline, and is what the certificate says. A command is a client of these functions like any other.
+
+| module | what it does |
+|---|---|
+| `numbers` | numbers that are asked for, exact |
+"""
