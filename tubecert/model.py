@@ -263,6 +263,8 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
     terms = [*spec.f, *(t for row in spec.B for t in row)]
     if spec.metric:
         terms += [t for row in spec.metric.dual_metric for t in row]
+    if spec.disturbance:
+        terms += [t for row in spec.disturbance.E for t in row]
     findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
     for term in spec.uncertainty.h or ():
         findings += _undefined(term, over_time, "the safe set and the horizon", effort)

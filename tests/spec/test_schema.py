@@ -100,6 +100,7 @@ def test_what_the_reader_says_of_keys_and_kinds_the_schema_says_too(path):
     codes = set(re.findall(r"# expect: (TC\d+)", path.read_text("utf-8", "replace")))
     # keys that are names; YAML that a schema never sees
     by_name = {"units_unknown", "tube_state", "start_box_unknown", "bounds_of_one_input", "bounds_mixed"}
+    by_name |= {"hardware_noise_of_nothing", "disturbance_ragged", "disturbance_rows"}
     exempt = {*by_name, "yaml_complex_key"}
     if codes and codes <= STRUCTURAL | {"TC113"} and path.stem not in exempt:
         assert errors("spec", as_text(path))
@@ -202,7 +203,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     }
     assert not unmet, "a section that no example file of tests/specs/ok has"
     # their keys are states or inputs
-    box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits"}
+    box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise"}
     for (path, kind), known in asked.known.items():
         if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
             continue

@@ -7,7 +7,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `source` | reads the text within limits; lines and columns |
 | `document` | YAML events -> a tree that knows where each node stands |
 | `reader` | a cursor that answers with values or findings |
-| `names`, `system`, `plan`, `settings`, `obstacles`, `simulation`, `synthesis` | the sections of the file |
+| `names`, `system`, `plan`, `settings`, `obstacles`, `hardware`, `simulation`, `synthesis` | the sections of the file |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `load` | puts the sections together |
@@ -21,7 +21,9 @@ from tubecert.spec.load import load, load_text
 from tubecert.spec.types import (
     Adaptation,
     Bounds,
+    Disturbance,
     Expectation,
+    Hardware,
     Interpolation,
     Knots,
     Matrix,
@@ -44,7 +46,9 @@ __all__ = [
     "CODES",
     "Adaptation",
     "Bounds",
+    "Disturbance",
     "Expectation",
+    "Hardware",
     "Interpolation",
     "Knots",
     "Matrix",

@@ -12,8 +12,20 @@ from fractions import Fraction
 from typing import Any
 
 from tubecert.expression import full_text, number_text
+from tubecert.spec.hardware import LARGEST, ONE_SAMPLE
 from tubecert.spec.load import VERSION
-from tubecert.spec.types import Bundle, Matrix, Obstacle, Simulation, Spec, Synthesis, Task, Term, Tube
+from tubecert.spec.types import (
+    Bundle,
+    Hardware,
+    Matrix,
+    Obstacle,
+    Simulation,
+    Spec,
+    Synthesis,
+    Task,
+    Term,
+    Tube,
+)
 
 
 def canonical(spec: Spec) -> dict[str, Any]:
@@ -51,6 +63,11 @@ def canonical(spec: Spec) -> dict[str, Any]:
         data["limits"] = {name: _numbers(ends) for name, ends in spec.limits}
     if spec.simulation is not None:
         data["simulation"] = _simulation(spec.simulation)
+    if spec.hardware is not None:
+        data["hardware"] = _hardware(spec, spec.hardware)
+    if (wind := spec.disturbance) is not None:
+        bound = LARGEST if wind.bound is None else number_text(wind.bound)
+        data["disturbance"] = {"E": [_texts(row) for row in wind.E], "bound": bound, **_given(rate=wind.rate)}
     return data
 
 
@@ -164,6 +181,26 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     if obstacle.radius is None:
         return shown | {"polygon": _matrix(obstacle.polygon)}
     return shown | {"disc": {"center": _numbers(obstacle.center), **_given(radius=obstacle.radius)}}
+
+
+def _hardware(spec: Spec, machine: Hardware) -> dict[str, Any]:
+    def sought(value: Fraction | None, word: str = LARGEST) -> str:
+        return word if value is None else number_text(value)
+
+    data: dict[str, Any] = {
+        "sample_time": sought(machine.sample_time),
+        "delay": sought(machine.delay, ONE_SAMPLE if machine.one_sample else LARGEST),
+        "noise": _given(**dict(zip(spec.states, machine.noise, strict=True)))
+        if isinstance(machine.noise, tuple)
+        else sought(machine.noise),
+        "feedforward": "held" if machine.held else "continuous",
+        "predict": "true" if machine.predict else "false",
+        "bandwidth": sought(machine.bandwidth, "auto"),
+        **_given(noise_rate=machine.noise_rate),
+    }
+    if machine.feedback_time is not None:
+        data["feedback_rate"] = number_text(1 / machine.feedback_time)
+    return data
 
 
 def _simulation(wanted: Simulation) -> dict[str, Any]:

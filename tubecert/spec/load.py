@@ -9,6 +9,7 @@ from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.limits import read_limits
+from tubecert.spec.hardware import read_disturbance, read_hardware
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
@@ -49,6 +50,8 @@ _OPTIONAL = (
     "obstacles",
     "limits",
     "simulation",
+    "hardware",
+    "disturbance",
 )
 
 
@@ -160,6 +163,8 @@ def _read_named(
     obstacles = read_obstacles(entries.get("obstacles"), names)
     limits = read_limits(entries.get("limits"), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
+    hardware = read_hardware(entries.get("hardware"), entries.get("disturbance"), names)
+    disturbance = read_disturbance(entries.get("disturbance"), names)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
     if plan is None or x0 is None or tube is None or adaptation is None:
@@ -193,6 +198,8 @@ def _read_named(
         obstacles=obstacles,
         limits=limits,
         simulation=simulation,
+        hardware=hardware,
+        disturbance=disturbance,
         locations=Places(reader.places),
     )
 

@@ -46,10 +46,13 @@ _OTHER_KEYS = {
     ),
     **dict.fromkeys(("x0", "start", "initial", "initial_condition"), "write initial_state: {at: [...]}"),
     **dict.fromkeys(("reference", "path", "setpoint", "desired"), "the plan is the key trajectory"),
-    **dict.fromkeys(("disturbance", "disturbances"), "what is not known is the key uncertainty"),
     **dict.fromkeys(
-        ("noise", "delay", "sensors"),
-        "no claim covers it: what is assumed instead is listed in every report",
+        ("disturbances", "wind"),
+        "what acts beside the inputs is the key disturbance, what acts through them is uncertainty",
+    ),
+    **dict.fromkeys(
+        ("noise", "delay", "sensors", "sample_time", "sampling", "computer", "machine"),
+        "the machine is the key hardware: {rate: 500, delay: 0.001, noise: 0.001}",
     ),
     **dict.fromkeys(
         ("constraints", "domain", "bounds_x"), "the box that the tube must stay in is the key safe_set"

@@ -230,6 +230,49 @@ class Simulation:
     h: tuple[Term, ...] | None = None
 
 
+Largest = Literal["sample_time", "delay", "noise", "wind"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hardware:
+    """The computer, the sensors and their delay; times in s. What is None is searched for, or follows.
+
+    `sample_time` of inputs and adaptation; `delay` from a sample to its input, None with `one_sample` (it is one
+    sample time); `noise`: |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|;
+    `held`: u* is played from sample to sample; `feedback_time`: the sample time of the feedback where it has one of its
+    own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s. `largest` is what is
+    searched for, `wind` being the bound of the disturbance.
+    """
+
+    sample_time: Fraction | None
+    delay: Fraction | None = Fraction(0)
+    one_sample: bool = False
+    noise: Fraction | Vector | None = Fraction(0)
+    noise_rate: Fraction | None = None
+    held: bool = False
+    feedback_time: Fraction | None = None
+    predict: bool = False
+    bandwidth: Fraction | None = None
+    largest: Largest | None = None
+
+    def __post_init__(self) -> None:
+        assert (self.sample_time is None) == (self.largest == "sample_time")
+        assert (self.delay is None) == (self.one_sample or self.largest == "delay")
+        assert (self.noise is None) == (self.largest == "noise")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """What acts beside the inputs: E(x) w, E (n, k), |w| <= `bound` (None: the largest is searched for).
+
+    `rate` in 1/s, if |w'| is at most that: what of it the inputs can reach is adapted to.
+    """
+
+    E: TermMatrix
+    bound: Fraction | None
+    rate: Fraction | None = None
+
+
 class Places(Mapping[str, Location]):
     """Where the value of each key of the file stands; read-only, and it can be pickled."""
 
@@ -285,6 +328,8 @@ class Spec:
     obstacles: tuple[Obstacle, ...] = ()
     limits: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()  # by input, of some of them
     simulation: Simulation | None = None
+    hardware: Hardware | None = None
+    disturbance: Disturbance | None = None
     locations: Places = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
@@ -292,6 +337,7 @@ class Spec:
         assert len(self.f) == len(self.B) == len(self.safe_set) == len(self.x0) == n
         assert all(len(row) == m for row in self.B)
         assert len(self.start_box) in (0, n)
+        assert self.disturbance is None or len(self.disturbance.E) == n
 
     def location(self, path: str) -> Location | None:
         """Where the value of `path` stands, or the nearest enclosing key that is in the file."""
