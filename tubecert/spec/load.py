@@ -8,8 +8,8 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
-from tubecert.spec.limits import read_limits
 from tubecert.spec.hardware import read_disturbance, read_hardware
+from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
