@@ -62,6 +62,14 @@ class Location:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NamedPlace(Location):
+    """A place in the value of an option or an argument: its name stands for file, line and column."""
+
+    def __str__(self) -> str:
+        return self.file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """One thing to report; `help` says what to write or do instead."""
 

@@ -18,7 +18,8 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.records import from_json
-from tubecert.spec import Spec, canonical
+from tubecert.spec import Setting, Spec, canonical
+from tubecert.spec.load import again
 from tubecert.spec.types import Table
 
 _IDLE = ("name", "expect", "simulation", "system.units", "trajectory.file")
@@ -64,8 +65,8 @@ class Belonging:
 
 
 def compared(spec: Spec, result: Result) -> Belonging:
-    """The `result` of a certificate against a specification."""
-    own, effective = canonical(spec), result.spec.effective.data
+    """The `result` of a certificate against a specification; raises `SpecError` for keys set that it lacks."""
+    own, effective = canonical(as_set(spec, result.overrides)), result.spec.effective.data
     overridden = _overridden(own, effective, result.overrides)
     asked = own["metric"].get("synthesise") if "metric" in own else None
     if asked is not None and result.synthesis is not None and result.synthesis.asked.data == asked:
@@ -77,10 +78,15 @@ def compared(spec: Spec, result: Result) -> Belonging:
     return Belonging(
         serious=tuple(key for key in differing if key not in _IDLE),
         idle=tuple(key for key in differing if key in _IDLE),
-        overridden=tuple(overridden),
+        overridden=(*overridden, *sorted(result.overrides.settings)),
         synthesised=asked is not None,
         same_text=digest == result.spec.file_hash,
     )
+
+
+def as_set(spec: Spec, overrides: Overrides) -> Spec:
+    """The specification with the keys that were set on the command line that certified."""
+    return again(spec, [Setting(path=path, text=text) for path, text in sorted(overrides.settings.items())])
 
 
 def _overridden(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> list[str]:

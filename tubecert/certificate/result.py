@@ -71,13 +71,14 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overrides:
-    """What the command line changed."""
+    """What the command line changed; `settings`: keys of the specification, with the texts of their values (--set)."""
 
     rho_a: Fraction | None = None
     epsilon: Fraction | None = None
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     metric: str | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,7 @@ class _Kept:
 
 def key_of_text(what: str, spec: Spec) -> str:
     """The name of what follows from a file's text (and its plan file)."""
-    return _key([what, spec.source, _plan_file(spec)])
+    return _key([what, spec.source, list(spec.settings), _plan_file(spec)])
 
 
 def key_of_system(spec: Spec, gap: Fraction, budget: int) -> str:

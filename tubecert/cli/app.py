@@ -12,7 +12,7 @@ import typer
 
 from tubecert.cli import everyday, rechecking, simulating, synthesising, verifying
 from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
-from tubecert.cli.options import Budget, Deadline, Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Deadline, Output, Settings, SpecFile, number_option, with_output
 from tubecert.errors import ExitCode
 from tubecert.letters import ALL, words_of
 
@@ -42,6 +42,7 @@ _CERTIFY_AFTER = """\b
 Examples:
   tubecert certify plant.yaml
   tubecert certify plant.yaml --rho-a 0.05 --conditions all -o plant.json
+  tubecert certify plant.yaml --set tube.epsilon=0.3 --set system.parameters.m=0.5
   tubecert certify plant.yaml --bandwidth 50 --adaptation-rate 2e7
   tubecert certify plant.yaml --report plant.html
   tubecert certify plant.yaml -q -o - | jq .result.tube
@@ -89,6 +90,7 @@ def certify(
     context: typer.Context,
     spec: SpecFile,
     *,
+    set_: Settings = None,
     rho_a: Annotated[
         str | None, number_option("--rho-a", "Radius left to the adaptation (overrides tube.rho_a).")
     ] = None,

@@ -15,6 +15,7 @@ from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, read_certificate, write_pages
+from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
@@ -32,12 +33,13 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Certify; `given` holds the options by the names of their parameters."""
     numbers = _numbers(given)
     deadline = numbers.pop("deadline", None)
+    settings = settings_of(given)
     target = _target(given)
     pages = _pages(given, target)
     from tubecert import spec
     from tubecert.spec.metric_file import with_metric
 
-    system = spec.load(given["spec"])
+    system = spec.load(given["spec"], settings)
     if given["metric"] is not None:
         system = with_metric(system, str(given["metric"]))
     kept = _kept_place(given, system, target)

@@ -47,6 +47,15 @@ def number_option(flag: str, help: str) -> object:
     return typer.Option(flag, metavar="NUMBER", help=help)
 
 
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a key of the specification, e.g. tube.epsilon=0.3; may be repeated.",
+    ),
+]
+
 Budget = Annotated[str | None, number_option("--budget", "Boxes examined per claim before giving up.")]
 
 Deadline = Annotated[

@@ -16,6 +16,7 @@ from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import open_certificate, read_certificate
+from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding
@@ -61,10 +62,11 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Simulate; `given` holds the options by the names of their parameters."""
     _installed()
     numbers = _numbers(given)
+    settings = settings_of(given)
     chosen = _controllers(given["controllers"])
     from tubecert import spec
 
-    system = spec.load(given["spec"])
+    system = spec.load(given["spec"], settings)
     wishes = _wishes(given, numbers, chosen, system)
     folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
     from tubecert.simulate.certified import require_plan

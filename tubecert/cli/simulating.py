@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Output, Settings, SpecFile, number_option, with_output
 from tubecert.letters import ADAPTIVE, words_of
 
 _AFTER = """\b
@@ -81,6 +81,7 @@ def simulate(
     sample_time: Annotated[
         str | None, number_option("--sample-time", "Choose the sample time of sampled, in s.")
     ] = None,
+    set_: Settings = None,
     epsilon: Annotated[
         str | None, number_option("--epsilon", "Overrides tube.epsilon (without --certificate).")
     ] = None,
@@ -97,6 +98,10 @@ def simulate(
     given = dict(locals())
     if certificate is not None and (epsilon is not None or rho_a is not None):
         raise typer.BadParameter("a certificate has its own epsilon and rho_a", ctx=context)
+    if certificate is not None and set_:
+        raise typer.BadParameter(
+            "a certificate has its own specification: --set goes without it", ctx=context
+        )
     with guarded(how):
         from tubecert.cli.simulate import run
 

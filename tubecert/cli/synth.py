@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Never
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
+from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode, SpecError
-from tubecert.findings import Finding
+from tubecert.findings import Finding, NamedPlace
 from tubecert.kinds import DISTANCE
-from tubecert.library.numbers import NamedPlace, Numbers
+from tubecert.library.numbers import Numbers
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.synthesis import solver_name
@@ -35,6 +36,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     seconds = values.pop("deadline")
     budget = numbers.count("--budget", given["budget"])
     numbers.check()
+    settings = settings_of(given)
     target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
     for place in (target, *([given["plot"]] if given["plot"] else [])):
         certificate.check_target(place)
@@ -43,7 +45,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         raise refused(f"cannot write {given['plot']}: the comparison is drawn as SVG", "give a file FILE.svg")
     from tubecert import spec
 
-    system = spec.load(given["spec"])
+    system = spec.load(given["spec"], settings)
     spare(target, {"plan": plan_of(given, system)})
     wanted = _wanted(system, given, values)
     from tubecert import pipeline

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Deadline, Output, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Deadline, Output, Settings, SpecFile, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -93,6 +93,7 @@ def synth(
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --sweep.")
     ] = None,
+    set_: Settings = None,
     rho_a: Annotated[str | None, number_option("--rho-a", "Overrides tube.rho_a.")] = None,
     epsilon: Annotated[str | None, number_option("--epsilon", "Overrides tube.epsilon.")] = None,
     budget: Budget = None,

@@ -5,23 +5,14 @@ In: texts with the names of what they are for (options of a command, arguments o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
 
 from tubecert.errors import SpecError
 from tubecert.expression import ExpressionError, parse_number
-from tubecert.findings import Finding, Location
+from tubecert.findings import Finding, NamedPlace
 
 _MODERATE: Final = 60  # powers of ten: the conditions hold products of gains, and floats end at 1e308
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedPlace(Location):
-    """A place in the value of an option or an argument: its name stands for file, line and column."""
-
-    def __str__(self) -> str:
-        return self.file
 
 
 class Numbers:

@@ -7,13 +7,16 @@ verified.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Section
 from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.obstacles import Cleared, read_cleared
@@ -52,6 +55,9 @@ MEASURED = (
 )
 INFIMA = ("lower", "input_gain_least")  # constants whose lower side is used
 
+_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d{1,6}\])*", re.ASCII)
+_PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
+
 
 @dataclass(frozen=True, slots=True)
 class Plans:
@@ -78,13 +84,17 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """What the command line replaced in the specification; gains that were asked for."""
+    """What the command line replaced in the specification; gains that were asked for.
+
+    `settings`: numbers that were set, by path, beside what the specification says there.
+    """
 
     epsilon: Fraction | None
     rho_a: Fraction | None
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
     metric: str | None
+    settings: dict[str, tuple[Fraction, Fraction]]
 
     @property
     def gains(self) -> Asked:
@@ -211,7 +221,7 @@ def read_result(node: Node) -> Result:
         specification=specification,
         effective_hash=spec["effective_hash"].text(),
         claim=_claim(own["claim"], states, specification.plant.inputs),
-        overrides=_overrides(own["overrides"]),
+        overrides=_overrides(own["overrides"], spec["effective"]),
         plan=read_plan(own["plan"], specification),
         safe_set=_box(own["safe_set"], states, Node.decimal),
         assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
@@ -277,15 +287,45 @@ def _box(node: Node, states: tuple[str, ...], read: Callable[[Node], Fraction]) 
     return {name: (read(low), read(high)) for name in states for low, high in [sides[name].pair()]}
 
 
-def _overrides(node: Node) -> Overrides:
-    own = node.closed(optional=("epsilon", "rho_a", "bandwidth", "adaptation_rate", "metric"))
+def _overrides(node: Node, effective: Node) -> Overrides:
+    own = node.closed(optional=("epsilon", "rho_a", "bandwidth", "adaptation_rate", "metric", "settings"))
     return Overrides(
         epsilon=own.get("epsilon", Node.decimal),
         rho_a=own.get("rho_a", Node.decimal),
         bandwidth=own.get("bandwidth", Node.decimal),
         adaptation_rate=own.get("adaptation_rate", Node.decimal),
         metric=own.get("metric", Node.text),
+        settings=own.get("settings", lambda item: _settings(item, effective)) or {},
     )
+
+
+def _settings(node: Node, effective: Node) -> dict[str, tuple[Fraction, Fraction]]:
+    """What was set and is a number, where the specification has one; other texts are no more than told."""
+    found = {}
+    for path, item in node.items():
+        if not _PATH.fullmatch(path):
+            raise item.refused("is not named by the path of a key")
+        given, own = _rational(item.text()), _rational(_at(effective.value, path))
+        if given is not None and own is not None:
+            found[path] = (given, own)
+    return found
+
+
+def _at(value: Any, path: str) -> object:
+    """What stands at a path, None where there is nothing."""
+    for name, index in _PART.findall(path):
+        if name:
+            value = value.get(name) if isinstance(value, dict) else None
+        else:
+            value = value[int(index)] if isinstance(value, list) and int(index) < len(value) else None
+    return value
+
+
+def _rational(text: object) -> Fraction | None:
+    try:
+        return read_number(text) if isinstance(text, str) else None
+    except GrammarError:
+        return None
 
 
 def _declared(node: Node) -> dict[str, Fraction]:

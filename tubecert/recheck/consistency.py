@@ -93,6 +93,8 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
         ("rho_a", given.rho_a, spec.rho_a),
     ):
         yield own in (None, value), f"overrides.{name} is not what spec.effective has"
+    for path, (set_, had) in given.settings.items():
+        yield set_ == had, f"overrides.settings.{path} is not what spec.effective has"
     if sections is None:
         return
     for kind in KINDS:

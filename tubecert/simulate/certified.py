@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tubecert.certificate.belonging import compared
+from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
 from tubecert.conditions.theorem import Recipe
@@ -81,13 +81,13 @@ class Certified:
 
 
 def adopted(spec: Spec, result: Result) -> Spec:
-    """The specification with what the certification had changed: radii and metric of the command line, a new metric.
+    """The specification with what the certification had changed: what the command line gave, a new metric.
 
     Raises `ForeignError` if the certificate is about another system.
     """
     compared(spec, result).require(spec, "the certificate")
     other = _without_plan(result.spec.effective.data)
-    spec = replace(spec, tube=other.tube)
+    spec = replace(as_set(spec, result.overrides), tube=other.tube)
     if result.overrides.metric is None and spec.metric is not None:
         return spec
     return replace(spec, metric=other.metric, synthesis=other.synthesis)

@@ -10,6 +10,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `names`, `system`, `plan`, `settings`, `obstacles`, `hardware`, `simulation`, `synthesis` | the sections of the file |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
+| `override` | keys that the command line sets, put into the tree |
 | `load` | puts the sections together |
 | `canonical` | the effective specification as plain data |
 | `codes`, `types` | finding codes; the values of a specification |
@@ -18,6 +19,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 from tubecert.spec.canonical import canonical
 from tubecert.spec.codes import CODES
 from tubecert.spec.load import load, load_text
+from tubecert.spec.override import Setting
 from tubecert.spec.types import (
     Adaptation,
     Bounds,
@@ -54,6 +56,7 @@ __all__ = [
     "Matrix",
     "Metric",
     "Obstacle",
+    "Setting",
     "Simulation",
     "Spec",
     "Synthesis",

@@ -20,36 +20,39 @@ from tubecert.spec.source import MAX_NESTING, Mark, Source
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scalar:
-    """Text as written; `style` is empty for plain text, else the quote or block indicator."""
+class Placed:
+    """Where a node stands; `source` is the text that `start` is a place of, where that is not the file's."""
 
     start: Mark
+    source: Source | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scalar(Placed):
+    """Text as written; `style` is empty for plain text, else the quote or block indicator."""
+
     end: Mark
     text: str
     style: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ListNode:
+class ListNode(Placed):
     """A list."""
 
-    start: Mark
     items: tuple[Node, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MappingNode:
+class MappingNode(Placed):
     """A mapping, with its keys in the order of the file."""
 
-    start: Mark
     pairs: tuple[tuple[Scalar, Node], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BrokenNode:
+class BrokenNode(Placed):
     """Stands where something was refused (and reported)."""
-
-    start: Mark
 
 
 _PLAIN_TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "seq", "map"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from tubecert.errors import SpecError
@@ -12,6 +14,7 @@ from tubecert.spec.hardware import read_disturbance, read_hardware
 from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
+from tubecert.spec.override import Setting, put
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import (
@@ -55,13 +58,13 @@ _OPTIONAL = (
 )
 
 
-def load(path: str) -> Spec:
-    """The specification in a file.
+def load(path: str, settings: Sequence[Setting] = ()) -> Spec:
+    """The specification in a file, with the keys that are set in place of its own.
 
     Raises `TargetError` if the file cannot be read and `SpecError` with every problem, in the order of the
     file.
     """
-    return load_source(read_source(path))
+    return load_source(read_source(path), settings)
 
 
 def load_system(path: str) -> Spec:
@@ -77,15 +80,22 @@ def load_text(text: str, file: str = "<text>") -> Spec:
     return load_source(Source.of(file, text))
 
 
-def load_source(source: Source, *, alone: bool = False) -> Spec:
+def again(spec: Spec, settings: Sequence[Setting]) -> Spec:
+    """The specification in the same text, with these keys set in place of those it was read with."""
+    return load_source(Source.of(spec.path, spec.source), settings) if settings else spec
+
+
+def load_source(source: Source, settings: Sequence[Setting] = (), *, alone: bool = False) -> Spec:
     """The specification in a source; see `load_system` for a system `alone`."""
     check_limits(source)
     node, findings = compose(source)
+    node, misplaced = put(node, settings)
+    findings += misplaced
     reader = Reader(source)
     reader.findings.extend(findings)
     spec = None
     if not any(finding.code in (codes.YAML_SYNTAX, codes.LIMIT) for finding in findings):
-        spec = _read(root_field(reader, node), alone=alone)
+        spec = _read(root_field(reader, node), settings, alone=alone)
     if reader.findings or spec is None:
         raise SpecError(_ordered(reader.findings))
     return spec
@@ -98,7 +108,7 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
     return capped(sorted(findings, key=position), codes.LIMIT)
 
 
-def _read(root: Field, *, alone: bool) -> Spec | None:
+def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
@@ -125,7 +135,10 @@ def _read(root: Field, *, alone: bool) -> Spec | None:
     names = read_names(system) if system else None
     if system is None or names is None:
         return None  # without names nothing else can be read
-    return _read_named(root.reader, entries, system, name, names)
+    spec = _read_named(root.reader, entries, system, name, names)
+    return (
+        None if spec is None else replace(spec, settings=tuple((each.path, each.text) for each in settings))
+    )
 
 
 def _is_another_file(root: Field) -> bool:

@@ -141,7 +141,7 @@ class Field:
     def location(self) -> Location:
         """Where the value begins."""
         width = len(self.node.text) if isinstance(self.node, Scalar) else 1
-        return self.reader.source.location(self.node.start, width)
+        return self._source(self.node).location(self.node.start, width)
 
     def fail(self, code: str, message: str, help: str = "") -> None:
         """Reports that this value will not do."""
@@ -352,7 +352,8 @@ class Field:
     def inside(self, offset: int, width: int) -> Location:
         """The place of a part of a scalar's text."""
         assert isinstance(self.node, Scalar)
-        return self.reader.source.location(place_in(self.reader.source, self.node, offset), width)
+        source = self._source(self.node)
+        return source.location(place_in(source, self.node, offset), width)
 
     # findings
 
@@ -362,7 +363,10 @@ class Field:
         self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
 
     def _at(self, code: str, key: Scalar, message: str, help: str = "") -> None:
-        self.reader.report(code, self.reader.source.location(key.start, len(key.text)), message, help)
+        self.reader.report(code, self._source(key).location(key.start, len(key.text)), message, help)
+
+    def _source(self, node: Node) -> Source:
+        return node.source or self.reader.source
 
     def _name(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key

@@ -330,6 +330,7 @@ class Spec:
     simulation: Simulation | None = None
     hardware: Hardware | None = None
     disturbance: Disturbance | None = None
+    settings: tuple[tuple[str, str], ...] = ()  # keys set by the command line, with their texts
     locations: Places = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:

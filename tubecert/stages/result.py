@@ -88,7 +88,7 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         formulas=options.formulas,
         spec=_source(spec),
         claim=claim_data(spec, period_of(spec)),
-        overrides=_overrides(options),
+        overrides=_overrides(spec, options),
         effort=Work(gap=options.gap, budget=options.budget),
         plan=_plan(reached),
         safe_set=dict(zip(spec.states, spec.safe_set, strict=True)),
@@ -134,13 +134,14 @@ def _source(spec: Spec) -> Source:
     )
 
 
-def _overrides(options: Options) -> Overrides:
+def _overrides(spec: Spec, options: Options) -> Overrides:
     return Overrides(
         rho_a=options.rho_a,
         epsilon=options.epsilon,
         bandwidth=options.bandwidth,
         adaptation_rate=options.adaptation_rate,
         metric=None if options.metric is None else visible(options.metric.name),
+        settings=dict(spec.settings),
     )
 
 
