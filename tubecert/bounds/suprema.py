@@ -22,7 +22,7 @@ from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
-from tubecert.enclosure.pencil import Pencil, SumOfPencils
+from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
 from tubecert.expression import (
     ONE,
     ZERO,
@@ -184,6 +184,11 @@ class Suprema:
         if self.model.h is None:
             raise ValueError("h is declared by bounds, not by expressions")
         return self.model.h
+
+    def range_of(self, name: str, e: Expression) -> tuple[float, float]:
+        """Bounds of an expression over the tube, from below and from above."""
+        most, least = (self._over_tube(name, scalar(end)).above for end in (e, -e))
+        return -least, most
 
     # -- feedback ----------------------------------------------------------------------------------------------
 

@@ -1,0 +1,422 @@
+"""The constants that certificate H needs beside those of A, B and C: what time, delay and noise cost.
+
+In: a tube, what is asked of the hardware, and the constants of B. Out: `HardwareConstants`, each an enclosure, and the
+set that the estimate is clipped to. All are in the coordinates z = S x of the tube, noise n is given in x. With W = L'L
+it is Theta = L^-T and F~ = L^-T F L^-1. Trusted: yes. Implements: theory 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+from itertools import product as choices
+
+import numpy as np
+
+from tubecert.bounds.constants import BoundConstants, Constant, Meaning
+from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.coordinates import Coordinates
+from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.constant import decimal_above
+from tubecert.enclosure.domain import BoxDomain
+from tubecert.enclosure.interval import Interval, sqrt
+from tubecert.enclosure.metric_norm import MetricNorm
+from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.pencil import Pencil, SumOfPencils
+from tubecert.expression import ZERO, derivatives
+from tubecert.expression.matrix import (
+    Matrix,
+    adjugate,
+    column,
+    combine,
+    constants,
+    determinant,
+    identity,
+    jacobian,
+    multiply,
+    transpose,
+)
+from tubecert.metric.geodesic import GeodesicTest
+from tubecert.model import TIME, divide
+from tubecert.spec import Hardware, Knots
+
+Box = tuple[tuple[Fraction, Fraction], ...]
+
+
+def _of(symbol: str, unit: str, words: str) -> dict[str, Meaning]:
+    return {"meaning": Meaning(symbol=symbol, equation="theory 8", unit=unit, words=words, number=symbol)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareConstants:
+    """Every constant of certificate H that A, B and C do not have, each an enclosure; None where it does not apply.
+
+    One unit of noise is |n| <= 1, or |n_i| <= what is given for state i.
+    """
+
+    feedback_slope: Constant = field(metadata=_of("D_F", "1/s", "sup |F~|, both signs of its eigenvalues"))
+    feedback_curvature: Constant = field(
+        metadata=_of("D_Fx", "1/(x s)", "how much F~ changes per distance that a geodesic is moved")
+    )
+    plan_tilt: Constant = field(
+        metadata=_of(
+            "D_cx", "1/(u s)", "how much B'M changes per distance that the plan moves, in the metric"
+        )
+    )
+    plan_speed: Constant = field(metadata=_of("Ystar", "x/s", "sup |x*'|"))
+    drift_difference: Constant = field(
+        metadata=_of("phi_rel", "x/s", "sup |f + B u* at x, less the same at x*|")
+    )
+    drift_difference_metric: Constant | None = field(
+        metadata=_of("phi_relM", "d/s", "sup |Theta (f(x) - f(x*))|, for constant M and B")
+    )
+    drift_slope_metric: Constant | None = field(
+        metadata=_of("D_A", "1/s", "sup |Theta f_x Theta^-1|, for constant M and B")
+    )
+    drift_explained: Constant = field(
+        metadata=_of("D_pf", "u/x", "sup |B^+ f_x|: how the drift between two samples enters the estimate")
+    )
+    noise_size: Constant = field(metadata=_of("n_E", "x", "size of one unit of noise"))
+    noise_metric: Constant = field(metadata=_of("n_M", "d", "sup |Theta n| over one unit of noise"))
+    noise_explained: Constant = field(metadata=_of("n_B", "u s", "sup |B^+ n| over one unit of noise"))
+    input_rate: Constant | None = field(
+        metadata=_of("Lus", "u/s", "Lipschitz constant of u*, if u* is held from sample to sample")
+    )
+    symbols: Constant = field(metadata=_of("G", "1/x", "sup of the norm of the Christoffel symbols"))
+    symbols_slope: Constant = field(metadata=_of("L_G", "1/x^2", "sup of the norm of their derivatives"))
+
+    def printable(self) -> HardwareConstants:
+        """The same with every enclosure widened to printable bounds."""
+        return replace(self, **{name: value.printable() for name, value, _ in self.items()})
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of every constant that applies, in the order of the table."""
+        return [(name, value, TABLE[name]) for name in TABLE if (value := getattr(self, name)) is not None]
+
+
+TABLE: dict[str, Meaning] = {item.name: item.metadata["meaning"] for item in fields(HardwareConstants)}
+
+
+def hardware_constants(
+    suprema: Suprema, machine: Hardware, geodesics: GeodesicTest, known: BoundConstants
+) -> HardwareConstants:
+    """The constants of certificate H over the tube of `suprema`, whose other constants are `known`."""
+    search = HardwareSuprema(**{item.name: getattr(suprema, item.name) for item in fields(Suprema)})
+    noise = machine.noise if isinstance(machine.noise, tuple) else None
+    return HardwareConstants(
+        feedback_slope=search.feedback_slope(),
+        feedback_curvature=search.feedback_curvature(),
+        plan_tilt=search.plan_tilt(),
+        plan_speed=search.plan_speed(known.plan_defect),
+        drift_difference=search.drift_difference(),
+        drift_difference_metric=search.drift_difference_metric(known.upper),
+        drift_slope_metric=search.drift_slope_metric(),
+        drift_explained=search.drift_explained(known),
+        noise_size=search.noise_size(noise),
+        noise_metric=search.noise_metric(noise),
+        noise_explained=search.noise_explained(noise),
+        input_rate=search.input_rate() if machine.held else None,
+        symbols=geodesics.symbols,
+        symbols_slope=geodesics.slope or Constant(below=0.0, above=np.inf),
+    ).printable()
+
+
+@dataclass(frozen=True)
+class HardwareSuprema(Suprema):
+    """The suprema of a model over the tube that only certificate H needs."""
+
+    @property
+    def flat(self) -> bool:
+        """Whether the metric and B are constant."""
+        return self._white is not None and self.model.constant_input
+
+    @cached_property
+    def _white(self) -> Whitened | None:
+        """Coordinates in which a constant metric is the identity; None if it is not constant."""
+        return whitened(self.model.W)
+
+    @property
+    def _written(self) -> bool:
+        """Whether x* and u* are expressions of t: not through knots, nor anywhere in boxes."""
+        return self.plan.spans is None and self.plan.knots is None and self.plan.allowance is None
+
+    # -- feedback ----------------------------------------------------------------------------------------------
+
+    def feedback_slope(self) -> Constant:
+        """D_F = sup |F~|: the largest |eigenvalue| of the pencil (F, W)."""
+        return self._constant(
+            self._over_tube("feedback_slope", SumOfPencils([self.model.F], self.model.W), self._fine)
+        )
+
+    def feedback_curvature(self) -> Constant:
+        """D_Fx >= sup over |v| = 1 of |eigenvalue| of (T_v, W), T_v = F_v - W_v M F - F M W_v."""
+        slopes = self.fields.slopes(self.model.F)
+        if self._white is None:
+            MF = multiply(_inverse(self.model.W), self.model.F)
+            turned = [multiply(w, MF) for w in self.fields.slopes(self.model.W)]
+            slopes = [
+                combine(1, f, -1, combine(1, w, 1, transpose(w))) for f, w in zip(slopes, turned, strict=True)
+            ]
+        slopes = [slope for slope in slopes if _moves(slope)]
+        if not slopes:
+            return Constant.exactly(0.0)
+        return self._constant(self._over_tube("feedback_curvature", SumOfPencils(slopes, self.model.W)))
+
+    def plan_tilt(self) -> Constant:
+        """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|."""
+        if self.flat or (self.plan.is_constant and self.plan.allowance is None):
+            return Constant.exactly(0.0)
+        W, columns = self.model.W, self.model.columns
+        BM = multiply(columns, _inverse(W))
+        slopes = zip(self.fields.slopes(columns), self.fields.slopes(W), strict=True)
+        blocks = [_block(combine(1, b, -1, multiply(BM, w))) for b, w in slopes]
+        blocks = [self.plan.on(self.model, block) for block in blocks if _moves(block)]
+        if not blocks:
+            return Constant.exactly(0.0)
+        objective = SumOfPencils(
+            blocks, self.plan.on(self.model, _diagonal(identity(len(columns)), W)), fixed=self.plan.fixed
+        )
+        return self._constant(self._search_plan("plan_tilt", objective))
+
+    # -- plan --------------------------------------------------------------------------------------------------
+
+    def plan_speed(self, defect: Constant) -> Constant:
+        """Ystar = sup |x*'|; of plans that are not known, sup |f + B u*| on them and what their defect adds."""
+        if self.plan.allowance is None:
+            slope = self.fields.vector(self.plan.slope)
+            return self._on_plan("plan_speed", SumOfNorms([slope], self.plan.fixed))
+        drift = self.plan.on(self.model, self.fields.drift_on_plan())
+        speed = self._on_plan("plan_speed", SumOfNorms([drift], self.plan.fixed))
+        total = Interval(speed.below, speed.above) + Interval(defect.below, defect.above)
+        return Constant(below=0.0, above=float(total.hi))
+
+    def input_rate(self) -> Constant:
+        """Lus: the Lipschitz constant of u*, infinite where u* may jump."""
+        if self.plan.knots is not None:
+            return _rate_of(self.plan.knots)
+        if self.plan.allowance is not None:
+            held = all(e.is_constant for e in self.plan.u)
+            return Constant.exactly(0.0) if held else Constant(below=0.0, above=np.inf)
+        slope = column(derivatives(self.plan.u, TIME))
+        return self._on_plan("input_rate", SumOfNorms([slope], self.plan.fixed))
+
+    # -- drift -------------------------------------------------------------------------------------------------
+
+    def drift_difference(self) -> Constant:
+        """phi_rel = sup |(f + B u*)(x* + z) - (f + B u*)(x*)|, |z| <= rho.
+
+        At most rho times the Lipschitz constant of f + B u*; where x* is written in t, the difference itself is
+        bounded, too.
+        """
+        drift = self.model.drift_on_plan()
+        by_mean = self._by_mean_value(self._known_inputs(drift))
+        if not self._written:
+            return by_mean
+        name, difference = "drift_difference", self.fields.of_vector(self._from_plan(drift))
+        return _smaller(self.norms(name, [difference]), by_mean)
+
+    def _by_mean_value(self, drift: Matrix) -> Constant:
+        """A bound of |drift(x* + z) - drift(x*)|: rho sup |drift_x|."""
+        by_state = self.fields.of_vector(self.fields.by_state(_jacobian(drift, self.model.states)))
+        slope = self.norms("drift_difference", [by_state])
+        return Constant(below=0.0, above=float((Interval(slope.below, slope.above) * self._reach).hi))
+
+    def drift_difference_metric(self, largest: Constant) -> Constant | None:
+        """phi_relM = sup |Theta (f(x* + z) - f(x*))|, for constant M and B."""
+        slope = self.drift_slope_metric()
+        if self._white is None or slope is None:
+            return None
+        # |Theta z| <= sqrt(A) rho
+        length = sqrt(Interval(largest.below, largest.above)) * self._reach
+        by_mean = Constant(below=0.0, above=float((Interval(0.0, slope.above) * length).hi))
+        if not self._written:
+            return by_mean
+        difference = self._white.vector(self._from_plan(column(self.model.f)))
+        return _smaller(self._white.length(self.norms("drift_difference_metric", [difference])), by_mean)
+
+    def drift_slope_metric(self) -> Constant | None:
+        """D_A = sup |Theta f_x Theta^-1|, for constant M and B."""
+        if self._white is None or not self.flat:
+            return None
+        slope = self._white.map(self.model.f_x)
+        return self._white.norm(self.norms("drift_slope_metric", [slope]))
+
+    def drift_explained(self, known: BoundConstants) -> Constant:
+        """D_pf = sup |B^+ f_x| where B is constant, else DBp Dfx: they are taken at two points."""
+        if self.model.constant_input:
+            return self.norms("drift_explained", [multiply(self.fields.B_pinv, self.fields.f_x)])
+        pinv, f_x = (Interval(c.below, c.above) for c in (known.B_pinv, known.f_x))
+        total = pinv * f_x
+        return Constant(below=max(0.0, float(total.lo)), above=float(total.hi))
+
+    def _from_plan(self, drift: Matrix) -> Matrix:
+        """What a column of x and u* is, less what it is at x*, in states and t."""
+        return combine(1, self._known_inputs(drift), -1, self.plan.on(self.model, drift))
+
+    def _known_inputs(self, drift: Matrix) -> Matrix:
+        """The names of the inputs replaced by u*, where that is written in t."""
+        if not self._written:
+            return drift
+        return substituted(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
+
+    @property
+    def _reach(self) -> Interval:
+        return Interval(self.rho, self.rho)
+
+    # -- noise -------------------------------------------------------------------------------------------------
+
+    def noise_size(self, noise: Sequence[Fraction] | None) -> Constant:
+        """The size in z of one unit of noise."""
+        if noise is None:
+            return self.norms("noise_size", [self.fields.of_vector(identity(len(self.model.states)))])
+        return _largest([self.norms("noise_size", [self.fields.of_vector(n)]) for n in corners(noise)])
+
+    def noise_metric(self, noise: Sequence[Fraction] | None) -> Constant:
+        """n_M = sup |Theta n| over one unit of noise: of a box, at its corners."""
+        if noise is None:
+            return self.greatest_stretch()
+        return _largest(
+            [
+                self._constant(self._over_tube("noise_metric", MetricNorm(n, self.model.W), self._fine))
+                for n in corners(noise)
+            ]
+        )
+
+    def noise_explained(self, noise: Sequence[Fraction] | None) -> Constant:
+        """n_B = sup |B^+ n| over one unit of noise: of a box, at its corners."""
+        pinv = multiply(self.fields.B_pinv, self.fields.of_vector(identity(len(self.model.states))))
+        if noise is None:
+            return self.norms("noise_explained", [pinv])
+        return _largest([self.norms("noise_explained", [multiply(pinv, n)]) for n in corners(noise)])
+
+
+def clip_box(suprema: Suprema) -> Box:
+    """A box of decimals that contains 0 and h over the tube, per input; h is given as expressions."""
+    found = []
+    for name, h in zip(suprema.model.inputs, suprema.h, strict=True):
+        low, high = suprema.range_of(f"h of {name}", h)
+        found.append((-_decimal(-low), _decimal(high)))
+    return tuple(found)
+
+
+def corners(noise: Sequence[Fraction]) -> list[Matrix]:
+    """The corners of the box |n_i| <= noise_i, each (n, 1), one of every two opposite ones."""
+    moving = [i for i, most in enumerate(noise) if most]
+    found = []
+    for signs in choices((1, -1), repeat=max(0, len(moving) - 1)):
+        corner = list(noise)
+        for i, sign in zip(moving[1:], signs, strict=True):
+            corner[i] *= sign
+        found.append(constants([[value] for value in corner]))
+    return found
+
+
+def _decimal(bound: float) -> Fraction:
+    """The least decimal >= bound and 0."""
+    return decimal_above(Fraction(bound)) if bound > 0 else Fraction(0)
+
+
+def _largest(found: Sequence[Constant]) -> Constant:
+    top = max(found, key=lambda c: c.above)
+    return Constant(below=max(c.below for c in found), above=top.above, at=top.at)
+
+
+def _smaller(direct: Constant, bound: Constant) -> Constant:
+    """An enclosure with the smaller of two bounds from above."""
+    return Constant(below=direct.below, above=min(direct.above, bound.above), at=direct.at)
+
+
+def _rate_of(knots: Knots) -> Constant:
+    """The largest slope of u* through knots; where it is held and not the same throughout, it jumps."""
+    steps = list(pairwise(knots.u))
+    if all(a == b for a, b in steps):
+        return Constant.exactly(0.0)
+    if knots.interpolation == "hold":
+        return Constant(below=0.0, above=np.inf)
+    durations = [b - a for a, b in pairwise(knots.t)]
+    squares = [
+        sum(((q - p) / length) ** 2 for p, q in zip(a, b, strict=True))
+        for (a, b), length in zip(steps, durations, strict=True)
+    ]
+    root = sqrt(Interval.of(max(map(Fraction, squares))))
+    return Constant(below=float(root.lo), above=float(root.hi))
+
+
+# -- a constant metric -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whitened:
+    """Coordinates y = T x in which a constant W is nearly the identity: `least` I <= T W T' <= `most` I."""
+
+    coordinates: Coordinates
+    least: float
+    most: float
+
+    def vector(self, a: Matrix) -> Matrix:
+        """T a."""
+        return multiply(self.coordinates.S, a)
+
+    def map(self, a: Matrix) -> Matrix:
+        """T A T^-1."""
+        return self.vector(multiply(a, self.coordinates.S_inverse))
+
+    def length(self, found: Constant) -> Constant:
+        """|Theta a| from |T a|: M = T'(T W T')^-1 T."""
+        return _scaled(found, 1 / sqrt(Interval(self.least, self.most)))
+
+    def norm(self, found: Constant) -> Constant:
+        """|Theta A Theta^-1| from |T A T^-1|."""
+        root = sqrt(Interval(self.least, self.most))
+        return _scaled(found, root / root)
+
+
+def _scaled(found: Constant, factor: Interval) -> Constant:
+    value = Interval(found.below, found.above) * factor
+    return Constant(below=max(0.0, float(value.lo)), above=float(value.hi), at=found.at)
+
+
+def whitened(W: Matrix) -> Whitened | None:
+    """Such coordinates, if W is a matrix of rational numbers."""
+    if not all(e.is_constant for row in W for e in row):
+        return None
+    factor = np.linalg.inv(np.linalg.cholesky(np.array([[float(e.fraction) for e in row] for row in W])))
+    T = Coordinates(tuple(tuple(Fraction(float(x)) for x in row) for row in factor))
+    scaled = multiply(multiply(T.S, W), transpose(T.S))
+    unit, nowhere = identity(len(W)), BoxDomain({})
+    most = supremum(Pencil(scaled, unit), nowhere, Effort()).above
+    least = -supremum(Pencil([[-e for e in row] for row in scaled], unit), nowhere, Effort()).above
+    return Whitened(coordinates=T, least=least, most=most)
+
+
+# -- matrices --------------------------------------------------------------------------------------------------
+
+
+def _inverse(W: Matrix) -> Matrix:
+    return divide(adjugate(W), determinant(W))
+
+
+def _jacobian(drift: Matrix, states: Sequence[str]) -> Matrix:
+    return jacobian([row[0] for row in drift], states)
+
+
+def _moves(a: Matrix) -> bool:
+    return any(e is not ZERO for row in a for e in row)
+
+
+def _block(c: Matrix) -> Matrix:
+    """[0 C; C' 0]: its largest eigenvalue is the norm of C, (m, n)."""
+    m, n = len(c), len(c[0])
+    return (
+        *((*(ZERO,) * m, *row) for row in c),
+        *((*row, *(ZERO,) * n) for row in transpose(c)),
+    )
+
+
+def _diagonal(a: Matrix, b: Matrix) -> Matrix:
+    """[A 0; 0 B]."""
+    p, q = len(a), len(b)
+    return (*((*row, *(ZERO,) * q) for row in a), *((*(ZERO,) * p, *row) for row in b))
