@@ -6,7 +6,8 @@ constant is a line here, what bounds it (`bounds.compute`), its name in `conditi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import Field, dataclass, field, fields
 from typing import Literal
 
 from tubecert.enclosure.constant import Constant, Witness
@@ -132,10 +133,15 @@ class BoundConstants:
 
     def items(self) -> list[tuple[str, Constant, Meaning]]:
         """`(name, value, meaning)` of every constant, in the order of the table."""
-        return [(item.name, getattr(self, item.name), item.metadata["meaning"]) for item in fields(self)]
+        return [(name, getattr(self, name), meaning) for name, meaning in TABLE.items()]
 
 
-TABLE: dict[str, Meaning] = {item.name: item.metadata["meaning"] for item in fields(BoundConstants)}
+def table_of(constants: Iterable[Field[object]]) -> dict[str, Meaning]:
+    """What each of the fields of a class of constants is."""
+    return {item.name: item.metadata["meaning"] for item in constants}
+
+
+TABLE: dict[str, Meaning] = table_of(fields(BoundConstants))
 
 DERIVED: dict[str, Meaning] = {
     name: Meaning(symbol=symbol, equation=equation, unit=unit, words=words)

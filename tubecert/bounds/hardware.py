@@ -16,7 +16,7 @@ from itertools import product as choices
 
 import numpy as np
 
-from tubecert.bounds.constants import BoundConstants, Constant, Meaning
+from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
 from tubecert.bounds.suprema import Suprema, substituted
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -97,7 +97,7 @@ class HardwareConstants:
         return [(name, value, TABLE[name]) for name in TABLE if (value := getattr(self, name)) is not None]
 
 
-TABLE: dict[str, Meaning] = {item.name: item.metadata["meaning"] for item in fields(HardwareConstants)}
+TABLE: dict[str, Meaning] = table_of(fields(HardwareConstants))
 
 
 def hardware_constants(
