@@ -203,7 +203,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     }
     assert not unmet, "a section that no example file of tests/specs/ok has"
     # their keys are states or inputs
-    box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise"}
+    box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise", "hardware.limits"}
     for (path, kind), known in asked.known.items():
         if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
             continue

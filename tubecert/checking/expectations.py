@@ -8,10 +8,12 @@ from fractions import Fraction
 from math import isfinite
 
 from tubecert.certificate.result import Result
-from tubecert.claims import METRIC_CLAIMS, MetricFound
+from tubecert.claims import METRIC_CLAIMS, MetricFound, Reason
+from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
 from tubecert.kinds import SAMPLED
+from tubecert.pipeline.verification import Verified
 from tubecert.spec import Expectation, Spec
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
@@ -61,6 +63,8 @@ def outcome(result: Result) -> Outcome:
 
 def _numbers(result: Result) -> Iterator[tuple[str, float]]:
     """rho, the least clearance, and the gains of the first certificate that decides; the sample time is that of C."""
+    if result.metric is not None and result.metric.largest_rate is not None:
+        yield from _largest_rate(result.metric.largest_rate)
     if result.tube is not None:
         yield "rho", float(result.tube.rho)
     if result.clearance:
@@ -77,16 +81,33 @@ def _numbers(result: Result) -> Iterator[tuple[str, float]]:
         yield "sample_time", float(gains.sample_time)
 
 
+def _largest_rate(enclosed: Constant) -> Iterator[tuple[str, float]]:
+    """What is proven that the metric supports, if there is a bound."""
+    if isfinite(enclosed.below):
+        yield "largest_rate", enclosed.below
+
+
+def outcome_of_metric(found: Verified) -> Outcome:
+    """What the verification of a metric comes down to."""
+    numbers = () if found.largest_rate is None else tuple(_largest_rate(found.largest_rate))
+    claims = [] if found.reason is None else [_claim(found.reason)]
+    return Outcome(verdict=found.verdict, numbers=numbers, claims=tuple(claims))
+
+
+def _claim(reason: Reason) -> Claim:
+    return Claim(
+        name=title(reason.claim),
+        verdict=reason.verdict,
+        message=message(reason),
+        relax=advice(reason.relax),
+    )
+
+
 def _claims(result: Result) -> Iterator[Claim]:
     """A claim per reason, and one per certificate that has no reason among them."""
     named = {getattr(reason.claim, "section", None) for reason in result.reasons}
     for reason in result.reasons:
-        yield Claim(
-            name=title(reason.claim),
-            verdict=reason.verdict,
-            message=message(reason),
-            relax=advice(reason.relax),
-        )
+        yield _claim(reason)
     of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in result.reasons)
     if result.metric is not None and not of_metric:
         yield Claim(name="metric", verdict=result.metric.verdict)

@@ -42,6 +42,7 @@ class Given:
     gap: str
     budget: str | None
     target: str | None
+    expect: bool
 
 
 def run(given: Given, output: Output) -> ExitCode:
@@ -79,7 +80,24 @@ def run(given: Given, output: Output) -> ExitCode:
         write_stdout(verification.as_json(found))
     elif not output.quiet and (said := verification.summary(found, target)):
         write_stdout(shown.text(said))
+    if given.expect:
+        return _as_locked([case.spec for case in cases], [verified for _, verified in found], terminal)
     return _code([verified for _, verified in found])
+
+
+def _as_locked(specs: Sequence[Spec], found: Sequence[Verified], terminal: Terminal) -> ExitCode:
+    """Certified if every metric is what the section `expect` of its specification says."""
+    from tubecert.checking.expectations import compared, outcome_of_metric
+    from tubecert.report.findings import render
+
+    wrong = [
+        each
+        for spec, verified in zip(specs, found, strict=True)
+        for each in compared(spec, outcome_of_metric(verified))
+    ]
+    if wrong:
+        terminal.show(render(wrong))
+    return ExitCode.NOT_CERTIFIED if wrong else ExitCode.CERTIFIED
 
 
 def _cases(files: Sequence[str], rate: Fraction | None) -> Iterator[Case]:

@@ -14,6 +14,7 @@ Examples:
   tubecert verify plant.yaml
   tubecert verify plant.yaml metric.json other.mat
   tubecert verify published/*.yaml --json
+  tubecert verify configs/published/*.yaml --expect
   tubecert verify plant.yaml coefficients.npz --rate 0.8 -o metric.json
 
 \b
@@ -53,11 +54,17 @@ def verify(
             "--output", "-o", metavar="FILE", help="Write a metric file, if there is one metric and it holds."
         ),
     ] = None,
+    expect: Annotated[
+        bool,
+        typer.Option(
+            "--expect", help="Compare each with the section `expect` of its specification; 0 if all agree."
+        ),
+    ] = False,
     how: Output,
 ) -> None:
     """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
     with guarded(how):
         from tubecert.cli.verify import Given, run
 
-        code = run(Given(files=files, rate=rate, gap=gap, budget=budget, target=output), how)
+        code = run(Given(files=files, rate=rate, gap=gap, budget=budget, target=output, expect=expect), how)
     raise typer.Exit(code)

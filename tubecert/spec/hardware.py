@@ -23,6 +23,7 @@ KEYS: Final = (
     "feedback_rate",
     "predict",
     "bandwidth",
+    "limits",
 )
 LARGEST: Final = "largest"
 ONE_SAMPLE: Final = "one sample"
@@ -80,7 +81,8 @@ def _identity(field: Field, names: Names) -> TermMatrix:
 
 def read_hardware(field: Field | None, disturbance: Field | None, names: Names) -> Hardware | None:
     """The machine; None if the section is absent or unsound. One number of it, or the wind, may be `largest`."""
-    wind = _largest_wind(disturbance)
+    wind = _within(disturbance, "bound")
+    wind = wind if _is(wind, LARGEST) else None
     if field is None:
         if wind is not None:
             wind.fail(
@@ -137,14 +139,21 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     )
 
 
-def _largest_wind(disturbance: Field | None) -> Field | None:
-    """Where the bound of the disturbance is to be the largest, if it is."""
-    if disturbance is None or not isinstance(disturbance.node, MappingNode):
+def limits_of(limits: Field | None, hardware: Field | None) -> Field | None:
+    """Where the limits of the inputs stand: in a section of their own, or in that of the hardware."""
+    own = _within(hardware, "limits")
+    if own is not None and limits is not None:
+        own.fail(
+            codes.RANGE, "hardware.limits beside limits", "they are the same limits: give one of the two"
+        )
+    return limits or own
+
+
+def _within(section: Field | None, name: str) -> Field | None:
+    """The value of a key of a section, if it is there."""
+    if section is None or not isinstance(section.node, MappingNode):
         return None
-    for key, node in disturbance.node.pairs:
-        if key.text == "bound" and isinstance(node, Scalar) and node.text == LARGEST:
-            return disturbance.child(key, node)
-    return None
+    return next((section.child(key, node) for key, node in section.node.pairs if key.text == name), None)
 
 
 def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fraction | None:

@@ -10,7 +10,7 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding, capped
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar, compose
-from tubecert.spec.hardware import read_disturbance, read_hardware
+from tubecert.spec.hardware import limits_of, read_disturbance, read_hardware
 from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
@@ -122,7 +122,7 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
     if entries is None:
         return None
     if alone:
-        entries = {key: entries[key] for key in (*_SYSTEM, "metric") if key in entries}
+        entries = {key: entries[key] for key in (*_SYSTEM, "metric", "expect") if key in entries}
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
@@ -174,7 +174,7 @@ def _read_named(
     kernel, _ = read_kernel(entries.get("conditions"))
     expect = read_expectation(entries.get("expect"), names)
     obstacles = read_obstacles(entries.get("obstacles"), names)
-    limits = read_limits(entries.get("limits"), names)
+    limits = read_limits(limits_of(entries.get("limits"), entries.get("hardware")), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
     hardware = read_hardware(entries.get("hardware"), entries.get("disturbance"), names)
     disturbance = read_disturbance(entries.get("disturbance"), names)

@@ -16,7 +16,7 @@ from tubecert.spec.reader import Field, Reader
 from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
-RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time")
+RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
 
 _SLUG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 

@@ -8,7 +8,7 @@ from tubecert.recheck.specified.numbers import several
 from tubecert.recheck.specified.plant import Plant
 
 IDLE = ("name", "expect", "simulation", "obstacles", "limits")
-_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time")
+_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
 
 
 def read_idle(own: Members, plant: Plant) -> None:
