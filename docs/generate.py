@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -139,6 +140,68 @@ def codes() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def published() -> str:
+    """The page of published metrics, from what `verify` said of them (configs/published/verified.json)."""
+    folder = ROOT / "configs" / "published"
+    known = json.loads((folder / "verified.json").read_text(encoding="utf-8"))
+    count = {word: sum(each["verdict"] == word for each in known) for word in ("certified", "refuted")}
+    parts = [
+        _NOTE,
+        "# Published metrics",
+        "Contraction metrics as their authors published them, every digit, each on the set and at the rate that were "
+        "published with it, and what is proven of each with true sine and cosine: C1 (W is positive definite), C2 and "
+        f"C3 hold for {count['certified']} of {len(known)}; {count['refuted']} are refuted, each at a point of its set "
+        "that a test evaluates again with 50 digits (tests/metric/test_published.py). One of these fails C3 in its "
+        "strong form only, which tubecert asks for: its authors ask for a weaker one. *Supports* is the largest rate "
+        "for which C2 is proven on that set.",
+        "```console\ntubecert verify configs/published/*.yaml --json > configs/published/verified.json\n```",
+        "The command takes a few minutes; `tubecert verify configs/published/*.yaml --expect` compares with what the "
+        "files lock.",
+        "| metric | published | proven | supports, 1/s | condition number | refuted at |\n|---|---|---|---|---|---|\n"
+        + "\n".join(_published_row(folder, each) for each in known),
+        "## Sources",
+        "\n".join(f"- {source}" for source in _sources(folder, known)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _published_row(folder: Path, each: dict[str, Any]) -> str:
+    notes = _notes(folder / Path(each["file"]).name)
+    rate, at = each.get("largest_rate"), each.get("reason", {}).get("at")
+    condition = each.get("condition_number")
+    where = (
+        ""
+        if at is None
+        else ", ".join(f"{name} = {value:.6g}" for name, value in zip(each["safe_set"], at["x"], strict=True))
+    )
+    failed = "" if each["verdict"] == "certified" else f": {_FAILS[each['reason']['claim']]}"
+    cells = [
+        f"`{Path(each['file']).stem}`",
+        notes["published"].split(";")[0],
+        each["verdict"] + failed,
+        "" if rate is None else f"{rate[0]:.6g}" if rate[0] > 0 else "none above 0",
+        "" if condition is None else f"{condition[1]:.4g}",
+        where,
+    ]
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+_FAILS = {"metric_definite": "C1", "metric_contraction": "C2", "metric_killing": "C3 in its strong form"}
+
+
+def _notes(path: Path) -> dict[str, str]:
+    """The comments at the head of a file: `# key: words`."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return dict(line[2:].split(": ", 1) for line in lines if line.startswith("# "))
+
+
+def _sources(folder: Path, known: list[dict[str, Any]]) -> list[str]:
+    """Every source once, without the number of a metric of a series."""
+    found = [_notes(folder / Path(each["file"]).name) for each in known]
+    told = [f"{n['source']} ({n['published']})" for n in found]
+    return list(dict.fromkeys(re.sub(r"cached metric \d+", "cached metrics (ged_..)", text) for text in told))
+
+
 def everything() -> dict[str, str]:
     """The text of every page by its file name."""
     schemas = {"specification": "spec", "metric": "metric", "certificate": "certificate"}
@@ -146,7 +209,7 @@ def everything() -> dict[str, str]:
     for name, short in schemas.items():
         path = ROOT / "tubecert" / "schemas" / f"{short}.schema.json"
         made[f"{name}.md"] = Reference(json.loads(path.read_text(encoding="utf-8"))).page()
-    return {**made, "codes.md": codes()}
+    return {**made, "codes.md": codes(), "published.md": published()}
 
 
 def main() -> None:
