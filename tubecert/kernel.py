@@ -5,7 +5,7 @@ holds, and held: `check` is its only maker. Who proposed the recipe does not mat
 proofs, here; nothing else may say "certified" (tests/house/test_trust.py).
 
 In: a `TubeProblem` and recipes from anywhere. Out: proofs, or what is missing. Trusted: yes, and it imports nothing
-that is not. Implements: theorems 0, A (26a)-(26c), B and C by what `THEOREMS` lists.
+that is not. Implements: theorems 0, A (26a)-(26c), B, C and H by what `THEOREMS` lists.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final, Generic, NoReturn
 
 import numpy as np
 
-from tubecert.conditions import alone, distance, rates, sampled
+from tubecert.conditions import alone, distance, hardware, rates, sampled
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
@@ -25,7 +25,8 @@ from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbou
 from tubecert.enclosure.interval import Interval
 
 THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
-    theorem.recipe: theorem for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM, sampled.THEOREM)
+    theorem.recipe: theorem
+    for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM, sampled.THEOREM, hardware.THEOREM)
 }
 
 
@@ -177,13 +178,16 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
 
 
 def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Proposal[R]:
-    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed."""
+    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed.
+
+    A curve is about other loops: what the theorem is stated for.
+    """
 
     def kept(recipe: R | None) -> R | None:
         return recipe if recipe is not None and theorem.is_about(problem, recipe) else None
 
     def those(recipes: Iterable[R]) -> tuple[R, ...]:
-        return tuple(recipe for recipe in recipes if theorem.is_about(problem, recipe))
+        return tuple(recipe for recipe in recipes if theorem.states(problem, recipe))
 
     return replace(
         proposal,

@@ -8,7 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["ADAPTIVE", "ALL", "ALONE", "DISTANCE", "NAMES", "RATES", "SAMPLED", "Name", "name_of", "words_of"]
+__all__ = [
+    "ADAPTIVE",
+    "ALL",
+    "ALONE",
+    "DISTANCE",
+    "HARDWARE",
+    "NAMES",
+    "RATES",
+    "SAMPLED",
+    "Name",
+    "name_of",
+    "words_of",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,8 +44,9 @@ ALONE: Final = Name(key="no_adaptation", option="none", letter="0", title="no ad
 RATES: Final = Name(key="conditions_26", option="26", letter="A", title="(26)")
 DISTANCE: Final = Name(key="distance", option="distance", letter="B", title="distance")
 SAMPLED: Final = Name(key="sampled", option="sampled", letter="C", title="sampled")
+HARDWARE: Final = Name(key="hardware", option="hardware", letter="H", title="hardware")
 
-NAMES: Final = (ALONE, RATES, DISTANCE, SAMPLED)
+NAMES: Final = (ALONE, RATES, DISTANCE, SAMPLED, HARDWARE)
 ADAPTIVE: Final = tuple(name for name in NAMES if name.adapts)
 ALL: Final = "all"
 

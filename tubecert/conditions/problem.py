@@ -19,6 +19,7 @@ from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions.arithmetic import Array, T
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.kernels import Kernel
+from tubecert.conditions.machine import Machine
 from tubecert.conditions.predictor import Matrix, damping, scalar_gain
 from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
@@ -66,6 +67,7 @@ class Numbers(Generic[T]):
     phi: T
     d0: T
     delta: T
+    delta_p: T  # the plan defect in |.| (certificate H only)
     smin: T  # inf of the smallest singular value of Theta B (as printed only)
     excess: T  # sup lmax(F~) (as printed only)
     H0: T
@@ -109,6 +111,7 @@ class TubeProblem:
     kernel: Kernel | None = None
     drift: Drift = Drift.PLAN
     filter_factor: int = 2
+    machine: Machine | None = None
 
     def __post_init__(self) -> None:
         if min(self.rate, self.rho_a, self.epsilon) <= 0:

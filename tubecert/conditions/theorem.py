@@ -29,7 +29,9 @@ class Recipe(Protocol):
 
 R = TypeVar("R", bound=Recipe)
 
-_AUXILIARY = ("speed", "prediction_error", "uncertainty")  # bounds, which may be 0; all else are gains
+def _any(problem: TubeProblem, recipe: object) -> bool:
+    del problem, recipe
+    return True
 
 
 def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
@@ -46,7 +48,8 @@ class Theorem(Generic[R]):
     overcome. `provisos`: why the formulas that the problem asks for prove nothing, if so. `formula`: everything that
     the margins contain, in floats at some gains, to record which constants it needs. `ultimate`: |x - x*| is at most
     this in the long run, for a recipe that is proven. `own_predictor`: where a general matrix A_m is asked for, the
-    theorem is about -g I with a gain of its own.
+    theorem is about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
+    what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any.
     """
 
     recipe: type[R]
@@ -57,9 +60,16 @@ class Theorem(Generic[R]):
     provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     ultimate: Callable[[TubeProblem, R], float] | None = None
     own_predictor: bool = False
+    sizes: tuple[str, ...] = ("speed", "prediction_error", "uncertainty")
+    optional: tuple[str, ...] = ()
+    about: Callable[[TubeProblem, R], bool] = _any
 
     def is_about(self, problem: TubeProblem, recipe: object) -> bool:
-        """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its predictor.
+        """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its numbers."""
+        return self.states(problem, recipe) and self.about(problem, cast("R", recipe))
+
+    def states(self, problem: TubeProblem, recipe: object) -> bool:
+        """Whether the theorem is stated for a recipe: its kind, its signs, its predictor.
 
         The theorems are stated for positive gains; a negative g would make q = 2 g, and with it the bound of the
         prediction error, smaller than it is.
@@ -68,11 +78,9 @@ class Theorem(Generic[R]):
             return False
         numbers = {item.name: getattr(recipe, item.name) for item in fields(self.recipe)}
         predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
-        sizes = [value for name, value in numbers.items() if name in _AUXILIARY]
-        gains = [
-            *(value for name, value in numbers.items() if name not in _AUXILIARY),
-            *([] if g is None else [g]),
-        ]
+        known = {name: x for name, x in numbers.items() if not (x is None and name in self.optional)}
+        gains = [*(x for name, x in known.items() if name not in self.sizes), *([] if g is None else [g])]
+        sizes = [x for name, x in known.items() if name in self.sizes]
         signed = all(isinstance(x, Fraction) and x > 0 for x in gains) and all(
             isinstance(x, Fraction) and x >= 0 for x in sizes
         )

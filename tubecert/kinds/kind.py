@@ -84,6 +84,11 @@ class Kind(ABC, Generic[R]):
         """The name of its section in a certificate."""
         return self.name.key
 
+    def applies(self, problem: TubeProblem) -> bool:
+        """Whether the kind says anything of a problem: if not, certificates have no section of it."""
+        del problem
+        return True
+
     @abstractmethod
     def section(self, problem: TubeProblem, proposal: Proposal[R]) -> Section[R]:
         """The section about what a search proposes."""

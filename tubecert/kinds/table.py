@@ -8,11 +8,12 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.kinds import name_of
 from tubecert.kinds.alone import Alone
 from tubecert.kinds.distance import Distance
+from tubecert.kinds.hardware import Hardware
 from tubecert.kinds.kind import Kind
 from tubecert.kinds.rates import Rates
 from tubecert.kinds.sampled import Sampled
 
-KINDS: Final[tuple[Kind[Any], ...]] = (Alone(), Rates(), Distance(), Sampled())
+KINDS: Final[tuple[Kind[Any], ...]] = (Alone(), Rates(), Distance(), Sampled(), Hardware())
 
 
 def kind_of(word: str) -> Kind[Any]:
@@ -21,6 +22,12 @@ def kind_of(word: str) -> Kind[Any]:
     return next(kind for kind in KINDS if kind.name == name)
 
 
+def kinds_of(problem: TubeProblem) -> tuple[Kind[Any], ...]:
+    """The kinds that say anything of a problem."""
+    return tuple(kind for kind in KINDS if kind.applies(problem))
+
+
 def needed_by_all(problem: TubeProblem) -> frozenset[str]:
     """The constants without which no kind with adaptation can say anything, by field name."""
-    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in KINDS if kind.name.adapts))
+    adaptive = [kind for kind in kinds_of(problem) if kind.name.adapts]
+    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in adaptive))

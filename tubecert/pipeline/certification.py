@@ -16,7 +16,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
-from tubecert.kinds.table import KINDS
+from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.reasons import obstacle_reasons, reasons
 from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
@@ -106,7 +106,7 @@ def explain(judged: Judged) -> Explanation:
     problem, printed = judged.bounded.problem, [RATES.key] if judged.as_printed else []
     explained = {
         kind.key: PROPOSERS[kind.theorem.recipe].explain(problem, _least(judged.sections[kind.key]))
-        for kind in KINDS
+        for kind in kinds_of(problem)
     }
     told = [
         reason

@@ -9,12 +9,14 @@ from typing import Any, Final
 
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe
 from tubecert.conditions.sampled import SampledRecipe
 from tubecert.search.distance import propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
+from tubecert.search.hardware import propose_hardware
 from tubecert.search.rates import propose_rates
 from tubecert.search.sampled import propose_sampled
 
@@ -53,4 +55,5 @@ PROPOSERS: Final[Mapping[type, Proposer]] = {
     RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
     DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
     SampledRecipe: Proposer(propose=propose_sampled),
+    HardwareRecipe: Proposer(propose=propose_hardware),
 }

@@ -13,8 +13,8 @@ from tubecert.enclosure.constant import Constant
 from tubecert.kernel import overall
 from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
-from tubecert.kinds.table import KINDS, kind_of
-from tubecert.letters import ALL
+from tubecert.kinds.table import KINDS, kind_of, kinds_of
+from tubecert.letters import ALL, HARDWARE
 from tubecert.stages.bounded import Bounded
 from tubecert.stages.question import Question
 from tubecert.verdict import Verdict
@@ -54,7 +54,7 @@ class Judged:
         """Constants at the gains found, that the certificate lists beside those of the tube."""
         return {
             name: (value.printable(), DERIVED[name])
-            for kind in KINDS
+            for kind in kinds_of(self.bounded.problem)
             for name, value in kind.derived(self.sections[kind.key]).items()
         }
 
@@ -63,7 +63,8 @@ def deciding(question: Question) -> tuple[str, ...]:
     """The kinds that decide a question, by key."""
     chosen = question.options.conditions or question.spec.decides or RATES.option
     if chosen == ALL:
-        return tuple(kind.key for kind in KINDS if kind.name.adapts)
+        given = question.spec.hardware is not None
+        return tuple(kind.key for kind in KINDS if kind.name.adapts and (given or kind.name is not HARDWARE))
     return (kind_of(chosen).key,)
 
 
@@ -71,6 +72,6 @@ def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judg
     """The sections about what is proposed, by the recipe of each kind."""
     sections = {
         kind.key: kind.section(bounded.problem, proposals.get(kind.theorem.recipe, Proposal()))
-        for kind in KINDS
+        for kind in kinds_of(bounded.problem)
     }
     return Judged(bounded=bounded, sections=sections)

@@ -17,6 +17,8 @@ ROLES: Mapping[Role, str] = {
     "least_bandwidth": "least omega",
     "least_adaptation": "least Gamma",
     "longest_sample": "omega = 1/Ts",
+    "machine": "least tube",
+    "largest": "largest",
 }
 
 # a condition as it is named beside a certificate
@@ -33,6 +35,8 @@ SHOWN: Mapping[str, str] = {
     "no_adaptation": "sup D(t), feedback alone",
     "distance": "sup D(t)",
     "sampled": "sup D(t), sampled",
+    "hardware": "sup D(t), as the machine runs it",
+    "hardware_level": "dhat + n_M",
 }
 
 SAYS: Mapping[str, str] = {
@@ -42,6 +46,8 @@ SAYS: Mapping[str, str] = {
     "no_adaptation": "the feedback alone must keep the distance below dbar",
     "distance": "the distance bound sup D(t) must stay below dbar",
     "sampled": "the distance bound with sampled adaptation must stay below dbar",
+    "hardware": "the distance bound of the sampled and delayed loop must stay below its level dhat",
+    "hardware_level": "the level dhat and the noise must fit into dbar together",
     "initial_distance": "d0, the length of the segment to the start, must be below dbar = sqrt(a) rho",
     "plan_defect": "the plan's defect alone must keep the distance below dbar",
     "corrected_formulas": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",

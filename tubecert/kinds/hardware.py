@@ -1,0 +1,188 @@
+"""Certificate H: the loop as a computer runs it. Implements: theory 8, theorems H and H-P."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.conditions import hardware
+from tubecert.conditions.hardware import LEVEL, STAYS, HardwareRecipe, Told
+from tubecert.conditions.machine import Machine
+from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.proposal import Proposal
+from tubecert.enclosure.constant import Constant, printable_above, printable_below
+from tubecert.enclosure.interval import Interval
+from tubecert.kernel import Checked, judge
+from tubecert.kinds import HARDWARE
+from tubecert.kinds.data import Pair, Role, SectionData, margin_data, missing_data
+from tubecert.kinds.kind import Kind, Section
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareBudget:
+    """What fills the level: shares of lambda dhat, each rounded up; they do not reach 1 together."""
+
+    plan: float
+    feedforward: float
+    wind: float
+    wind_estimate: float
+    bias: float
+    noise_estimate: float
+    lag: float
+    noise_feedback: float
+    sampling: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwarePoint:
+    """A proven point of a curve: the level that a sample time allows."""
+
+    sample_time: Fraction
+    level: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareData(SectionData):
+    """Certificate H: the machine, the level d(x*, x) < `level` that is proven for it, and what follows.
+
+    `deadbeat`: the filter has no bandwidth of its own, the newest estimate is used as it is; `noise` in units of what is
+    given per state, else |n|; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|, `half_widths`
+    |x_i - x_i*|, `inputs` every input; `margin` is that of (H.12), `level_margin` that of (H.10).
+    """
+
+    name = HARDWARE
+    sample_time: Fraction | None
+    delay: Fraction | None
+    feedback_time: Fraction | None
+    bandwidth: Fraction | None
+    deadbeat: bool
+    noise: Fraction | None
+    wind: Fraction | None
+    predict: bool
+    clip: tuple[tuple[Fraction, Fraction], ...]
+    clip_radius: Fraction | None
+    level: Fraction | None
+    radius: float | None
+    half_widths: Mapping[str, float]
+    inputs: Mapping[str, tuple[float, float]]
+    margin: Constant | None
+    level_margin: Constant | None
+    budget: HardwareBudget | None
+    curve: tuple[HardwarePoint, ...]
+    largest: str | None = None
+
+    def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
+        """The one machine."""
+        del asked
+        if self.sample_time is None or self.margin is None or self.level_margin is None:
+            return ()
+        role: Role = "machine" if self.largest is None else "largest"
+        margins = {STAYS: self.margin, LEVEL: self.level_margin}
+        return (Pair(role=role, bandwidth=self.bandwidth, sample_time=self.sample_time, margins=margins),)
+
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Sample time and level."""
+        return tuple((float(p.sample_time), float(p.level)) for p in self.curve)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareSection(Section[HardwareRecipe]):
+    """The machine that was asked for, or the largest that serves, with the least level found for it."""
+
+    name = HARDWARE
+    machine: Machine
+    told: Told | None
+
+    def data(self) -> HardwareData:
+        """The section `hardware` of the certificate."""
+        found, proof = self.decisive, self.proof
+        r = None if found is None else found.recipe
+        known = None if proof is None else self.told
+        return HardwareData(
+            verdict=self.verdict,
+            sample_time=None if r is None else r.sample_time,
+            delay=None if r is None else r.delay,
+            feedback_time=None if r is None else r.feedback_time,
+            bandwidth=None if r is None else r.bandwidth,
+            deadbeat=r is not None and r.bandwidth is None,
+            noise=None if r is None else r.noise,
+            wind=None if r is None else r.wind,
+            predict=self.machine.asked.predict,
+            clip=self.machine.clip,
+            clip_radius=None if r is None else r.clip_radius,
+            level=None if r is None else r.level,
+            radius=None if known is None else printable_above(known.radius),
+            half_widths={} if r is None or known is None else self._half_widths(r),
+            inputs={} if r is None or known is None else self._inputs(r, known),
+            margin=_margin(found, STAYS),
+            level_margin=_margin(found, LEVEL),
+            ultimate_radius=self.judgement.ultimate_radius,
+            budget=None if known is None else _budget(known),
+            curve=tuple(HardwarePoint(sample_time=r.sample_time, level=r.level) for r in self.curve),
+            largest=self.machine.asked.largest,
+            shortfalls=missing_data(self.shortfalls),
+        )
+
+    def _half_widths(self, recipe: HardwareRecipe) -> Mapping[str, float]:
+        """|x_i - x_i*| < dhat sup sqrt(W_ii)."""
+        level = Interval.of(recipe.level)
+        return {
+            name: printable_above(float((Interval.exact(width) * level).hi))
+            for name, width in self.machine.widths.items()
+        }
+
+    def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
+        """What every input does: u*, the feedback, and the clip with its other sign."""
+        R, feedback = recipe.clip_radius, Fraction(known.feedback)
+        clip = self.machine.clip or tuple((-R, R) for _ in self.machine.inputs)
+        return {
+            name: (
+                printable_below(Fraction(low) - feedback - most),
+                printable_above(Fraction(high) + feedback - least),
+            )
+            for (name, (low, high)), (least, most) in zip(self.machine.inputs.items(), clip, strict=True)
+        }
+
+
+def _margin(found: Checked[HardwareRecipe] | None, condition: str) -> Constant | None:
+    return None if found is None else margin_data(found.margins[condition])
+
+
+def _budget(known: Told) -> HardwareBudget:
+    b = known.budget
+    return HardwareBudget(
+        plan=printable_above(b.plan),
+        feedforward=printable_above(b.feedforward),
+        wind=printable_above(b.wind),
+        wind_estimate=printable_above(b.wind_estimate),
+        bias=printable_above(b.bias),
+        noise_estimate=printable_above(b.noise_estimate),
+        lag=printable_above(b.lag),
+        noise_feedback=printable_above(b.noise_feedback),
+        sampling=printable_above(b.sampling),
+    )
+
+
+class Hardware(Kind[HardwareRecipe]):
+    """Certificate H."""
+
+    name = HARDWARE
+    theorem = hardware.THEOREM
+    form = HardwareData
+
+    def applies(self, problem: TubeProblem) -> bool:
+        """Whether the specification says what the hardware is."""
+        return problem.machine is not None
+
+    def section(self, problem: TubeProblem, proposal: Proposal[HardwareRecipe]) -> HardwareSection:
+        """The section about a proposal; `ValueError` where it does not apply."""
+        if problem.machine is None:
+            raise ValueError("the specification says nothing of the hardware")
+        judgement = judge(problem, self.theorem, proposal)
+        proof = judgement.proof
+        return HardwareSection(
+            judgement=judgement,
+            machine=problem.machine,
+            told=None if proof is None else hardware.told(problem, proof.recipe),
+        )

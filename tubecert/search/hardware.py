@@ -1,0 +1,349 @@
+"""Search of certificate H: the least level at a machine, and the largest sample time, delay, noise or wind.
+
+In floats, many machines at once: each is a lane. Over (dhat, omega, f0) there is a valley - bias s1/omega against noise
+omega - so that a coarse grid starts and zooms follow. Round first, then verify the printed decimals: the exact theorem
+is not monotone in Ts. Implements: theory section 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.conditions import hardware as theorem_h
+from tubecert.conditions import machine as machines
+from tubecert.conditions.arithmetic import Array, quiet
+from tubecert.conditions.decimals import round_down, round_up
+from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant
+from tubecert.conditions.machine import Machine
+from tubecert.conditions.obstacles import reach
+from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.kernel import obstacles
+from tubecert.search.scan import boundary_log, largest, serves
+
+DIGITS = 4
+_ROOM = 9  # digits of what only the proof needs
+_DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
+_STEPS = 9  # of the fixed point of Y, S, N, np; a search needs no more, and what is printed is verified
+_ZOOMS = 12
+_CURVE_POINTS = 13
+
+Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lanes:
+    """Machines, one per lane: all arrays have one shape; `omega` NaN where it is to be found."""
+
+    Ts: Array
+    tau: Array
+    Tf: Array
+    nu: Array
+    wbar: Array
+    omega: Array
+
+    def __getitem__(self, index: object) -> Lanes:
+        """Some of the lanes, or the same with axes added."""
+        return Lanes(**{name: getattr(self, name)[index] for name in Lanes.__slots__})
+
+    @property
+    def possible(self) -> Mask:
+        """Whether a machine is one at all."""
+        return np.asarray(self.tau <= self.Ts * (1 + 1e-12))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What is free at a machine, per lane."""
+
+    dhat: Array
+    omega: Array
+    f0: Array
+
+
+class Search:
+    """Theorem H in floats, over one problem."""
+
+    def __init__(self, problem: TubeProblem, machine: Machine) -> None:
+        self.problem = problem
+        self.machine = machine
+        self.R = machine.clip_radius(problem.constants.h)
+        exact = theorem_h.plant(problem, self.R)
+        self.plant = Plant(
+            n=problem.floats(self.R),
+            m=machines.floats(exact.m),
+            beta_w=exact.beta_w.hi,
+            D_E=exact.D_E.hi,
+            eps_w=exact.eps_w.hi,
+            rest=exact.rest.hi,
+            held=exact.held,
+            drift=None if exact.drift is None else exact.drift.hi,
+        )
+        self.dbar = float(reach(self.plant.n))
+        self.rate = float(self.plant.n.lam)
+
+    # -- what a choice needs
+
+    @quiet
+    def settled(self, at: Lanes, chosen: Choice) -> Loop[Array]:
+        """The loop with Y, S, N and np from above: each step keeps what the theorem asks for, but for rounding."""
+        zero = np.zeros(np.broadcast_shapes(at.Ts.shape, chosen.dhat.shape))
+        ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
+        predicts = self.machine.asked.predict
+        loop = Loop(
+            Ts=at.Ts + zero,
+            tau=at.tau + zero,
+            Tf=at.Tf + zero,
+            omega=chosen.omega + zero,
+            nu=at.nu + zero,
+            wbar=at.wbar + zero,
+            dhat=chosen.dhat + zero,
+            f0=chosen.f0 + zero,
+            Y=zero,
+            S=zero + np.inf,
+            N=zero,
+            np=zero if predicts else None,
+            late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
+            off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
+        )
+        for step in range(_STEPS):
+            e = theorem_h.estimate(self.plant, loop)
+            loop = replace(
+                loop, Y=e.speed, np=e.prediction, S=loop.S if step == 0 else e.bias, N=loop.N if step == 0 else e.ripple
+            )
+        e = theorem_h.estimate(self.plant, loop)
+        return replace(loop, S=e.bias, N=e.ripple, np=e.prediction)
+
+    @quiet
+    def needed(self, at: Lanes, chosen: Choice) -> Array:
+        """What dhat has to exceed, over dhat, and what dbar has to, over dbar: below 1 where the theorem holds."""
+        x = theorem_h.evaluated(self.plant, self.settled(at, chosen))
+        stays = x.course.supremum() / x.loop.dhat
+        fits = (x.loop.dhat + x.estimate.n_fb) / self.dbar
+        worst = np.maximum(stays, fits)
+        good = np.isfinite(worst) & (x.loss.chi > 0) & at.possible
+        return np.where(good, worst, np.inf)
+
+    # -- minima over what is free
+
+    def _omegas(self, at: Lanes, share: Array) -> Array:
+        """From lambda/4 to no filter, in logarithms of omega, at a share in [0, 1]; what is asked for where it is."""
+        low, high = np.log(self.rate / 4), np.log(_DEADBEAT / at.Ts)
+        return np.where(np.isnan(at.omega), np.exp(low + (high - low) * share), at.omega)
+
+    def least(self, at: Lanes, dhat: Array | None = None) -> tuple[Array, Choice]:
+        """The least `needed` per lane with a choice that has it; at a given dhat, or over dhat too. Lanes have one axis."""
+        top = np.maximum(self.dbar - at.nu * float(self.plant.m.n_M), 1e-9 * self.dbar)
+        free = dhat is None
+
+        def chosen(point: Array) -> Choice:
+            level = top[:, None] * np.exp(-9 * point[0]) if dhat is None else np.broadcast_to(dhat[:, None], point[0].shape)
+            return Choice(dhat=level, omega=self._omegas(at[:, None], point[1]), f0=level * np.exp(-14 * point[2]))
+
+        counts = (7 if free else 1, 13, 9)
+        axes = [(np.arange(k) + 0.5) / k if k > 1 else np.array([0.0]) for k in counts]
+        axes[1][-1] = 1.0
+        axes[0] = axes[0] - axes[0][0]
+        start = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])
+        lanes = np.arange(len(at.Ts))
+        points = np.repeat(start[:, None, :], len(lanes), axis=1)
+        steps = np.array([0.5 / k for k in counts])
+        best: Array = np.full(len(lanes), np.inf)
+        place = np.zeros((3, len(lanes)))
+        for _ in range(_ZOOMS):
+            values = self.needed(at[:, None], chosen(points))
+            index = np.argmin(values, axis=1)
+            better = values[lanes, index] < best
+            best = np.where(better, values[lanes, index], best)
+            place = np.where(better, points[:, lanes, index], place)
+            around = _AROUND_3 if free else _AROUND_2
+            points = np.clip(place[:, :, None] + (steps[:, None] * around)[:, None, :], 0.0, 1.0)
+            steps = steps * 0.6
+        found = chosen(place[:, :, None])
+        return best, Choice(dhat=found.dhat[:, 0], omega=found.omega[:, 0], f0=found.f0[:, 0])
+
+    def level(self, at: Lanes) -> Choice | None:
+        """The least level of one machine, with its choice; None if none was found."""
+        low = float(max(self.plant.n.d0, 1e-6 * self.dbar))
+        grid = np.geomspace(low, self.dbar, 48)
+        holds = self._holds(at, grid)
+        if not holds.any():
+            best, choice = self.least(at)
+            return choice if best[0] < 1 else None
+        first = int(np.argmax(holds))
+        dhat = grid[[first]]
+        if first > 0:
+            dhat = boundary_log(
+                lambda x: self._holds(at, x.ravel()).reshape(x.shape), grid[[first]], grid[[first - 1]], rounds=4
+            )
+        _, choice = self.least(at, dhat)
+        return choice
+
+    def _holds(self, at: Lanes, dhat: Array) -> Mask:
+        """Whether the theorem holds at levels, for one machine."""
+        best, _ = self.least(at[np.zeros(len(dhat), dtype=int)], dhat)
+        return np.asarray(best < 1)
+
+
+def _around(free: tuple[bool, ...]) -> Array:
+    """Steps of a zoom: -1, 0, 1 in each direction that is free, shape (directions, points)."""
+    ways = [np.array([-1.0, 0.0, 1.0]) if each else np.array([0.0]) for each in free]
+    return np.stack([a.ravel() for a in np.meshgrid(*ways, indexing="ij")])
+
+
+_AROUND_3, _AROUND_2 = _around((True, True, True)), _around((False, True, True))
+
+
+# -- machines
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """A machine in exact numbers; `bandwidth` None is searched for."""
+
+    sample_time: Fraction
+    delay: Fraction
+    feedback_time: Fraction
+    noise: Fraction
+    wind: Fraction
+    bandwidth: Fraction | None
+
+    def lanes(self) -> Lanes:
+        """One lane."""
+        return Lanes(
+            Ts=np.array([float(self.sample_time)]),
+            tau=np.array([float(self.delay)]),
+            Tf=np.array([float(self.feedback_time)]),
+            nu=np.array([float(self.noise)]),
+            wbar=np.array([float(self.wind)]),
+            omega=np.array([np.nan if self.bandwidth is None else float(self.bandwidth)]),
+        )
+
+
+def setting_at(problem: TubeProblem, machine: Machine, value: Fraction) -> Setting:
+    """The machine that is asked for, with `value` for the number that is searched for, if one is."""
+    asked, wind = machine.asked, problem.wind
+    Ts = value if asked.sample_time is None else asked.sample_time
+    delay = Ts if asked.one_sample else value if asked.delay is None else asked.delay
+    noise = Fraction(1) if isinstance(asked.noise, tuple) else value if asked.noise is None else asked.noise
+    gust = Fraction(0) if wind is None else value if wind.bound is None else wind.bound
+    return Setting(
+        sample_time=Ts,
+        delay=delay,
+        feedback_time=Ts if asked.feedback_time is None else asked.feedback_time,
+        noise=noise,
+        wind=gust,
+        bandwidth=asked.bandwidth,
+    )
+
+
+def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
+    """The least level that is found for a machine, as a recipe that is checked; None if none was found."""
+    choice = search.level(setting.lanes())
+    if choice is None:
+        return None
+    omega = float(choice.omega[0])
+    bandwidth = setting.bandwidth
+    if bandwidth is None and omega * float(setting.sample_time) < 0.9 * _DEADBEAT:
+        bandwidth = round_up(omega, DIGITS)
+    floor = round_up(float(choice.f0[0]), _ROOM)
+    recipe = None
+    for room in (1e-7, 1e-5, 1e-4, 1e-3, 1e-2):
+        level = round_up(float(choice.dhat[0]) * (1 + room), DIGITS + 1)
+        for inflation in (1e-9, 1e-6):
+            recipe = proof_at(search, setting, bandwidth, level, floor, inflation)
+            if recipe is not None and serves(search.problem, recipe):
+                return recipe
+    return recipe
+
+
+def proof_at(
+    search: Search, setting: Setting, bandwidth: Fraction | None, level: Fraction, floor: Fraction, inflation: float
+) -> HardwareRecipe | None:
+    """The recipe at printed numbers: Y, S, N and np in floats, inflated, as decimals; None where they have no bound."""
+    at = setting.lanes()
+    omega = 2 * _DEADBEAT / at.Ts if bandwidth is None else np.array([float(bandwidth)])
+    chosen = Choice(dhat=np.array([float(level)]), omega=omega, f0=np.array([float(floor)]))
+    loop = search.settled(at, chosen)
+    sizes = [float(x[0]) * (1 + inflation) for x in (loop.Y, loop.S, loop.N)]
+    prediction = None if loop.np is None else float(loop.np[0]) * (1 + inflation)
+    if not np.all(np.isfinite([*sizes, prediction or 0.0])) or min(sizes) < 0 or not sizes[0] > 0:
+        return None
+    Y, S, N = (round_up(value, 13) for value in sizes)
+    return HardwareRecipe(
+        sample_time=setting.sample_time,
+        delay=setting.delay,
+        feedback_time=setting.feedback_time,
+        bandwidth=bandwidth,
+        noise=setting.noise,
+        wind=setting.wind,
+        clip_radius=search.R,
+        level=level,
+        floor=floor,
+        speed=Y,
+        bias=S,
+        ripple=N,
+        prediction=None if prediction is None else round_up(prediction, 13),
+    )
+
+
+def largest_value(search: Search) -> float:
+    """The largest number of what is searched for that serves, in floats; 0 if none does."""
+    asked, problem, machine = search.machine.asked, search.problem, search.machine
+    one = setting_at(problem, machine, Fraction(1)).lanes()
+
+    def at(x: Array) -> Lanes:
+        base = one[np.zeros(len(x), dtype=int)]
+        if asked.largest == "noise":
+            return replace(base, nu=x)
+        if asked.largest == "wind":
+            return replace(base, wbar=x)
+        if asked.largest == "delay":
+            return replace(base, tau=x)
+        Tf = x if asked.feedback_time is None else base.Tf
+        return replace(base, Ts=x, Tf=Tf, tau=x if asked.one_sample else base.tau)
+
+    def test(x: Array) -> Mask:
+        best, _ = search.least(at(x.ravel()))
+        return np.asarray(best < 1).reshape(x.shape)
+
+    low, high = _ends(search)
+    return float(largest(test, np.array([low]), np.array([high]), points=60)[0])
+
+
+def _ends(search: Search) -> tuple[float, float]:
+    """Between what the largest number is looked for."""
+    asked = search.machine.asked
+    if asked.largest == "delay" and asked.sample_time is not None:
+        return 1e-6 * float(asked.sample_time), float(asked.sample_time)
+    if asked.largest == "noise":
+        most = search.dbar / max(float(search.plant.m.n_M), 1e-300)
+        return 1e-9 * most, most
+    if asked.largest == "wind":
+        most = search.rate * search.dbar / max(float(search.plant.beta_w), 1e-300)
+        return 1e-9 * most, 10 * most
+    return 1e-9 / search.rate, 1e2 / search.rate
+
+
+def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:
+    """The least level at the machine that is asked for, or at the largest one of what is searched for."""
+    del asked  # gains of the other loops; this one is the specification's
+    machine = problem.machine
+    if machine is None or obstacles(problem, theorem_h.THEOREM):
+        return Proposal()
+    search = Search(problem, machine)
+    if machine.asked.largest is None:
+        recipe = recipe_at(search, setting_at(problem, machine, Fraction(1)))
+        return Proposal() if recipe is None else Proposal(decisive=recipe, role="machine")
+    found = largest_value(search)
+    for attempt in range(4):
+        value = round_down(found * (1 - 1e-9) * (1 - attempt * 2e-4), DIGITS) if found > 0 else Fraction(0)
+        if value == 0 and machine.asked.largest == "sample_time":
+            break
+        recipe = recipe_at(search, setting_at(problem, machine, value))
+        if recipe is not None and serves(problem, recipe):
+            return Proposal(decisive=recipe, role="largest")
+    return Proposal()
