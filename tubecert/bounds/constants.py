@@ -101,9 +101,7 @@ class BoundConstants:
     initial_distance: Constant = field(
         metadata=_of("d0", "theory 4", "d", "length of the segment from x*(0) to x(0)")
     )
-    plan_defect: Constant = field(
-        metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|")
-    )
+    plan_defect: Constant = field(metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|"))
     plan_defect_metric: Constant = field(
         metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
     )

@@ -3,14 +3,14 @@
 THEOREM H. If dhat + n_M <= dbar, Y > phi + DB (kb + ups + X) + D_E wbar and dhat > max(d0, f0, d1, sup D), then
 d(x*, x) < dhat and |x - x*| < dhat/sqrt(a) over the horizon, for every h, every wind and every noise of the class, with
 a loop that is sampled, delayed and held. THEOREM H-P is the same for a feedback that acts on the predicted state. A
-proof is a recipe, decimals for which (H.6)-(H.12), (H.17) are verified; larger Y, S, N, np prove the same. A recipe that
-fails refutes nothing. Implements: theory section 8.
+proof is a recipe, decimals for which (H.6)-(H.12), (H.17) are verified; larger Y, S, N, np prove the same. A recipe
+that fails refutes nothing. Implements: theory section 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Generic
 
@@ -211,9 +211,7 @@ def wind_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
 def noise_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
     """N of (H.7), or what noise of a bounded rate does if that is less."""
     nbar = loop.nu * p.m.n_E
-    summed = (
-        2 * gain_of_filter(loop) * (loop.nu * p.m.n_B) + p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar
-    )
+    summed = 2 * gain_of_filter(loop) * (loop.nu * p.m.n_B) + p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar
     return summed if p.drift is None else minimum(summed, p.m.n_B * p.drift)
 
 
@@ -385,7 +383,7 @@ def in_step(first: Fraction, second: Fraction) -> bool:
 def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
     """The safe side of everything that is known; `ValueError` without a machine."""
     machine = _machine(problem)
-    wind = problem.wind
+    wind = getattr(problem, "wind", None)
     zero = Interval.of(0)
     n = problem.proven(R)
     return Plant(
@@ -394,7 +392,7 @@ def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
         beta_w=zero if wind is None else Interval.exact(wind.constants.push.above),
         D_E=zero if wind is None else Interval.exact(wind.constants.size.above),
         eps_w=zero if wind is None else Interval.exact(wind.constants.explained.above),
-        rest=zero if n.rest_speed is None else n.rest_speed,
+        rest=zero,
         held=machine.asked.held,
         drift=None if machine.drift is None else Interval.of(machine.drift),
     )
@@ -452,9 +450,7 @@ def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Inte
     if problem.machine is None or not _describes_a_loop(recipe):
         return nothing, nothing
     x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
-    if not (
-        problem.machine.clips_within(problem.constants.h, recipe.clip_radius) and _side_conditions(x)
-    ):
+    if not (problem.machine.clips_within(problem.constants.h, recipe.clip_radius) and _side_conditions(x)):
         return nothing, nothing
     level = (1 - (x.loop.dhat + x.estimate.n_fb) / reach(x.plant.n)).sanitised()
     stays = (1 - x.course.supremum() / x.loop.dhat).sanitised()
@@ -477,9 +473,7 @@ def _describes_a_loop(r: HardwareRecipe) -> bool:
 def _side_conditions(x: Evaluated[Interval]) -> bool:
     """(5.1), (H.6), (H.7), (H.11) and (H.17)."""
     e, loop = x.estimate, x.loop
-    predicted = (
-        e.prediction is None or loop.np is None or bool(e.prediction.sanitised().hi <= loop.np.lo)
-    )
+    predicted = e.prediction is None or loop.np is None or bool(e.prediction.sanitised().hi <= loop.np.lo)
     return (
         bool(x.loss.chi.sanitised().lo > 0)
         and bool(e.bias.sanitised().hi <= loop.S.lo)
@@ -503,7 +497,7 @@ def is_the_machine(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
     """Whether a recipe is about the machine, the noise and the wind of the problem, where they are given."""
     if problem.machine is None:
         return False
-    asked, wind = problem.machine.asked, problem.wind
+    asked, wind = problem.machine.asked, getattr(problem, "wind", None)
     feedback_time = recipe.sample_time if asked.feedback_time is None else asked.feedback_time
     delay = recipe.sample_time if asked.one_sample else asked.delay
     noise = Fraction(1) if isinstance(asked.noise, tuple) else asked.noise
@@ -579,8 +573,9 @@ THEOREM = Theorem(
 class Budget:
     """What fills the level: shares of lambda dhat, each rounded up.
 
-    `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the rest
-    of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the floor.
+    `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the
+    rest of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the
+    floor.
     """
 
     plan: float

@@ -56,7 +56,7 @@ class Machine:
     def clips_within(self, h: Constant, R: Fraction) -> bool:
         """Whether |v| <= R over the set that the estimate is clipped to, decided exactly."""
         square = self._square(h)
-        return square is not None and R > 0 and R**2 >= square
+        return square is not None and R > 0 and square <= R**2
 
     def _square(self, h: Constant) -> Fraction | None:
         """R^2 at least: of the corner of the box that is farthest, or Dh^2; None if there is no bound."""
@@ -109,11 +109,28 @@ class MachineNumbers(Generic[T]):
     L_G: T
 
 
-def proven(constants: HardwareConstants) -> MachineNumbers[Interval]:
+def proven(c: HardwareConstants) -> MachineNumbers[Interval]:
     """The safe side: the theorem holds with these numbers, because each bounds its constant."""
-    named: dict[str, Interval | None] = dict.fromkeys(MachineNumbers.__slots__)
-    known = {meaning.number: Interval.exact(value.above) for _, value, meaning in constants.items()}
-    return MachineNumbers(**(named | {name: known[name] for name in known if name in named}))
+    return MachineNumbers(
+        D_F=_most(c.feedback_slope),
+        D_Fx=_most(c.feedback_curvature),
+        D_cx=_most(c.plan_tilt),
+        Ystar=_most(c.plan_speed),
+        phi_rel=_most(c.drift_difference),
+        phi_relM=None if c.drift_difference_metric is None else _most(c.drift_difference_metric),
+        D_A=None if c.drift_slope_metric is None else _most(c.drift_slope_metric),
+        D_pf=_most(c.drift_explained),
+        n_E=_most(c.noise_size),
+        n_M=_most(c.noise_metric),
+        n_B=_most(c.noise_explained),
+        Lus=None if c.input_rate is None else _most(c.input_rate),
+        G=_most(c.symbols),
+        L_G=_most(c.symbols_slope),
+    )
+
+
+def _most(constant: Constant) -> Interval:
+    return Interval.exact(constant.above)
 
 
 def floats(numbers: MachineNumbers[Interval]) -> MachineNumbers[Array]:
@@ -125,4 +142,3 @@ def floats(numbers: MachineNumbers[Interval]) -> MachineNumbers[Array]:
 def ones() -> MachineNumbers[Array]:
     """Every number 1: to record what the formulas ask for beside them."""
     return MachineNumbers(**{name: np.asarray(1.0) for name in MachineNumbers.__slots__})
-

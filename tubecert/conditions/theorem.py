@@ -29,6 +29,7 @@ class Recipe(Protocol):
 
 R = TypeVar("R", bound=Recipe)
 
+
 def _any(problem: TubeProblem, recipe: object) -> bool:
     del problem, recipe
     return True

@@ -19,7 +19,9 @@ from tubecert.enclosure.interval import Interval
 from tubecert.kinds import Name
 from tubecert.verdict import Verdict
 
-Role = Literal["feedback", "asked", "least_bandwidth", "least_adaptation", "longest_sample", "machine", "largest"]
+Role = Literal[
+    "feedback", "asked", "least_bandwidth", "least_adaptation", "longest_sample", "machine", "largest"
+]
 _BEYOND = 1e300  # larger margins are not told
 
 

@@ -46,9 +46,9 @@ class HardwarePoint:
 class HardwareData(SectionData):
     """Certificate H: the machine, the level d(x*, x) < `level` that is proven for it, and what follows.
 
-    `deadbeat`: the filter has no bandwidth of its own, the newest estimate is used as it is; `noise` in units of what is
-    given per state, else |n|; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|, `half_widths`
-    |x_i - x_i*|, `inputs` every input; `margin` is that of (H.12), `level_margin` that of (H.10).
+    `deadbeat`: the filter has no bandwidth of its own, the newest estimate is used as it is; `noise` is |n|, or in
+    units of what is given per state; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|,
+    `half_widths` |x_i - x_i*|, `inputs` every input; `margin` is that of (H.12), `level_margin` that of (H.10).
     """
 
     name = HARDWARE
@@ -135,13 +135,14 @@ class HardwareSection(Section[HardwareRecipe]):
     def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
         """What every input does: u*, the feedback, and the clip with its other sign."""
         R, feedback = recipe.clip_radius, Fraction(known.feedback)
-        clip = self.machine.clip or tuple((-R, R) for _ in self.machine.inputs)
+        ranges = self.machine.inputs
+        clip = self.machine.clip if self.machine.clip and ranges else tuple((-R, R) for _ in ranges)
         return {
             name: (
                 printable_below(Fraction(low) - feedback - most),
                 printable_above(Fraction(high) + feedback - least),
             )
-            for (name, (low, high)), (least, most) in zip(self.machine.inputs.items(), clip, strict=True)
+            for (name, (low, high)), (least, most) in zip(ranges.items(), clip, strict=True)
         }
 
 

@@ -13,16 +13,18 @@ from tubecert.kinds.kind import Kind
 from tubecert.kinds.rates import Rates
 from tubecert.kinds.sampled import Sampled
 
-KINDS: Final[tuple[Kind[Any], ...]] = (Alone(), Rates(), Distance(), Sampled(), Hardware())
+AnyKind = Kind[Any]
+
+KINDS: Final[tuple[AnyKind, ...]] = (Alone(), Rates(), Distance(), Sampled(), Hardware())
 
 
-def kind_of(word: str) -> Kind[Any]:
+def kind_of(word: str) -> AnyKind:
     """The kind with this key, option or letter; `KeyError` if there is none."""
     name = name_of(word)
     return next(kind for kind in KINDS if kind.name == name)
 
 
-def kinds_of(problem: TubeProblem) -> tuple[Kind[Any], ...]:
+def kinds_of(problem: TubeProblem) -> tuple[AnyKind, ...]:
     """The kinds that say anything of a problem."""
     return tuple(kind for kind in KINDS if kind.applies(problem))
 

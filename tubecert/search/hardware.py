@@ -29,6 +29,7 @@ _ROOM = 9  # digits of what only the proof needs
 _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _STEPS = 9  # of the fixed point of Y, S, N, np; a search needs no more, and what is printed is verified
 _ZOOMS = 12
+_LEAST = 1e-15  # of what is 0 but for rounding
 _CURVE_POINTS = 13
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -112,7 +113,11 @@ class Search:
         for step in range(_STEPS):
             e = theorem_h.estimate(self.plant, loop)
             loop = replace(
-                loop, Y=e.speed, np=e.prediction, S=loop.S if step == 0 else e.bias, N=loop.N if step == 0 else e.ripple
+                loop,
+                Y=e.speed,
+                np=e.prediction,
+                S=loop.S if step == 0 else e.bias,
+                N=loop.N if step == 0 else e.ripple,
             )
         e = theorem_h.estimate(self.plant, loop)
         return replace(loop, S=e.bias, N=e.ripple, np=e.prediction)
@@ -135,13 +140,19 @@ class Search:
         return np.where(np.isnan(at.omega), np.exp(low + (high - low) * share), at.omega)
 
     def least(self, at: Lanes, dhat: Array | None = None) -> tuple[Array, Choice]:
-        """The least `needed` per lane with a choice that has it; at a given dhat, or over dhat too. Lanes have one axis."""
+        """The least `needed` per lane with a choice that has it; at a given dhat, or over dhat too."""
         top = np.maximum(self.dbar - at.nu * float(self.plant.m.n_M), 1e-9 * self.dbar)
         free = dhat is None
 
         def chosen(point: Array) -> Choice:
-            level = top[:, None] * np.exp(-9 * point[0]) if dhat is None else np.broadcast_to(dhat[:, None], point[0].shape)
-            return Choice(dhat=level, omega=self._omegas(at[:, None], point[1]), f0=level * np.exp(-14 * point[2]))
+            level = (
+                top[:, None] * np.exp(-9 * point[0])
+                if dhat is None
+                else np.broadcast_to(dhat[:, None], point[0].shape)
+            )
+            return Choice(
+                dhat=level, omega=self._omegas(at[:, None], point[1]), f0=level * np.exp(-14 * point[2])
+            )
 
         counts = (7 if free else 1, 13, 9)
         axes = [(np.arange(k) + 0.5) / k if k > 1 else np.array([0.0]) for k in counts]
@@ -167,7 +178,7 @@ class Search:
 
     def level(self, at: Lanes) -> Choice | None:
         """The least level of one machine, with its choice; None if none was found."""
-        low = float(max(self.plant.n.d0, 1e-6 * self.dbar))
+        low = max(float(self.plant.n.d0), 1e-6 * self.dbar)
         grid = np.geomspace(low, self.dbar, 48)
         holds = self._holds(at, grid)
         if not holds.any():
@@ -177,7 +188,10 @@ class Search:
         dhat = grid[[first]]
         if first > 0:
             dhat = boundary_log(
-                lambda x: self._holds(at, x.ravel()).reshape(x.shape), grid[[first]], grid[[first - 1]], rounds=4
+                lambda x: self._holds(at, x.ravel()).reshape(x.shape),
+                grid[[first]],
+                grid[[first - 1]],
+                rounds=4,
             )
         _, choice = self.least(at, dhat)
         return choice
@@ -225,7 +239,7 @@ class Setting:
 
 def setting_at(problem: TubeProblem, machine: Machine, value: Fraction) -> Setting:
     """The machine that is asked for, with `value` for the number that is searched for, if one is."""
-    asked, wind = machine.asked, problem.wind
+    asked, wind = machine.asked, getattr(problem, "wind", None)
     Ts = value if asked.sample_time is None else asked.sample_time
     delay = Ts if asked.one_sample else value if asked.delay is None else asked.delay
     noise = Fraction(1) if isinstance(asked.noise, tuple) else value if asked.noise is None else asked.noise
@@ -250,39 +264,47 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     if bandwidth is None and omega * float(setting.sample_time) < 0.9 * _DEADBEAT:
         bandwidth = round_up(omega, DIGITS)
     floor = round_up(float(choice.f0[0]), _ROOM)
-    recipe = None
+    recipe: HardwareRecipe | None = None
     for room in (1e-7, 1e-5, 1e-4, 1e-3, 1e-2):
         level = round_up(float(choice.dhat[0]) * (1 + room), DIGITS + 1)
+        printed = Printed(bandwidth=bandwidth, level=level, floor=floor)
         for inflation in (1e-9, 1e-6):
-            recipe = proof_at(search, setting, bandwidth, level, floor, inflation)
+            recipe = proof_at(search, setting, printed, inflation)
             if recipe is not None and serves(search.problem, recipe):
                 return recipe
     return recipe
 
 
-def proof_at(
-    search: Search, setting: Setting, bandwidth: Fraction | None, level: Fraction, floor: Fraction, inflation: float
-) -> HardwareRecipe | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Printed:
+    """What was chosen, as decimals; `bandwidth` None: no filter."""
+
+    bandwidth: Fraction | None
+    level: Fraction
+    floor: Fraction
+
+
+def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -> HardwareRecipe | None:
     """The recipe at printed numbers: Y, S, N and np in floats, inflated, as decimals; None where they have no bound."""
     at = setting.lanes()
-    omega = 2 * _DEADBEAT / at.Ts if bandwidth is None else np.array([float(bandwidth)])
-    chosen = Choice(dhat=np.array([float(level)]), omega=omega, f0=np.array([float(floor)]))
+    omega = 2 * _DEADBEAT / at.Ts if own.bandwidth is None else np.array([float(own.bandwidth)])
+    chosen = Choice(dhat=np.array([float(own.level)]), omega=omega, f0=np.array([float(own.floor)]))
     loop = search.settled(at, chosen)
-    sizes = [float(x[0]) * (1 + inflation) for x in (loop.Y, loop.S, loop.N)]
-    prediction = None if loop.np is None else float(loop.np[0]) * (1 + inflation)
-    if not np.all(np.isfinite([*sizes, prediction or 0.0])) or min(sizes) < 0 or not sizes[0] > 0:
+    sizes = [max(float(x[0]) * (1 + inflation), _LEAST) for x in (loop.Y, loop.S, loop.N)]
+    prediction = None if loop.np is None else max(float(loop.np[0]) * (1 + inflation), _LEAST)
+    if not np.all(np.isfinite([*sizes, prediction or 0.0])):
         return None
     Y, S, N = (round_up(value, 13) for value in sizes)
     return HardwareRecipe(
         sample_time=setting.sample_time,
         delay=setting.delay,
         feedback_time=setting.feedback_time,
-        bandwidth=bandwidth,
+        bandwidth=own.bandwidth,
         noise=setting.noise,
         wind=setting.wind,
         clip_radius=search.R,
-        level=level,
-        floor=floor,
+        level=own.level,
+        floor=own.floor,
         speed=Y,
         bias=S,
         ripple=N,
