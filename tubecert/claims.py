@@ -167,7 +167,9 @@ class ConditionHolds(Claim):
     """A condition of a section that is not proven, by `margin`, or by what is `needed` and `allowed`.
 
     `condition` is one of the section's own (26a, 26b, 26c, distance, sampled), or what no gains can help:
-    `initial_distance` (d0 < dbar), `plan_defect` (delta/lambda < dbar), `bounded` (the constant `constant` is),
+    `initial_distance` (d0 < dbar), `plan_defect` (delta/lambda < dbar), `parameters` and `wind` (the same with what
+    they add), `wind_bound` (it is searched for), `wind_not_covered` (the theorem knows no wind), `bounded` (the
+    constant `constant` is),
     `corrected_formulas`; or `any_gains`: none were found; or `proven_gains`: of those found none could be proven.
     `beyond`: the margin is below all floats; `blocked_by` names a condition without which this one has no margin.
     """
@@ -617,6 +619,18 @@ class UncertaintyAsGiven(Assumption):
 
     tag: ClassVar[str] = "uncertainty_as_given"
     any_within_bounds: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindWithin(Assumption):
+    """Beside the inputs acts E(x) w with |w| <= `bound` (None: whatever a certificate finds), else arbitrary.
+
+    `rate` bounds |w'|, in 1/s, where that is known.
+    """
+
+    tag: ClassVar[str] = "wind_within"
+    bound: Fraction | None = None
+    rate: Fraction | None = None
 
 
 # -- as JSON

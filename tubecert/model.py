@@ -67,9 +67,11 @@ _RANK_WORK = 2_000_000  # operations at vertices of boxes for a left inverse of 
 
 @dataclass(frozen=True)
 class ControlAffineModel:
-    """xdot = f(x) + B(x)(u + h(t, x)) with dual metric W at a rate, all exact.
+    """xdot = f(x) + B(x)(u + h(t, x)) + E(x) w with dual metric W at a rate, all exact.
 
-    Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared.
+    Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
+    where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
+    `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows.
     """
 
     states: tuple[str, ...]
@@ -79,6 +81,11 @@ class ControlAffineModel:
     W: Matrix
     rate: Fraction
     h: tuple[Expression, ...] | None
+    E: Matrix = ()
+    wind_bound: Fraction | None = None
+    wind_rate: Fraction | None = None
+    drift: tuple[Expression, ...] = ()
+    parameters: tuple[tuple[str, Range], ...] = ()
 
     @cached_property
     def f_x(self) -> Matrix:
@@ -181,7 +188,7 @@ def divide(a: Matrix, e: Expression) -> Matrix:
 def build(spec: Spec) -> ControlAffineModel:
     """The model of a specification; without a metric, W is empty."""
     metric = spec.metric
-    h = spec.uncertainty.h
+    h, wind = spec.uncertainty.h, spec.disturbance
     return ControlAffineModel(
         states=spec.states,
         inputs=spec.inputs,
@@ -190,6 +197,9 @@ def build(spec: Spec) -> ControlAffineModel:
         W=tuple(tuple(term.expression for term in row) for row in metric.dual_metric) if metric else (),
         rate=metric.rate if metric else Fraction(0),
         h=None if h is None else tuple(term.expression for term in h),
+        E=() if wind is None else tuple(tuple(term.expression for term in row) for row in wind.E),
+        wind_bound=None if wind is None else wind.bound,
+        wind_rate=None if wind is None else wind.rate,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
+from tubecert.bounds.wind import Beside, uncertainty_constants
 from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.model import TIME
@@ -110,7 +111,10 @@ def bound_constants(
     if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
         declared = {**declared, "h_initial": declared["h"]}
     derived: dict[str, Constant] = {}
-    if suprema.model.h is not None:
+    if Beside(suprema).joins_uncertainty:
+        derived = uncertainty_constants(suprema, start, declared)
+        declared = {}
+    elif suprema.model.h is not None:
         derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
         derived["h_initial"] = start.uncertainty(suprema)
     delta_p, delta = suprema.plan_defect()

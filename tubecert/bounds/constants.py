@@ -14,7 +14,7 @@ from tubecert.enclosure.constant import Constant, Witness
 
 Side = Literal["below", "above"]
 
-__all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "Witness"]
+__all__ = ["EVERY", "TABLE", "BoundConstants", "Constant", "Meaning", "WindConstants", "Witness"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,6 +141,61 @@ def table_of(constants: Iterable[Field[object]]) -> dict[str, Meaning]:
 
 TABLE: dict[str, Meaning] = table_of(fields(BoundConstants))
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindConstants:
+    """What E w does for |w| <= 1 (theory 7): how hard it pushes, how fast it moves the state, what of it B explains.
+
+    Where w has a rate, E stands for (I - B B^+) E, and B^+ E w is a part of h.
+    """
+
+    push: Constant = field(
+        metadata=_of("beta_w", "theory 7", "d/s", "how fast the wind lengthens the geodesic at most, per |w|")
+    )
+    size: Constant = field(metadata=_of("D_E", "theory 7", "x/s", "sup |E|"))
+    explained: Constant = field(metadata=_of("eps_w", "theory 7", "u", "sup |B^+ E|"))
+
+    def printable(self) -> WindConstants:
+        """The same with every enclosure widened to printable bounds."""
+        return WindConstants(**{item.name: getattr(self, item.name).printable() for item in fields(self)})
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of each, by its name in a certificate."""
+        return [
+            (f"wind_{name}", getattr(self, name), meaning) for name, meaning in table_of(fields(self)).items()
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResidualConstants:
+    """What parameters in boxes leave of f that no input reaches, r = (I - B B^+)(f(x, theta) - f0(x)) (theory 7)."""
+
+    push: Constant = field(
+        metadata=_of(
+            "beta_r", "theory 7", "d/s", "what unknown parameters do to the distance beside the inputs"
+        )
+    )
+    size: Constant = field(
+        metadata=_of("D_r", "theory 7", "x/s", "sup of what unknown parameters do beside the inputs")
+    )
+
+    def printable(self) -> ResidualConstants:
+        """The same with every enclosure widened to printable bounds."""
+        return ResidualConstants(push=self.push.printable(), size=self.size.printable())
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of each, by its name in a certificate."""
+        return [
+            (f"residual_{name}", getattr(self, name), meaning)
+            for name, meaning in table_of(fields(self)).items()
+        ]
+
+
+WIND: dict[str, Meaning] = {
+    **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
+    **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
+}
+
 DERIVED: dict[str, Meaning] = {
     name: Meaning(symbol=symbol, equation=equation, unit=unit, words=words)
     for name, symbol, equation, unit, words in (
@@ -163,3 +218,6 @@ DERIVED: dict[str, Meaning] = {
         ("zeta_3", "zeta3", "conditions:zeta_3", "1", "effect of the state-dependence of h in (26b)"),
     )
 }
+
+EVERY: dict[str, Meaning] = {**TABLE, **WIND, **DERIVED}
+"""All that a certificate may list, by name."""

@@ -24,8 +24,8 @@ from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, midrad, wh
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.tape import Tape
 from tubecert.enclosure.taylor import MatrixFunction
-from tubecert.expression import ZERO, Expression, constant, free_symbols, root_above, substitute, symbol
-from tubecert.expression.matrix import column
+from tubecert.expression import ZERO, Expression, constant, free_symbols, root_above, symbol
+from tubecert.expression.matrix import Matrix, column
 from tubecert.model import TIME
 
 _PIECES = 512
@@ -44,11 +44,15 @@ class InitialState(Protocol):
 
     def uncertainty(self, suprema: Suprema) -> Constant:
         """H0, a bound of |h(0, x(0))|."""
+        return self.largest(suprema, [column(suprema.h)])
+
+    def largest(self, suprema: Suprema, matrices: list[Matrix]) -> Constant:
+        """The largest sum of norms of matrices at t = 0 and x(0)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class KnownStart:
+class KnownStart(InitialState):
     """x(0) is the point `x0`, shape (n,)."""
 
     x0: tuple[Fraction, ...]
@@ -90,13 +94,14 @@ class KnownStart:
             above=float((speed.hi * widths).sum() * (1 + 1e-13)),
         )
 
-    def uncertainty(self, suprema: Suprema) -> Constant:
-        """|h(0, x0)|."""
+    def largest(self, suprema: Suprema, matrices: list[Matrix]) -> Constant:
+        """It at x0."""
         states = zip(suprema.model.states, map(constant, self.x0), strict=True)
-        start = SumOfNorms([column(substitute(suprema.h, {TIME: ZERO, **dict(states)}))])
+        at_start = {TIME: ZERO, **dict(states)}
+        start = SumOfNorms([substituted(rows, at_start) for rows in matrices])
         if start.is_zero:
             return Constant.exactly(0.0)
-        found = supremum(start, BoxDomain({}), suprema.effort)
+        found = supremum(start, BoxDomain(dict(suprema.model.parameters)), suprema.effort)
         return Constant(below=found.below, above=found.above)
 
     def _delta(self, start: Sequence[Expression]) -> list[Expression]:
@@ -104,7 +109,7 @@ class KnownStart:
 
 
 @dataclass(frozen=True, slots=True)
-class StartWithin:
+class StartWithin(InitialState):
     """x(0) is any point with |x*(0) - x(0)| <= `radius`, in x whatever the coordinates of the tube."""
 
     radius: Fraction
@@ -127,16 +132,16 @@ class StartWithin:
         most = sqrt(Interval.exact(A.above)) * Interval.of(self.radius)
         return Constant(below=float(least.lo), above=float(most.hi))
 
-    def uncertainty(self, suprema: Suprema) -> Constant:
-        """sup |h(0, x)| over the ball of starts."""
+    def largest(self, suprema: Suprema, matrices: list[Matrix]) -> Constant:
+        """It over the ball of starts."""
         radius = fraction_bounds(self.radius)[1]
         instant, still = (Fraction(0), Fraction(0)), suprema.plan.at_start
         ball = replace(suprema, plan=still, rho=radius, time=instant, coordinates=None, sides=None)
-        return ball.norms("h_initial", [column(suprema.h)])
+        return ball.norms("h_initial", matrices)
 
 
 @dataclass(frozen=True, slots=True)
-class StartBox:
+class StartBox(InitialState):
     """x(0) is any point of a box, `sides` (n pairs): what is convex in x(0) is largest at a corner."""
 
     sides: tuple[tuple[Fraction, Fraction], ...]
@@ -161,14 +166,14 @@ class StartBox:
         whole = Interval.exact(first.above) + Interval.exact(rest.above)
         return Constant(below=first.below, above=float(whole.hi))
 
-    def uncertainty(self, suprema: Suprema) -> Constant:
-        """sup |h(0, x)| over the box."""
+    def largest(self, suprema: Suprema, matrices: list[Matrix]) -> Constant:
+        """It over the box."""
         sides = dict(zip(suprema.model.states, self.sides, strict=True))
         known = {name: constant(low) for name, (low, high) in sides.items() if low == high}
-        start = SumOfNorms([column(substitute(suprema.h, {TIME: ZERO, **known}))])
+        start = SumOfNorms([substituted(rows, {TIME: ZERO, **known}) for rows in matrices])
         if start.is_zero:
             return Constant.exactly(0.0)
-        found = supremum(start, BoxDomain(sides), suprema.effort)
+        found = supremum(start, BoxDomain({**sides, **dict(suprema.model.parameters)}), suprema.effort)
         return Constant(below=max(found.below, 0.0), above=found.above)
 
     def _corners(self) -> Iterator[tuple[Fraction, ...]]:

@@ -142,6 +142,8 @@ class Suprema:
         written = self.plan.spans is None and self.plan.knots is None and self.plan.allowance is None
         if self.coordinates is None or not written or len(matrices) > 1 or len(matrices[0][0]) > 1:
             return None
+        if free_symbols(row[0] for row in matrices[0]) & set(dict(self.model.parameters)):
+            return None
         spread = self.coordinates.spread
         sides = self.sides or (np.inf,) * len(spread)
         reach = [self.rho * float(row[i]) ** 0.5 * (1 - _SAME) for i, row in enumerate(spread)]
@@ -165,6 +167,12 @@ class Suprema:
 
     # -- uncertainty -------------------------------------------------------------------------------------------
 
+    def lipschitz(self, entries: tuple[Expression, ...], fields: Fields | None = None) -> Constant:
+        """A Lipschitz constant of entries in the states, whatever their kinks."""
+        if not free_symbols(entries) & set(self.model.states):
+            return Constant.exactly(0.0)
+        return self._constant(self._over_tube("h_x", _lipschitz(entries, fields or self.fields)))
+
     def uncertainty(self, fields: Fields | None = None) -> tuple[Constant, Constant, Constant]:
         """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks.
 
@@ -172,10 +180,7 @@ class Suprema:
         """
         h = self.h
         by_time = derivatives(h, TIME)
-        if not free_symbols(h) & set(self.model.states):
-            lipschitz = Constant.exactly(0.0)
-        else:
-            lipschitz = self._constant(self._over_tube("h_x", _lipschitz(h, fields or self.fields)))
+        lipschitz = self.lipschitz(h, fields)
         return self.norms("h", [column(h)]), lipschitz, self.norms("h_t", [column(by_time)])
 
     @property
@@ -289,6 +294,10 @@ class Suprema:
             high=printable_above(most(W[first][second])),
         )
 
+    def root_of(self, name: str, objective: Objective) -> Constant:
+        """The root of a supremum over the tube."""
+        return self._root(self._over_tube(name, objective))
+
     # -- searches ----------------------------------------------------------------------------------------------
 
     def _over_tube(
@@ -305,7 +314,7 @@ class Suprema:
             states=self.model.states,
             inputs=self.model.inputs,
             time=time,
-            extra={**self.plan.ranges, **(extra or {})},
+            extra={**self.plan.ranges, **dict(self.model.parameters), **(extra or {})},
         )
         return self._run(name, objective, tube, effort or self.effort)
 

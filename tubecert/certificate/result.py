@@ -56,6 +56,14 @@ class Plans:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Blowing:
+    """Every wind that is claimed about: |w| and, where it is known, |w'| at most; exact texts. None: searched for."""
+
+    bound: str | None
+    rate: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claimed:
     """What is claimed, in words of its own, exact texts; `recheck` derives it again from the specification."""
 
@@ -67,6 +75,7 @@ class Claimed:
     start: Start
     uncertainty: Literal["bounds", "expression", "expression_or_bounds"]
     plans: Plans | None = None
+    wind: Blowing | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,17 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Meaning
-from tubecert.certificate.result import Bound, Claimed, KnotTexts, MetricData, PlanData, Plans, Samples, Start
+from tubecert.certificate.result import (
+    Blowing,
+    Bound,
+    Claimed,
+    KnotTexts,
+    MetricData,
+    PlanData,
+    Plans,
+    Samples,
+    Start,
+)
 from tubecert.claims import (
     Assumption,
     ExactGeodesics,
@@ -26,6 +36,7 @@ from tubecert.claims import (
     UncertaintyAsDeclared,
     UncertaintyAsGiven,
     UpToHorizon,
+    WindWithin,
 )
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.expression import number_text
@@ -33,7 +44,7 @@ from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Spec, canonical
-from tubecert.spec.types import Bundle
+from tubecert.spec.types import Bundle, Disturbance
 from tubecert.trajectory import Plan
 
 _SAMPLES = 201
@@ -91,6 +102,14 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
         else "expression"
         if bounds is None or bounds.h is None
         else "expression_or_bounds",
+        wind=None if spec.disturbance is None else _wind(spec.disturbance),
+    )
+
+
+def _wind(wind: Disturbance) -> Blowing:
+    return Blowing(
+        bound=None if wind.bound is None else number_text(wind.bound),
+        rate=None if wind.rate is None else number_text(wind.rate),
     )
 
 
@@ -192,7 +211,7 @@ def assumptions(
     `geodesics` is the test for their uniqueness, once the tube is known.
     """
     flat = all(e.is_constant for row in model.W for e in row)
-    smooth, horizon = spec.adaptation.smooth, spec.trajectory.horizon
+    smooth, horizon, wind = spec.adaptation.smooth, spec.trajectory.horizon, spec.disturbance
     return (
         LeastFeedback(),
         StraightGeodesics() if flat else _geodesic_assumption(geodesics),
@@ -204,6 +223,7 @@ def assumptions(
         UncertaintyAsDeclared()
         if spec.uncertainty.h is None
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
+        *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
     )
 
 

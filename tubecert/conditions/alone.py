@@ -16,6 +16,7 @@ from tubecert.conditions.arithmetic import Array, T, decay_mean, exp, maximum, q
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.wind import provisos, pushed
 from tubecert.enclosure.interval import Interval
 
 
@@ -27,7 +28,7 @@ class NoGains:
 @quiet
 def ultimate(n: Numbers[T]) -> T:
     """A1 = (beta Dh + delta)/lambda: what d tends to at most."""
-    return (n.beta * n.Dh + n.delta) / n.lam
+    return (n.beta * n.Dh + pushed(n)) / n.lam
 
 
 @quiet
@@ -37,16 +38,16 @@ def supremum(n: Numbers[T]) -> T:
         return maximum(n.d0, ultimate(n))
     # D(T), with both ends positive: no difference is taken
     left, mean = exp(-n.lam * n.horizon), decay_mean(n.lam * n.horizon)
-    return maximum(n.d0, n.d0 * left + (n.beta * n.Dh + n.delta) * n.horizon * mean)
+    return maximum(n.d0, n.d0 * left + (n.beta * n.Dh + pushed(n)) * n.horizon * mean)
 
 
 @quiet
 def largest_uncertainty(n: Numbers[T]) -> T:
     """The Dh for which sup D reaches dbar, if d0 does not: (lambda dbar - delta)/beta, more on a finite horizon."""
     if n.horizon is None:
-        return (n.lam * reach(n) - n.delta) / n.beta
+        return (n.lam * reach(n) - pushed(n)) / n.beta
     left, mean = exp(-n.lam * n.horizon), decay_mean(n.lam * n.horizon)
-    return ((reach(n) - n.d0 * left) / (n.horizon * mean) - n.delta) / n.beta
+    return ((reach(n) - n.d0 * left) / (n.horizon * mean) - pushed(n)) / n.beta
 
 
 def _margin(n: Numbers[Interval]) -> Interval:
@@ -92,5 +93,6 @@ THEOREM = Theorem(
     ceilings=lambda problem, recipe: {"no_adaptation": float(_margin(problem.enclosed()).hi)},
     formula=_formula,
     obstacles=obstacles,
+    provisos=provisos,
     ultimate=ultimate_radius,
 )

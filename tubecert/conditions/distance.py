@@ -23,6 +23,7 @@ from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.predictor import Predictor, predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.wind import drifting, felt, is_felt, prediction, provisos, pushed, taken
 from tubecert.enclosure.interval import Interval
 
 _RISES = 200  # iterations towards the least fixed point from below; any number of them is sound
@@ -53,7 +54,7 @@ class DistanceState(Generic[T]):
 @quiet
 def drift_bound(n: Numbers[T]) -> T:
     """What |xdot| is at most without the uncertainty: phi + DB du dbar."""
-    return n.phi + n.DB * (n.du * reach(n))
+    return drifting(n) + n.DB * (n.du * reach(n))
 
 
 @quiet
@@ -84,10 +85,19 @@ def filter_error(n: Numbers[T], Y: T, omega: T, p: Predictor[T]) -> T:
     return gain * prediction_error(n.Dh + n.R, n.Dht + n.Dhx * Y, p.q)
 
 
+@quiet
+def error_needed(n: Numbers[T], Y: T, omega: T, p: Predictor[T], Gamma: T) -> T:
+    """What e has to be at least: Deta/sqrt(Gamma), (4.2); with what is no input (7.9)."""
+    if not is_felt(n):
+        return filter_error(n, Y, omega, p) / sqrt(Gamma)
+    xt = prediction(n, n.Dht + n.Dhx * Y, p, Gamma, felt(n, p))
+    return (n.DBpx * Y + n.DBp * (omega + p.shifted)) * xt + taken(n)
+
+
 def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
     """D(t) of theorem B."""
     return DistanceBound(
-        d0=n.d0, beta=n.beta, H0=n.H0, S=S, e=e, delta=n.delta, lam=n.lam, omega=omega, horizon=n.horizon
+        d0=n.d0, beta=n.beta, H0=n.H0, S=S, e=e, delta=pushed(n), lam=n.lam, omega=omega, horizon=n.horizon
     )
 
 
@@ -116,9 +126,12 @@ def _is_valid(
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """The side conditions of theorem B on Y, e and S, proven."""
     speed = speed_needed(n, s.S, s.e).hi < s.Y.lo
-    prediction = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo
+    if is_felt(n):
+        predicted = error_needed(n, s.Y, omega, p, Gamma).hi <= s.e.lo
+    else:
+        predicted = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo
     filtered = uncertainty(n, s.Y, omega).hi <= s.S.lo
-    return speed & prediction & filtered
+    return speed & predicted & filtered
 
 
 def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -> Interval:
@@ -133,13 +146,13 @@ def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     they with Y. The bound holds for all constants within their enclosures.
     """
     n = problem.enclosed(recipe.projection_radius)
-    omega, root = Interval.of(recipe.bandwidth), sqrt(Interval.of(recipe.adaptation_rate))
+    omega, Gamma = Interval.of(recipe.bandwidth), Interval.of(recipe.adaptation_rate)
     g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
     p = predictor(problem.A_m, omega, g)
 
     def errors(Y: Interval) -> tuple[Interval, Interval]:
         S = uncertainty(n, Y, omega).sanitised()
-        e = (filter_error(n, Y, omega, p) / root).sanitised()
+        e = error_needed(n, Y, omega, p, Gamma).sanitised()
         return Interval.exact(np.maximum(S.lo, 0.0)), Interval.exact(np.maximum(e.lo, 0.0))
 
     Y = least_from_below(lambda Y: speed_needed(n, *errors(Y)))
@@ -179,5 +192,6 @@ THEOREM = Theorem(
     ceilings=lambda problem, recipe: {"distance": distance_ceiling(problem, recipe)},
     formula=_at_once,
     obstacles=obstacles,
+    provisos=provisos,
     ultimate=ultimate_radius,
 )

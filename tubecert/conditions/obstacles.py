@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tubecert.conditions.arithmetic import T, sqrt
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.verdict import Shortfall
+from tubecert.conditions.wind import pushed
 from tubecert.enclosure.interval import Interval
 
 
@@ -22,20 +25,34 @@ def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     allowed = reach(safe), reach(whole)
     items = (
         _obstacle("initial_distance", allowed, (safe.d0, whole.d0)),
-        _obstacle("plan_defect", allowed, (_residual(safe), _residual(whole))),
+        _pushes(problem, allowed),
     )
     return tuple(item for item in items if item is not None)
 
 
+def _pushes(problem: TubeProblem, allowed: tuple[Interval, Interval]) -> Shortfall | None:
+    """What no input makes up for: the plan's defect, with it unknown parameters, with both the wind."""
+    causes = {"plan_defect": replace(problem, wind=None, residual=None)}
+    if problem.residual is not None:
+        causes["parameters"] = replace(problem, wind=None)
+    if problem.wind is not None:
+        causes["wind"] = problem
+    for claim, each in causes.items():
+        found = _obstacle(claim, allowed, (_residual(each.proven()), _residual(each.enclosed())))
+        if found is not None:
+            return found
+    return None
+
+
 def _residual(n: Numbers[Interval]) -> Interval:
-    """What a plan defect alone leads to: delta/lambda, or what of it the horizon allows."""
+    """What a plan defect and a wind alone lead to: delta/lambda, or what of it the horizon allows."""
     still = DistanceBound(
         d0=0 * n.d0,
         beta=n.beta,
         H0=0 * n.H0,
         S=0 * n.H0,
         e=0 * n.H0,
-        delta=n.delta,
+        delta=pushed(n),
         lam=n.lam,
         omega=2 * n.lam,
         horizon=n.horizon,

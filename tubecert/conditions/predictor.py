@@ -43,16 +43,17 @@ def damping(A_m: Matrix) -> Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Predictor(Generic[T]):
-    """What the conditions need of A_m: |A_m|, |A_m + omega I| and q = lmin(Q); P = I."""
+    """What the conditions need of A_m: |A_m|, |A_m + omega I| and q = lmin(Q); P = I. `scalar`: A_m = -g I."""
 
     norm: T
     shifted: T
     q: T
+    scalar: bool = False
 
     @staticmethod
     def of_gain(g: T, omega: T) -> Predictor[T]:
         """A_m = -g I."""
-        return Predictor(norm=g, shifted=absolute(omega - g), q=2 * g)
+        return Predictor(norm=g, shifted=absolute(omega - g), q=2 * g, scalar=True)
 
 
 @quiet

@@ -15,8 +15,15 @@ from typing import Final, Generic
 
 import numpy as np
 
-from tubecert.bounds.constants import TABLE, BoundConstants, Constant
-from tubecert.conditions.arithmetic import Array, T
+from tubecert.bounds.constants import (
+    TABLE,
+    BoundConstants,
+    Constant,
+    Meaning,
+    ResidualConstants,
+    WindConstants,
+)
+from tubecert.conditions.arithmetic import Array, T, minimum
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.machine import Machine
@@ -25,6 +32,7 @@ from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 
+Side = Callable[[str, Constant], Interval]
 _ROUNDING = 1 + Fraction(1, 10**9)  # what a caller who rounds rho may miss; `proven` corrects for it
 _LEAST_RADIUS = 1e-12  # of R_H where h vanishes: keeps every quotient defined
 RADIUS_DIGITS = 6  # of R_H: more than for the gains, because every digit dropped makes every constant larger
@@ -46,7 +54,11 @@ class Drift(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Numbers(Generic[T]):
-    """Constants, radii and options as numbers of one arithmetic; names are the paper's symbols."""
+    """Constants, radii and options as numbers of one arithmetic; names are the paper's symbols.
+
+    `delta` and `phi` contain what unknown parameters add to them, `rest_speed` (theory 7). What a wind of the bound
+    that is given does stands beside them: None without wind, or where its bound is not given.
+    """
 
     a: T
     A: T
@@ -78,11 +90,30 @@ class Numbers(Generic[T]):
     rho_r: T
     offset: T  # |x*(0) - x(0)| (as printed only)
     horizon: T | None
+    wind_push: T | None = None  # beta_w |w|
+    wind_speed: T | None = None  # D_E |w|
+    wind_error: T | None = None  # eps_w |w|
+    wind_matched: T | None = None  # |B B^+ E w| for a constant B
+    rest_speed: T | None = None  # D_r
+    rest_matched: T | None = None  # 0 for a constant B
 
 
 # the name of a constant in the formulas -> its field of `BoundConstants`
 FIELDS: Final = {meaning.number: name for name, meaning in TABLE.items() if meaning.number}
 _INFIMA: Final = {meaning.number for meaning in TABLE.values() if meaning.side == "below"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wind:
+    """What acts beside the inputs, E w: |w| <= `bound` (None: not given), and what it does per unit of |w|."""
+
+    bound: Fraction | None
+    constants: WindConstants
+
+    @property
+    def pushes(self) -> bool:
+        """Whether anything of E is left: it may be that all of it is a part of h."""
+        return self.constants.size.above > 0 and self.bound != 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +143,8 @@ class TubeProblem:
     drift: Drift = Drift.PLAN
     filter_factor: int = 2
     machine: Machine | None = None
+    wind: Wind | None = None
+    residual: ResidualConstants | None = None
 
     def __post_init__(self) -> None:
         if min(self.rate, self.rho_a, self.epsilon) <= 0:
@@ -158,6 +191,11 @@ class TubeProblem:
             return Fraction(1)  # serves nothing
         return round_up(max(self.constants.h.above, _LEAST_RADIUS), RADIUS_DIGITS)
 
+    @property
+    def constant_input(self) -> bool:
+        """Whether B is proven to be the same everywhere in the tube."""
+        return self.constants.B_x.above == 0
+
     def radius_serves(self, R_H: Fraction, *, clips: bool = False) -> bool:
         """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly."""
         if not np.isfinite(self.constants.h.above):
@@ -184,9 +222,13 @@ class TubeProblem:
         """Enclosures of the constants themselves, for what cannot be excluded."""
         return self._numbers(lambda _, c: Interval(c.below, c.above), R_H)
 
-    def _numbers(self, side: Callable[[str, Constant], Interval], R_H: Fraction | None) -> Numbers[Interval]:
+    def _numbers(self, side: Side, R_H: Fraction | None) -> Numbers[Interval]:
         named = {symbol: side(symbol, getattr(self.constants, field)) for symbol, field in FIELDS.items()}
         radius = self.projection_radius if R_H is None else R_H
+        found = self._of_problem(named, radius)
+        return self._with_residual(self._with_wind(found, side), side)
+
+    def _of_problem(self, named: dict[str, Interval], radius: Fraction) -> Numbers[Interval]:
         return Numbers(
             **named,
             R=Interval.of(radius),
@@ -197,6 +239,46 @@ class TubeProblem:
             offset=_interval(self.initial_offset),
             horizon=None if self.horizon is None else Interval.of(self.horizon),
         )
+
+    def _with_wind(self, n: Numbers[Interval], side: Side) -> Numbers[Interval]:
+        """Beside the constants of the tube, what the wind does (theory 7)."""
+        if self.wind is None or self.wind.bound is None:
+            return n
+        own, size = self.wind.constants, Interval.of(self.wind.bound)
+        push, speed, error = (
+            side(name, value) * size
+            for name, value in (("push", own.push), ("size", own.size), ("explained", own.explained))
+        )
+        return replace(
+            n,
+            wind_push=push,
+            wind_speed=speed,
+            wind_error=error,
+            wind_matched=minimum(speed, n.DB * error) if self.constant_input else speed,
+        )
+
+    def _with_residual(self, n: Numbers[Interval], side: Side) -> Numbers[Interval]:
+        """What unknown parameters do beside the inputs is a part of delta and of phi (theory 7)."""
+        if self.residual is None:
+            return n
+        push, size = side("push", self.residual.push), side("size", self.residual.size)
+        return replace(
+            n,
+            delta=n.delta + push,
+            phi=n.phi + size,
+            Df=n.Df + size,
+            rest_speed=size,
+            rest_matched=0 * size if self.constant_input else size,
+        )
+
+    def unbounded_wind(self) -> tuple[str, ...]:
+        """What a wind or unknown parameters do, if it has no finite bound, by its name in a certificate."""
+        return tuple(name for name, value, _ in self.beside() if not np.isfinite(value.above))
+
+    def beside(self) -> list[tuple[str, Constant, Meaning]]:
+        """What acts that is no input: the constants of wind and of unknown parameters, as `BoundConstants.items`."""
+        wind = [] if self.wind is None else self.wind.constants.items()
+        return wind + ([] if self.residual is None else self.residual.items())
 
 
 _SMALL_IS_SAFE = _INFIMA | {"rho_r", "rho_a", "lam"}

@@ -26,6 +26,7 @@ from tubecert.conditions.predictor import predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
 from tubecert.conditions.verdict import UNKNOWN, Shortfall
+from tubecert.conditions.wind import not_covered
 from tubecert.enclosure.interval import Interval
 
 Margins = dict[str, Interval]
@@ -142,8 +143,9 @@ def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
 
 
 def _provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """Several of the paper's printed formulas are wrong: they prove nothing."""
-    return (Shortfall(claim="corrected_formulas", margin=UNKNOWN),) if problem.as_printed else ()
+    """Several of the paper's printed formulas are wrong, and theorem A knows nothing that is no input."""
+    printed = (Shortfall(claim="corrected_formulas", margin=UNKNOWN),) if problem.as_printed else ()
+    return (*printed, *not_covered(problem))
 
 
 THEOREM = Theorem(

@@ -34,6 +34,7 @@ from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.wind import is_felt, provisos, pushed, taken, turning
 from tubecert.enclosure.interval import Interval
 
 
@@ -88,7 +89,9 @@ def sampled_state(n: Numbers[T], Ts: T, age: Ages[T], Y: T) -> SampledState[T]:
     b = _gain_drift(n)
     H1 = minimum(n.Dh, n.H0 + s1 * Ts)
     S_T = s1 * age.w + age.m * (s1 + b * Y)
-    d1 = n.d0 * exp(-n.lam * Ts) + (n.beta * H1 + n.delta) * Ts * decay_mean(n.lam * Ts)
+    if is_felt(n):
+        S_T = S_T + taken(n) + turning(n) * age.m * Y
+    d1 = n.d0 * exp(-n.lam * Ts) + (n.beta * H1 + pushed(n)) * Ts * decay_mean(n.lam * Ts)
     return SampledState(H1=H1, S_T=S_T, d1=d1)
 
 
@@ -112,7 +115,10 @@ def least_speed(n: Numbers[T], Ts: T, age: Ages[T]) -> T:
         drift + n.DB * n.Dh, least_solution(drift + n.DB * (n.H0 + n.Dht * Ts), n.DB * n.Dhx * Ts)
     )
     lag = age.w + age.m
-    later = least_solution(drift + n.DB * n.Dht * lag, n.DB * (n.Dhx * lag + b * age.m))
+    known, slope = drift + n.DB * n.Dht * lag, n.DB * (n.Dhx * lag + b * age.m)
+    if is_felt(n):
+        known, slope = known + n.DB * taken(n), slope + n.DB * turning(n) * age.m
+    later = least_solution(known, slope)
     return minimum(crude, maximum(first, later))
 
 
@@ -130,7 +136,7 @@ def _bound(n: Numbers[T], omega: T, s: SampledState[T]) -> DistanceBound[T]:
         H0=s.H1,
         S=s.S_T,
         e=number(0, n.d0),
-        delta=n.delta,
+        delta=pushed(n),
         lam=n.lam,
         omega=omega,
         horizon=n.horizon,
@@ -191,6 +197,7 @@ THEOREM = Theorem(
     ceilings=lambda problem, recipe: {"sampled": sampled_ceiling(problem, recipe)},
     formula=_at_once,
     obstacles=obstacles,
+    provisos=provisos,
     ultimate=ultimate_radius,
     own_predictor=True,
 )

@@ -104,9 +104,11 @@ class Theorem(Generic[R]):
     def unbounded(self, problem: TubeProblem) -> tuple[str, ...]:
         """The constants that it needs and that have no finite bound, by field name."""
         constants = problem.constants
+        beside = problem.unbounded_wind()
         if all(np.isfinite(getattr(constants, field).above) for field in FIELDS.values()):
-            return ()
-        return tuple(sorted(x for x in self.needs(problem) if not np.isfinite(getattr(constants, x).above)))
+            return beside
+        own = sorted(x for x in self.needs(problem) if not np.isfinite(getattr(constants, x).above))
+        return (*own, *beside)
 
 
 class _Recorder:
@@ -118,6 +120,8 @@ class _Recorder:
     def __getattr__(self, name: str) -> Any:
         if name not in Numbers.__slots__:
             raise AttributeError(name)
+        if name == "horizon" or name.startswith(("wind_", "rest_")):
+            return None
         # R_H is chosen from sup |h|
         self.asked.add("Dh" if name == "R" else name)
-        return None if name == "horizon" else np.asarray(1.0)
+        return np.asarray(1.0)

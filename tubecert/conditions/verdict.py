@@ -17,8 +17,9 @@ __all__ = ["NOTHING_FOUND", "UNKNOWN", "Shortfall", "Verdict", "unbounded"]
 class Shortfall:
     """A claim that is not proven: its margin (relative to what is allowed), both sides where known.
 
-    `claim` is `26a`, `26b`, `26c`, `distance`, `sampled` at gains asked for; `26a`, `initial_distance`, `plan_defect`
-    where no gains can help; `bounded` where `constant` has no finite bound; `corrected_formulas` where the formulas
+    `claim` is `26a`, `26b`, `26c`, `distance`, `sampled` at gains asked for; `26a`, `initial_distance`, `plan_defect`,
+    `parameters`, `wind` where no gains can help; `wind_bound`, `wind_not_covered` where nothing follows for a wind;
+    `bounded` where `constant` has no finite bound; `corrected_formulas` where the formulas
     themselves prove nothing; `proven_gains` where the search failed (see `claims.ConditionHolds`).
     """
 

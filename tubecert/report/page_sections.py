@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
@@ -220,7 +220,7 @@ def _constants(result: Result) -> Iterator[Block]:
 
 def _order(constants: Mapping[str, Bound]) -> list[str]:
     """The constants of the paper first, then what follows from them, each in the order of its table."""
-    known = {name: i for i, name in enumerate([*TABLE, *DERIVED])}
+    known = {name: i for i, name in enumerate(EVERY)}
     return sorted(constants, key=lambda name: (known.get(name, len(known)), name))
 
 

@@ -102,7 +102,7 @@ def equations() -> Mapping[str, EquationPage]:
 @cache
 def constants() -> Mapping[str, ConstantPage]:
     """The pages of the constants, by their names in a certificate."""
-    from tubecert.bounds.constants import DERIVED, TABLE
+    from tubecert.bounds.constants import EVERY
 
     data = _data("constants")
     return {
@@ -114,7 +114,7 @@ def constants() -> Mapping[str, ConstantPage]:
             equation=meaning.equation,
             **data[name],
         )
-        for name, meaning in {**TABLE, **DERIVED}.items()
+        for name, meaning in EVERY.items()
     }
 
 

@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tubecert.bounds.constants import DERIVED, TABLE
+from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Bound, MetricData, Plans, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Section = tuple[str, list["RenderableType"]]
-MEANINGS = {**TABLE, **DERIVED}
+MEANINGS = EVERY
 VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 

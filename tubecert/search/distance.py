@@ -20,6 +20,7 @@ from tubecert.conditions.obstacles import reach
 from tubecert.conditions.predictor import Predictor, predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.wind import felt, is_felt, pushed, taken
 from tubecert.kernel import obstacles
 from tubecert.search.bandwidths import bandwidths_around
 from tubecert.search.scan import boundary, minimum_lanes, minimum_log, serves, smallest
@@ -56,7 +57,7 @@ def least_rate(
         Y = theorem_b.least_speed(n, omega, e)
         return theorem_b.distance_bound(n, omega, theorem_b.uncertainty(n, Y, omega), e).supremum() < reach(n)
 
-    most = np.broadcast_to((reach(n) * n.lam - n.delta) / n.beta, omega.shape)
+    most = np.broadcast_to((reach(n) * n.lam - pushed(n)) / n.beta, omega.shape)
     zero = np.zeros_like(omega)
     feasible = (most > 0) & inside(zero)
     e_max = boundary(inside, zero, np.where(feasible, most, 0.0)) * (1 - _SLACK)
@@ -64,12 +65,25 @@ def least_rate(
     def rate(e: Array) -> Array:
         Y = theorem_b.least_speed(n, omega, e)
         p = _predictor(problem, n, omega, Y) if gain is None else Predictor.of_gain(gain, omega)
+        if is_felt(n):
+            return np.where(feasible & (e > 0), _rate_beside(n, omega, Y, p, e), np.inf)
         return np.where(feasible & (e > 0), (theorem_b.filter_error(n, Y, omega, p) / e) ** 2, np.inf)
 
     if not np.any(n.DBpx > 0):
         return rate(e_max), e_max
     # Deta grows with Y(e): the least may lie inside
     return minimum_lanes(rate, np.maximum(1e-4 * e_max, 1e-300), np.maximum(e_max, 1e-300))
+
+
+def _rate_beside(n: Numbers[Array], omega: Array, Y: Array, p: Predictor[Array], e: Array) -> Array:
+    """The Gamma for which (7.9) gives e, infinite where none does: a quadratic equation for 1/Gamma."""
+    room = (e - taken(n)) / (n.DBpx * Y + n.DBp * (omega + p.shifted))
+    drag, hs = felt(n, p) / p.q, n.Dh + n.R
+    c = 2 * hs * (n.Dht + n.Dhx * Y) / p.q
+    K, A = hs**2 + c, room**2 - 2 * drag**2
+    linear = A * K + 2 * drag**2 * c
+    root = 2 * drag * np.sqrt(np.maximum(A * K * c + drag**2 * (c**2 + K**2), 0.0))
+    return np.where(room > 2 * drag, (linear + root) / (room**2 * (room**2 - 4 * drag**2)), np.inf)
 
 
 @quiet
@@ -95,21 +109,20 @@ def recipes_at(
     """Recipes at given gains: the least fixed point Y, e, S in floats, inflated, as decimals."""
     R_H = problem.projection_radius
     n = problem.floats(R_H)
-    omega, root = (np.array([float(x) for x in xs]) for xs in (bandwidths, rates))
-    root = np.sqrt(root)
+    omega, Gamma = (np.array([float(x) for x in xs]) for xs in (bandwidths, rates))
     given = [float(g) for g in gains if g is not None]
     p = predictor(problem.A_m, omega, np.array(given) if given else None)
     e = np.zeros_like(omega)
     for _ in range(400):
         # Y is closed for a given e, so that only the error itself is iterated
         Y = theorem_b.least_speed(n, omega, e)
-        raised = theorem_b.filter_error(n, Y, omega, p) / root
+        raised = theorem_b.error_needed(n, Y, omega, p, Gamma)
         settled = np.all(raised <= e * (1 + 1e-15))
         e = raised
         if settled:
             break
     Y = Y * (1 + inflation)
-    e = theorem_b.filter_error(n, Y, omega, p) / root * (1 + 1e-12)
+    e = theorem_b.error_needed(n, Y, omega, p, Gamma) * (1 + 1e-12)
     S = theorem_b.uncertainty(n, Y, omega) * (1 + 1e-12) + 1e-12 * n.H0 + 1e-30
     return [
         DistanceRecipe(

@@ -11,6 +11,7 @@ from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
 from tubecert.bounds.compute import bound_constants
 from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.suprema import Suprema
+from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.claims import (
     ConstantBounded,
     DeclareUncertaintyBound,
@@ -19,7 +20,7 @@ from tubecert.claims import (
     UncertaintyBound,
 )
 from tubecert.conditions.kernels import Kernel
-from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.conditions.problem import Drift, Formulas, TubeProblem, Wind
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.constant import Constant, printable_above
@@ -172,8 +173,11 @@ def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> Tu
     spec, adaptation = question.spec, question.spec.adaptation
     epsilon, rho_a = tube.radii
     formulas = Formulas(question.options.formulas)
+    blows = wind_constants(suprema, constants.metric_input_gain)
     return TubeProblem(
         constants=constants,
+        wind=None if blows is None else Wind(bound=question.model.wind_bound, constants=blows),
+        residual=residual_constants(suprema),
         rate=question.model.rate,
         epsilon=epsilon,
         rho_a=rho_a,

@@ -197,7 +197,8 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
     enclosed, judged = reached.enclosed, reached.judged
     if enclosed is None:
         return {}
-    own = {name: constant_data(value, meaning) for name, value, meaning in enclosed.constants.items()}
+    all_of_tube = [*enclosed.constants.items(), *enclosed.problem.beside()]
+    own = {name: constant_data(value, meaning) for name, value, meaning in all_of_tube}
     derived = {} if judged is None else judged.derived()
     return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
 

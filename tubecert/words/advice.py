@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tubecert.bounds.constants import TABLE
+from tubecert.bounds.constants import EVERY
 from tubecert.claims import (
     AskForRateBelow,
     AskForRateUpTo,
@@ -63,7 +63,7 @@ def _is_known(item: Relax) -> bool:
 
 
 def _halving(item: HalveConstant) -> str:
-    meaning = TABLE[item.constant]
+    meaning = EVERY[item.constant]
     share = 100 * (1 - item.factor)
     return f"halving {meaning.symbol} ({meaning.words}) would lower the least Gamma by {share:.0f} %"
 

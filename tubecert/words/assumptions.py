@@ -16,6 +16,7 @@ from tubecert.claims import (
     UncertaintyAsDeclared,
     UncertaintyAsGiven,
     UpToHorizon,
+    WindWithin,
 )
 from tubecert.words.digits import ceiling_text, floor_text
 
@@ -43,6 +44,8 @@ def assumed(item: Assumption) -> str:
             return f"the projection is smooth with layer {float(item.layer):g}"
         case UpToHorizon():
             return f"the claim is for 0 <= t <= {float(item.horizon):g} s"
+        case WindWithin():
+            return _wind(item)
         case UncertaintyAsGiven():
             others = ", or any other within the bounds h, h_x, h_t of this certificate"
             return "the uncertainty is the expression of the specification" + (
@@ -50,6 +53,12 @@ def assumed(item: Assumption) -> str:
             )
         case _:
             return _FIXED[type(item)]
+
+
+def _wind(item: WindWithin) -> str:
+    size = "bounded" if item.bound is None else f"|w| <= {float(item.bound):g}"
+    rate = "" if item.rate is None else f", |dw/dt| <= {float(item.rate):g} 1/s"
+    return f"a wind acts as E(x) w beside the inputs, {size}{rate}, and is otherwise arbitrary"
 
 
 def _geodesics(item: ExactGeodesics) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
-from tubecert.bounds.constants import TABLE
+from tubecert.bounds.constants import EVERY
 from tubecert.claims import (
     Claim,
     ConditionHolds,
@@ -46,7 +46,7 @@ from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation
 from tubecert.words.digits import floor_text
 
 _OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
-_WITHOUT_MARGIN = ("corrected_formulas", "proven_gains", "any_gains")
+_WITHOUT_MARGIN = ("wind_bound", "wind_not_covered", "corrected_formulas", "proven_gains", "any_gains")
 
 
 def title(claim: Claim) -> str:
@@ -183,7 +183,7 @@ def _plan_bounded(claim: PlanBounded, reason: Reason) -> str:
 
 def unbounded(constant: str) -> str:
     """That a constant has no finite bound."""
-    meaning = TABLE[constant]
+    meaning = EVERY[constant]
     return f"{meaning.words} ({meaning.symbol}) could not be bounded within the budget of boxes"
 
 

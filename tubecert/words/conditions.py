@@ -25,6 +25,10 @@ ROLES: Mapping[Role, str] = {
 NAMES: Mapping[str, str] = {
     "initial_distance": "dbar <= d0",
     "plan_defect": "dbar <= delta/lambda",
+    "parameters": "dbar <= delta/lambda, with unknown parameters",
+    "wind": "dbar <= delta/lambda, with the wind",
+    "wind_bound": "wind without a bound",
+    "wind_not_covered": "stated without wind",
     "corrected_formulas": "as-printed",
     "proven_gains": "nothing found",
     "any_gains": "nothing found",
@@ -50,6 +54,12 @@ SAYS: Mapping[str, str] = {
     "hardware_level": "the level dhat and the noise must fit into dbar together",
     "initial_distance": "d0, the length of the segment to the start, must be below dbar = sqrt(a) rho",
     "plan_defect": "the plan's defect alone must keep the distance below dbar",
+    "parameters": "what unknown parameters do beside the inputs, with the plan's defect, must keep the distance "
+    "below dbar",
+    "wind": "what the wind does beside the inputs, with the plan's defect, must keep the distance below dbar",
+    "wind_bound": "the bound of the wind is searched for, which certificate H does; nothing follows here without it",
+    "wind_not_covered": "the theorem is stated for inputs and matched uncertainty alone: it says nothing of a wind, or "
+    "of unknown parameters, beside what the inputs can make",
     "corrected_formulas": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
     "proven_gains": "gains that seem to serve were found, but none could be proven to; the constants may be too wide "
     "(lower --gap), or the margins too thin for the arithmetic",

@@ -1,0 +1,76 @@
+"""What a wind adds to theorems 0, B and C: to the push on the distance, to |xdot|, to the estimate. Trusted.
+
+Without a wind every function here gives back what it was given, digit by digit. Implements: theory section 7.
+"""
+
+from __future__ import annotations
+
+from tubecert.conditions.arithmetic import T, number, sqrt
+from tubecert.conditions.predictor import Predictor
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.verdict import UNKNOWN, Shortfall
+
+
+def pushed(n: Numbers[T]) -> T:
+    """What lengthens the geodesic beside what the filter leaves of h: delta + beta_w |w|, (7.3)."""
+    return n.delta if n.wind_push is None else n.delta + n.wind_push
+
+
+def drifting(n: Numbers[T]) -> T:
+    """The bound of |f + B u*|, and of E w with it: phi + D_E |w|, (7.4)."""
+    return n.phi if n.wind_speed is None else n.phi + n.wind_speed
+
+
+def _sum(first: T | None, second: T | None) -> T | None:
+    if first is None or second is None:
+        return second if first is None else first
+    return first + second
+
+
+def beside(n: Numbers[T]) -> T | None:
+    """|E w + r|: what moves the state and is no input; None without wind and unknown parameters."""
+    return _sum(n.wind_speed, n.rest_speed)
+
+
+def taken(n: Numbers[T]) -> T:
+    """What certificate C takes for a part of h at least: eps_w |w| of (7.6)."""
+    return number(0, n.d0) if n.wind_error is None else n.wind_error
+
+
+def turning(n: Numbers[T]) -> T:
+    """And what more of it per distance that x moves, because B^+ turns: DBpx |E w + r| of (7.6)."""
+    other = beside(n)
+    return number(0, n.d0) if other is None else n.DBpx * other
+
+
+def is_felt(n: Numbers[T]) -> bool:
+    """Whether anything that is no input acts."""
+    return n.wind_speed is not None or n.rest_speed is not None
+
+
+def felt(n: Numbers[T], p: Predictor[T]) -> T:
+    """What drives the prediction error of certificate B beside the inputs: zb of (7.7)."""
+    found = _sum(n.wind_matched, n.rest_matched) if p.scalar else beside(n)
+    return number(0, n.d0) if found is None else found
+
+
+def prediction(n: Numbers[T], s1: T, p: Predictor[T], Gamma: T, zb: T) -> T:
+    """The bound of |xt| of (7.8): not only what adaptation leaves, but what is no input."""
+    hs = n.Dh + n.R
+    drag = zb / p.q
+    return sqrt(hs**2 / Gamma + (drag + sqrt(drag**2 + 2 * hs * s1 / (p.q * Gamma))) ** 2)
+
+
+def provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """Why nothing follows for a wind: its bound is not given, but looked for."""
+    if problem.wind is None or problem.wind.bound is not None:
+        return ()
+    return (Shortfall(claim="wind_bound", margin=UNKNOWN),)
+
+
+def not_covered(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """Why certificate A says nothing: it is stated without anything beside the inputs."""
+    wind, rest = problem.wind, problem.residual
+    blows = wind is not None and wind.pushes
+    moves = rest is not None and rest.size.above > 0
+    return (Shortfall(claim="wind_not_covered", margin=UNKNOWN),) if blows or moves else ()
