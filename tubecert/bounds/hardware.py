@@ -18,6 +18,7 @@ import numpy as np
 
 from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
 from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.bounds.wind import joined
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.constant import decimal_above
@@ -294,11 +295,16 @@ class HardwareSuprema(Suprema):
 
 
 def clip_box(suprema: Suprema) -> Box:
-    """A box of decimals that contains 0 and h over the tube, per input; h is given as expressions."""
+    """A box of decimals that contains 0 and h over the tube, per input; h is given as expressions.
+
+    h is what it is with a wind that joins it, and with unknown parameters (theory 7.1).
+    """
+    total, blown = joined(suprema)
     found = []
-    for name, h in zip(suprema.model.inputs, suprema.h, strict=True):
+    for i, (name, h) in enumerate(zip(suprema.model.inputs, total, strict=True)):
         low, high = suprema.range_of(f"h of {name}", h)
-        found.append((-_decimal(-low), _decimal(high)))
+        more = suprema.norms(f"wind of {name}", [(blown[i],)]).above if blown else 0.0
+        found.append((-_decimal(-low, more), _decimal(high, more)))
     return tuple(found)
 
 
@@ -314,9 +320,10 @@ def corners(noise: Sequence[Fraction]) -> list[Matrix]:
     return found
 
 
-def _decimal(bound: float) -> Fraction:
-    """The least decimal >= bound and 0."""
-    return decimal_above(Fraction(bound)) if bound > 0 else Fraction(0)
+def _decimal(bound: float, more: float) -> Fraction:
+    """The least decimal >= bound + more and 0."""
+    whole = Fraction(bound) + Fraction(more)
+    return decimal_above(whole) if whole > 0 else Fraction(0)
 
 
 def _largest(found: Sequence[Constant]) -> Constant:

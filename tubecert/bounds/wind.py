@@ -65,17 +65,22 @@ class Beside:
         return reached, _exact(combine(1, own, -1, multiply(fields.B, reached)))
 
     @property
-    def adapted(self) -> tuple[Matrix, Fraction, Fraction] | None:
-        """B^+ E with the bounds of |w| and of |w'|, where it is a part of h; None where it is not."""
+    def blown(self) -> Matrix:
+        """B^+ E times the bound of |w|, where B^+ E w is a part of h; empty where it is not."""
         model = self.suprema.model
         if not model.E or model.wind_bound is None or model.wind_rate is None or _vanishes(self.reached):
-            return None
-        return self.reached, model.wind_bound, model.wind_rate
+            return ()
+        return _times(model.wind_bound, self.reached)
+
+    @property
+    def rate(self) -> Fraction:
+        """The bound of |w'|."""
+        return self.suprema.model.wind_rate or Fraction(0)
 
     @property
     def joins_uncertainty(self) -> bool:
         """Whether h is more than the specification's own."""
-        return self.adapted is not None or any(e is not ZERO for e in self.known)
+        return bool(self.blown) or any(e is not ZERO for e in self.known)
 
 
 def _exact(rows: Matrix) -> Matrix:
@@ -140,11 +145,8 @@ def uncertainty_constants(
     What is declared is about the specification's own h.
     """
     beside = Beside(suprema)
-    own = suprema.model.h
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
-    total = known if own is None else tuple(a + b for a, b in zip(own, known, strict=True))
-    reached, bound, rate = beside.adapted or ((), Fraction(0), Fraction(0))
-    blown = _times(bound, reached)
+    total, blown = joined(suprema)
 
     def size(name: str, entries: Entries) -> Constant:
         """sup (|v| + |w| |B^+ E|): attained where there is one input."""
@@ -163,9 +165,17 @@ def uncertainty_constants(
     in_time = suprema.norms("h_t", [column(derivatives(total, TIME))]) if by_time is None else by_time
     if blown:
         lipschitz = grown(lipschitz, suprema.norms("h_x", suprema.fields.slopes(blown)))
-        in_time = grown(in_time, suprema.norms("h_t", [_times(rate, reached)]))
+        in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.reached)]))
     at_start = whole if first is not None else _at_start(suprema, start, total, blown)
     return {"h": whole, "h_x": lipschitz, "h_t": in_time, "h_initial": at_start}
+
+
+def joined(suprema: Suprema) -> tuple[Entries, Matrix]:
+    """H = v + G w/|w|: its entries v without wind, of what is given as expressions, and G (empty without wind)."""
+    beside, own = Beside(suprema), suprema.model.h
+    known = beside.known or (ZERO,) * len(suprema.model.inputs)
+    total = known if own is None else tuple(a + b for a, b in zip(own, known, strict=True))
+    return total, beside.blown
 
 
 def _at_start(suprema: Suprema, start: InitialState, total: Entries, blown: Matrix) -> Constant:

@@ -382,8 +382,7 @@ def in_step(first: Fraction, second: Fraction) -> bool:
 
 def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
     """The safe side of everything that is known; `ValueError` without a machine."""
-    machine = _machine(problem)
-    wind = getattr(problem, "wind", None)
+    machine, wind = _machine(problem), problem.wind
     zero = Interval.of(0)
     n = problem.proven(R)
     return Plant(
@@ -392,7 +391,7 @@ def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
         beta_w=zero if wind is None else Interval.exact(wind.constants.push.above),
         D_E=zero if wind is None else Interval.exact(wind.constants.size.above),
         eps_w=zero if wind is None else Interval.exact(wind.constants.explained.above),
-        rest=zero,
+        rest=zero if problem.residual is None else Interval.exact(problem.residual.size.above),
         held=machine.asked.held,
         drift=None if machine.drift is None else Interval.of(machine.drift),
     )
@@ -497,7 +496,7 @@ def is_the_machine(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
     """Whether a recipe is about the machine, the noise and the wind of the problem, where they are given."""
     if problem.machine is None:
         return False
-    asked, wind = problem.machine.asked, getattr(problem, "wind", None)
+    asked, wind = problem.machine.asked, problem.wind
     feedback_time = recipe.sample_time if asked.feedback_time is None else asked.feedback_time
     delay = recipe.sample_time if asked.one_sample else asked.delay
     noise = Fraction(1) if isinstance(asked.noise, tuple) else asked.noise
