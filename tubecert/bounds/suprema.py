@@ -165,6 +165,21 @@ class Suprema:
         """Dus = sup_t |u*(t)|."""
         return self._on_plan("u_star", SumOfNorms([column(self.plan.u)], self.plan.fixed))
 
+    def input_range(self, index: int, sharp: float) -> tuple[Constant, Constant]:
+        """(inf u*_i, sup u*_i), each to `sharp` in units of the input, if not to the gap that was asked for."""
+        name, u = self.model.inputs[index], self.plan.u[index]
+        effort = replace(self.effort, absolute=sharp)
+
+        def most(e: Expression) -> Constant:
+            if e.is_constant:
+                low, high = fraction_bounds(e.fraction)
+                return Constant(below=low, above=high)
+            entry = Pencil([[e]], [[ONE]], fixed=self.plan.fixed)
+            return self._constant(self._search_plan(f"range of {name}", entry, effort))
+
+        least = most(-u)
+        return Constant(below=-least.above, above=-least.below, at=least.at), most(u)
+
     # -- uncertainty -------------------------------------------------------------------------------------------
 
     def lipschitz(self, entries: tuple[Expression, ...], fields: Fields | None = None) -> Constant:

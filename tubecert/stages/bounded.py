@@ -20,6 +20,7 @@ from tubecert.claims import (
     UncertaintyBound,
 )
 from tubecert.conditions.kernels import Kernel
+from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem, Wind
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -31,6 +32,7 @@ from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
 from tubecert.spec import Obstacle
+from tubecert.stages.machine import machine_of
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.stages.tube import TubeFound
@@ -87,6 +89,7 @@ class Bounded:
     half_widths: Mapping[str, float]
     geodesics: GeodesicTest
     clearances: tuple[Cleared, ...] = ()
+    machine: Machine | None = None
 
     def __post_init__(self) -> None:
         if _endless(self.enclosed) is not None:
@@ -99,8 +102,8 @@ class Bounded:
 
     @property
     def problem(self) -> TubeProblem:
-        """What the theorems are asked about."""
-        return self.enclosed.problem
+        """What the theorems are asked about, with the machine if there is one."""
+        return replace(self.enclosed.problem, machine=self.machine)
 
 
 def enclose(tube: TubeFound) -> Enclosed:
@@ -137,10 +140,13 @@ def unmet(enclosed: Enclosed) -> Stopped | None:
 
 
 def _bounded(enclosed: Enclosed) -> Bounded:
+    spec, problem, suprema = enclosed.question.spec, enclosed.problem, enclosed.suprema
+    geodesics = _geodesics(enclosed)
     return Bounded(
         enclosed=enclosed,
         half_widths=_half_widths(enclosed),
-        geodesics=_geodesics(enclosed),
+        geodesics=geodesics,
+        machine=machine_of(spec, problem, suprema, geodesics),
         clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
     )
 

@@ -1,0 +1,46 @@
+"""What theorem H knows of the machine: the constants that it needs over the tube, and the range of every input.
+
+In: the constants over a tube whose specification has `hardware`. Out: a `Machine`. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from tubecert.bounds.hardware import Box, clip_box, hardware_constants
+from tubecert.bounds.suprema import Suprema
+from tubecert.bounds.wind import Beside
+from tubecert.conditions.machine import Machine
+from tubecert.conditions.problem import TubeProblem
+from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.metric.geodesic import GeodesicTest
+from tubecert.spec import Spec
+
+_SHARP = 1e-4  # of sup |u*|: how closely u* is enclosed at least
+
+
+def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: GeodesicTest) -> Machine | None:
+    """The machine of a specification; None if it has none."""
+    if spec.hardware is None:
+        return None
+    sharp = _SHARP * max(problem.constants.u_star.above, _SHARP)
+    ranges = {name: suprema.input_range(i, sharp) for i, name in enumerate(spec.inputs)}
+    return Machine(
+        constants=hardware_constants(suprema, spec.hardware, geodesics, problem.constants),
+        clip=_clip(spec, suprema),
+        asked=spec.hardware,
+        widths={
+            name: printable_above(w.above) for name, w in zip(spec.states, suprema.half_widths(), strict=True)
+        },
+        inputs={
+            name: (printable_below(least.below), printable_above(greatest.above))
+            for name, (least, greatest) in ranges.items()
+        },
+    )
+
+
+def _clip(spec: Spec, suprema: Suprema) -> Box:
+    """The box of h where that is an expression and nothing else; else empty, which stands for the ball of its size."""
+    bounds = spec.uncertainty.bounds
+    declared = suprema.model.h is None or (bounds is not None and bounds.h is not None)
+    if declared or Beside(suprema).joins_uncertainty:
+        return ()
+    return clip_box(suprema)
