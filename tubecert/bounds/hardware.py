@@ -30,24 +30,25 @@ from tubecert.enclosure.pencil import Pencil, SumOfPencils
 from tubecert.expression import ZERO, derivatives
 from tubecert.expression.matrix import (
     Matrix,
-    adjugate,
     column,
     combine,
     constants,
-    determinant,
     identity,
     jacobian,
     multiply,
     transpose,
 )
+from tubecert.metric.covariant import Geometry, MetricTensorNorm
 from tubecert.metric.geodesic import GeodesicTest
-from tubecert.model import TIME, divide
+from tubecert.model import TIME
 from tubecert.spec import Hardware, Knots
 
+_FEW = 4_000  # boxes
 Box = tuple[tuple[Fraction, Fraction], ...]
 
 
-def _of(symbol: str, unit: str, words: str) -> dict[str, Meaning]:
+def entry(symbol: str, unit: str, words: str) -> dict[str, Meaning]:
+    """The registry entry of a constant; in formulas it has its symbol for a name."""
     return {"meaning": Meaning(symbol=symbol, equation="theory 8", unit=unit, words=words, number=symbol)}
 
 
@@ -58,36 +59,36 @@ class HardwareConstants:
     One unit of noise is |n| <= 1, or |n_i| <= what is given for state i.
     """
 
-    feedback_slope: Constant = field(metadata=_of("D_F", "1/s", "sup |F~|, both signs of its eigenvalues"))
+    feedback_slope: Constant = field(metadata=entry("D_F", "1/s", "sup |F~|, both signs of its eigenvalues"))
     feedback_curvature: Constant = field(
-        metadata=_of("D_Fx", "1/(x s)", "how much F~ changes per distance that a geodesic is moved")
+        metadata=entry("D_Fx", "1/(x s)", "how much F~ changes per distance that a geodesic is moved")
     )
     plan_tilt: Constant = field(
-        metadata=_of(
+        metadata=entry(
             "D_cx", "1/(u s)", "how much B'M changes per distance that the plan moves, in the metric"
         )
     )
-    plan_speed: Constant = field(metadata=_of("Ystar", "x/s", "sup |x*'|"))
+    plan_speed: Constant = field(metadata=entry("Ystar", "x/s", "sup |x*'|"))
     drift_difference: Constant = field(
-        metadata=_of("phi_rel", "x/s", "sup |f + B u* at x, less the same at x*|")
+        metadata=entry("phi_rel", "x/s", "sup |f + B u* at x, less the same at x*|")
     )
     drift_difference_metric: Constant | None = field(
-        metadata=_of("phi_relM", "d/s", "sup |Theta (f(x) - f(x*))|, for constant M and B")
+        metadata=entry("phi_relM", "d/s", "sup |Theta (f(x) - f(x*))|, for constant M and B")
     )
     drift_slope_metric: Constant | None = field(
-        metadata=_of("D_A", "1/s", "sup |Theta f_x Theta^-1|, for constant M and B")
+        metadata=entry("D_A", "1/s", "sup |Theta f_x Theta^-1|, for constant M and B")
     )
     drift_explained: Constant = field(
-        metadata=_of("D_pf", "u/x", "sup |B^+ f_x|: how the drift between two samples enters the estimate")
+        metadata=entry("D_pf", "u/x", "sup |B^+ f_x|: how the drift between two samples enters the estimate")
     )
-    noise_size: Constant = field(metadata=_of("n_E", "x", "size of one unit of noise"))
-    noise_metric: Constant = field(metadata=_of("n_M", "d", "sup |Theta n| over one unit of noise"))
-    noise_explained: Constant = field(metadata=_of("n_B", "u s", "sup |B^+ n| over one unit of noise"))
+    noise_size: Constant = field(metadata=entry("n_E", "x", "size of one unit of noise"))
+    noise_metric: Constant = field(metadata=entry("n_M", "d", "sup |Theta n| over one unit of noise"))
+    noise_explained: Constant = field(metadata=entry("n_B", "u s", "sup |B^+ n| over one unit of noise"))
     input_rate: Constant | None = field(
-        metadata=_of("Lus", "u/s", "Lipschitz constant of u*, if u* is held from sample to sample")
+        metadata=entry("Lus", "u/s", "Lipschitz constant of u*, if u* is held from sample to sample")
     )
-    symbols: Constant = field(metadata=_of("G", "1/x", "sup of the norm of the Christoffel symbols"))
-    symbols_slope: Constant = field(metadata=_of("L_G", "1/x^2", "sup of the norm of their derivatives"))
+    symbols: Constant = field(metadata=entry("G", "1/x", "sup of the norm of the Christoffel symbols"))
+    symbols_slope: Constant = field(metadata=entry("L_G", "1/x^2", "sup of the norm of their derivatives"))
 
     def printable(self) -> HardwareConstants:
         """The same with every enclosure widened to printable bounds."""
@@ -130,6 +131,11 @@ class HardwareSuprema(Suprema):
     """The suprema of a model over the tube that only certificate H needs."""
 
     @property
+    def straight(self) -> bool:
+        """Whether the metric is constant."""
+        return self._white is not None
+
+    @property
     def flat(self) -> bool:
         """Whether the metric and B are constant."""
         return self._white is not None and self.model.constant_input
@@ -153,34 +159,47 @@ class HardwareSuprema(Suprema):
         )
 
     def feedback_curvature(self) -> Constant:
-        """D_Fx >= sup over |v| = 1 of |eigenvalue| of (T_v, W), T_v = F_v - W_v M F - F M W_v."""
-        slopes = self.fields.slopes(self.model.F)
+        """D_Fx >= sup over |v| = 1 of |eigenvalue| of (T_v, W), T_v = F_v - W_v M F - F M W_v.
+
+        By the norm of v -> T_v as a matrix from vectors to pairs of them and v.
+        """
+        objective = Geometry(self.model).slope_by_coordinates(self.fields)
         if self._white is None:
-            MF = multiply(_inverse(self.model.W), self.model.F)
-            turned = [multiply(w, MF) for w in self.fields.slopes(self.model.W)]
-            slopes = [
-                combine(1, f, -1, combine(1, w, 1, transpose(w))) for f, w in zip(slopes, turned, strict=True)
-            ]
-        slopes = [slope for slope in slopes if _moves(slope)]
-        if not slopes:
+            return self._tensor("feedback_curvature", objective)
+        slopes = [self._white.form(slope) for slope in self.fields.slopes(self.model.F)]
+        above = SumOfNorms([tuple(row for slope in slopes for row in slope)])
+        if above.is_zero:
             return Constant.exactly(0.0)
-        return self._constant(self._over_tube("feedback_curvature", SumOfPencils(slopes, self.model.W)))
+        found = self._over_tube("feedback_curvature", above)
+        bound = self._white.of_form(self._constant(found))
+        return replace(bound, below=min(objective.attained(found.at), bound.above))
 
     def plan_tilt(self) -> Constant:
         """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|."""
-        if self.flat or (self.plan.is_constant and self.plan.allowance is None):
+        if self.flat or not self._plan_moves:
             return Constant.exactly(0.0)
-        W, columns = self.model.W, self.model.columns
-        BM = multiply(columns, _inverse(W))
-        slopes = zip(self.fields.slopes(columns), self.fields.slopes(W), strict=True)
-        blocks = [_block(combine(1, b, -1, multiply(BM, w))) for b, w in slopes]
-        blocks = [self.plan.on(self.model, block) for block in blocks if _moves(block)]
-        if not blocks:
-            return Constant.exactly(0.0)
-        objective = SumOfPencils(
-            blocks, self.plan.on(self.model, _diagonal(identity(len(columns)), W)), fixed=self.plan.fixed
-        )
-        return self._constant(self._search_plan("plan_tilt", objective))
+        objective = Geometry(self.model).tilt_by_coordinates(self.fields, self._on_the_plan, self.plan.fixed)
+        return self._tensor_on_plan("plan_tilt", objective)
+
+    def _on_the_plan(self, rows: Matrix) -> Matrix:
+        return self.plan.on(self.model, rows)
+
+    @property
+    def _plan_moves(self) -> bool:
+        return not self.plan.is_constant or self.plan.allowance is not None
+
+    def _tensor(self, name: str, objective: MetricTensorNorm) -> Constant:
+        found = self._over_tube(name, objective, self._few)
+        return replace(self._constant(found), below=min(objective.attained(found.at), found.above))
+
+    def _tensor_on_plan(self, name: str, objective: MetricTensorNorm) -> Constant:
+        found = self._search_plan(name, objective, self._few)
+        return replace(self._constant(found), below=min(objective.attained(found.at), found.above))
+
+    @property
+    def _few(self) -> Effort:
+        """For what enters in the second place only."""
+        return replace(self.effort, budget=min(self.effort.budget, _FEW), cheap=0)
 
     # -- plan --------------------------------------------------------------------------------------------------
 
@@ -214,10 +233,15 @@ class HardwareSuprema(Suprema):
         """
         drift = self.model.drift_on_plan()
         by_mean = self._by_mean_value(self._known_inputs(drift))
-        if not self._written:
+        if self.flat or not self._written:  # where M and B are constant, no formula contains it
             return by_mean
-        name, difference = "drift_difference", self.fields.of_vector(self._from_plan(drift))
-        return _smaller(self.norms(name, [difference]), by_mean)
+        difference = SumOfNorms([self.fields.of_vector(self._from_plan(drift))])
+        return _smaller(self._in_few("drift_difference", difference), by_mean)
+
+    def _in_few(self, name: str, objective: SumOfNorms) -> Constant:
+        if objective.is_zero:
+            return Constant.exactly(0.0)
+        return self._constant(self._over_tube(name, objective, self._few))
 
     def _by_mean_value(self, drift: Matrix) -> Constant:
         """A bound of |drift(x* + z) - drift(x*)|: rho sup |drift_x|."""
@@ -235,8 +259,8 @@ class HardwareSuprema(Suprema):
         by_mean = Constant(below=0.0, above=float((Interval(0.0, slope.above) * length).hi))
         if not self._written:
             return by_mean
-        difference = self._white.vector(self._from_plan(column(self.model.f)))
-        return _smaller(self._white.length(self.norms("drift_difference_metric", [difference])), by_mean)
+        difference = SumOfNorms([self._white.vector(self._from_plan(column(self.model.f)))])
+        return _smaller(self._white.length(self._in_few("drift_difference_metric", difference)), by_mean)
 
     def drift_slope_metric(self) -> Constant | None:
         """D_A = sup |Theta f_x Theta^-1|, for constant M and B."""
@@ -371,6 +395,14 @@ class Whitened:
         """T A T^-1."""
         return self.vector(multiply(a, self.coordinates.S_inverse))
 
+    def form(self, a: Matrix) -> Matrix:
+        """T A T'."""
+        return multiply(self.vector(a), transpose(self.coordinates.S))
+
+    def of_form(self, found: Constant) -> Constant:
+        """|Theta A Theta'| from |T A T'|."""
+        return _scaled(found, 1 / Interval(self.least, self.most))
+
     def length(self, found: Constant) -> Constant:
         """|Theta a| from |T a|: M = T'(T W T')^-1 T."""
         return _scaled(found, 1 / sqrt(Interval(self.least, self.most)))
@@ -402,28 +434,9 @@ def whitened(W: Matrix) -> Whitened | None:
 # -- matrices --------------------------------------------------------------------------------------------------
 
 
-def _inverse(W: Matrix) -> Matrix:
-    return divide(adjugate(W), determinant(W))
-
-
 def _jacobian(drift: Matrix, states: Sequence[str]) -> Matrix:
     return jacobian([row[0] for row in drift], states)
 
 
 def _moves(a: Matrix) -> bool:
     return any(e is not ZERO for row in a for e in row)
-
-
-def _block(c: Matrix) -> Matrix:
-    """[0 C; C' 0]: its largest eigenvalue is the norm of C, (m, n)."""
-    m, n = len(c), len(c[0])
-    return (
-        *((*(ZERO,) * m, *row) for row in c),
-        *((*row, *(ZERO,) * n) for row in transpose(c)),
-    )
-
-
-def _diagonal(a: Matrix, b: Matrix) -> Matrix:
-    """[A 0; 0 B]."""
-    p, q = len(a), len(b)
-    return (*((*row, *(ZERO,) * q) for row in a), *((*(ZERO,) * p, *row) for row in b))

@@ -1,8 +1,8 @@
 """Affine forms of tensors over boxes: a midpoint, a part linear in each variable, and a radius for all the rest.
 
-With e_i in [-1, 1] the position in the box along variable i, an entry is c_0 + sum_i c_i e_i + r, |r| <= radius. Products
-keep the linear part, so what is computed from forms converges quadratically with the size of the box, and no derivative
-of a product is ever written out. Everything here is rigorous; rounding errors go into the radius.
+With e_i in [-1, 1] the position in the box along variable i, an entry is c_0 + sum_i c_i e_i + r, |r| <= radius.
+Products keep the linear part, so what is computed from forms converges quadratically with the size of the box, and no
+derivative of a product is ever written out. Everything here is rigorous; rounding errors go into the radius.
 """
 
 from __future__ import annotations
@@ -64,7 +64,9 @@ def contract(spec: str, a: Form, b: Form) -> Form:
         return np.asarray(np.einsum(spec, x, y, optimize=True))
 
     first = times(a.parts[0], b.parts[0])
-    linear = [times(a.parts[0], q) + times(p, b.parts[0]) for p, q in zip(a.parts[1:], b.parts[1:], strict=True)]
+    linear = [
+        times(a.parts[0], q) + times(p, b.parts[0]) for p, q in zip(a.parts[1:], b.parts[1:], strict=True)
+    ]
     swing_a, swing_b = np.abs(a.parts[1:]).sum(axis=0), np.abs(b.parts[1:]).sum(axis=0)
     whole_a, whole_b = a.size, b.size
     radius = times(swing_a, swing_b) + times(a.radius, whole_b) + times(whole_a, b.radius)
@@ -96,8 +98,10 @@ class Forms:
 
 
 def unfolded_norm(form: Form, rows: tuple[int, ...]) -> tuple[Array, Array]:
-    """A bound (N,) of the spectral norms of tensors as matrices, the axes `rows` against the others; and by variable
-    (N, d) how much it grows over the box."""
+    """A bound (N,) of the spectral norms of tensors as matrices, the axes `rows` against the others.
+
+    And by variable, (N, d), how much it grows over the box.
+    """
     parts = np.stack([_unfold(part, rows) for part in form.parts])
     radius = _unfold(form.radius, rows)
     linear = [spectral_norm_midrad(part, np.zeros_like(part)).hi for part in parts[1:]]

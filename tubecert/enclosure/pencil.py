@@ -190,10 +190,8 @@ class Definite(Pencil):
 class SumOfPencils:
     """sum_i max |lambda| of the pencils (N_i(x), D(x)): with D = W^2, sum_i |W^-1 N_i W^-1|."""
 
-    def __init__(
-        self, numerators: Sequence[Matrix], denominator: Matrix, *, fixed: frozenset[str] = frozenset()
-    ) -> None:
-        self._function = MatrixFunction([denominator, *numerators], fixed=fixed)
+    def __init__(self, numerators: Sequence[Matrix], denominator: Matrix) -> None:
+        self._function = MatrixFunction([denominator, *numerators])
         self.variables = self._function.variables
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:

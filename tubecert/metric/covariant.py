@@ -11,7 +11,7 @@ Implements: theory 8. Trusted: yes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +24,7 @@ from tubecert.enclosure.linalg import norm_bound, whitening
 from tubecert.enclosure.objective import Estimate
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, column, differentiate, jacobian
+from tubecert.metric.geodesic import alternating, contracted
 from tubecert.model import ControlAffineModel
 
 _SLACK = 1e-13
@@ -124,6 +125,21 @@ class MetricTensorNorm:
         frame, tensor = self._at(lo, hi)
         norms = np.min([least_norm(tensor, rows).lo for rows in self._rows], axis=0)
         return np.asarray(norms / frame.most ** (self._rank / 2) * (1 - _SLACK))
+
+    def attained(self, at: Mapping[str, float]) -> float:
+        """What the multilinear map itself reaches at a point: |T(v, w, ...)|/(|v| |w| ...) of chosen vectors."""
+        if any(name not in at for name in self.variables):
+            return 0.0
+        point = np.array([[at[name] for name in self.variables]])
+        with np.errstate(all="ignore"):
+            frame, tensor = self._at(point, point)
+        if not (np.isfinite(tensor.size).all() and np.isfinite(frame.most).all()):
+            return 0.0
+        mid, error = tensor.parts[0][0], tensor.size[0] - np.abs(tensor.parts[0][0]) + _SLACK * tensor.size[0]
+        vectors = alternating(mid)
+        value = abs(contracted(mid, vectors)) - contracted(error, [np.abs(v) for v in vectors]) * (1 + _SLACK)
+        scale = float(np.prod([np.linalg.norm(v) for v in vectors]) * frame.most[0] ** (self._rank / 2))
+        return max(0.0, float(value / scale) * (1 - 10 * _SLACK))
 
 
 @dataclass(frozen=True)
@@ -233,9 +249,7 @@ class Geometry:
 
         def tensor(frame: Frame, forms: list[Form]) -> Form:
             F, F_z, W_z = forms[0], frame.each(stacked(forms[1 : 1 + n])), frame.each(stacked(forms[1 + n :]))
-            turn = contract(
-                "akc,cl->akl", W_z, contract("cd,dl->cl", frame.M, frame.both(F))
-            )
+            turn = contract("akc,cl->akl", W_z, contract("cd,dl->cl", frame.M, frame.both(F)))
             return F_z - (turn + turn.turned(0, 2, 1))
 
         matrices = [self.model.F, *fields.slopes(self.model.F), *fields.slopes(self.model.W)]

@@ -193,9 +193,11 @@ class SymbolNorm:
             mid, rad = self.tensor(point, point)
         if not np.isfinite(mid).all():
             return 0.0
-        vectors = _alternating(mid[0])
+        vectors = alternating(mid[0])
         error = rad[0] + 1e-12 * np.abs(mid[0])
-        value = abs(_contract(mid[0], vectors)) - _contract(error, [np.abs(v) for v in vectors]) * (1 + 1e-12)
+        value = abs(contracted(mid[0], vectors)) - contracted(error, [np.abs(v) for v in vectors]) * (
+            1 + 1e-12
+        )
         scale = float(np.prod([np.linalg.norm(v) for v in vectors])) * (1 + 1e-12)
         return max(0.0, float(value / scale) * (1 - 1e-12))
 
@@ -254,7 +256,7 @@ def _unfold(tensor: Array, rows: tuple[int, ...]) -> Array:
     return np.ascontiguousarray(turned).reshape(len(tensor), height, -1)
 
 
-def _contract(tensor: Array, vectors: Sequence[Array], keep: int | None = None) -> Array:
+def contracted(tensor: Array, vectors: Sequence[Array], keep: int | None = None) -> Array:
     """The tensor applied to one vector per axis, except the axis `keep`."""
     for axis in reversed(range(tensor.ndim)):
         if axis != keep:
@@ -262,7 +264,7 @@ def _contract(tensor: Array, vectors: Sequence[Array], keep: int | None = None) 
     return tensor
 
 
-def _alternating(tensor: Array) -> list[Array]:
+def alternating(tensor: Array) -> list[Array]:
     """Unit vectors that make |T(v, w, ...)| large, a proposal: alternating maximisation from axes."""
     best, value = [np.eye(size)[0] for size in tensor.shape], -1.0
     for start in choices(*(range(size) for size in tensor.shape[1:])):
@@ -273,7 +275,7 @@ def _alternating(tensor: Array) -> list[Array]:
         reached = 0.0
         for _ in range(20):
             for axis in range(tensor.ndim):
-                image = _contract(tensor, vectors, axis)
+                image = contracted(tensor, vectors, axis)
                 reached = float(np.linalg.norm(image))
                 if reached > 0:
                     vectors[axis] = image / reached
