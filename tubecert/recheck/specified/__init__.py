@@ -11,5 +11,6 @@ has a default: the canonical form writes out all that a claim rests on. `recheck
 | `start` | x(0) |
 | `metric` | the dual metric, or what one that is to be found must be |
 | `loop` | the loop of adaptation |
+| `hardware` | the machine that runs the controller, and the disturbance beside the inputs |
 | `idle` | what no claim rests on |
 """

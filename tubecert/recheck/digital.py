@@ -1,0 +1,292 @@
+"""Theorem H at printed numbers, on balls: control that is sampled, late and noisy, with wind beside the inputs.
+
+Implements: theory 8 (H.6)-(H.12) and (H.17). Written from the theorem, evaluated once at the numbers of a recipe:
+nothing is searched for here. What is no number serves nothing, because every comparison with it is false.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, exact, larger, root, smaller
+from tubecert.recheck.conditions import Setting
+from tubecert.recheck.filtering import Distance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineNumbers:
+    """The constants that only theorem H has, as balls by their names in a certificate; None where one is not stated."""
+
+    feedback_slope: Ball
+    feedback_curvature: Ball
+    plan_tilt: Ball
+    plan_speed: Ball
+    plan_defect: Ball
+    drift_difference: Ball
+    drift_difference_metric: Ball | None
+    drift_slope_metric: Ball | None
+    drift_explained: Ball
+    noise_size: Ball
+    noise_metric: Ball
+    noise_explained: Ball
+    input_rate: Ball | None
+    symbols: Ball
+    symbols_slope: Ball
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Promise:
+    """What the specification promises of the machine beside the numbers of a recipe.
+
+    `held`: u* is held between samples; `predicts`: feedback from a predicted state; `drift`: a bound of
+    |n_k - n_(k-1)|/Ts in units of noise, if there is one.
+    """
+
+    held: bool
+    predicts: bool
+    drift: Fraction | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Digital:
+    """The numbers of a recipe; times in s. `bandwidth` None: the filter forgets at once (omega is infinite)."""
+
+    sample_time: Fraction
+    delay: Fraction
+    feedback_time: Fraction
+    bandwidth: Fraction | None
+    noise: Fraction
+    wind: Fraction
+    clip_radius: Fraction
+    level: Fraction
+    floor: Fraction
+    speed: Fraction
+    bias: Fraction
+    ripple: Fraction
+    prediction: Fraction | None
+
+    @property
+    def sensible(self) -> bool:
+        """Whether all are of the sign and order that the theorem asks for."""
+        above = (self.sample_time, self.feedback_time, self.level, self.floor, self.speed, self.clip_radius)
+        others = (self.delay, self.noise, self.wind, self.bias, self.ripple, self.prediction or Fraction(0))
+        filters = self.bandwidth is None or self.bandwidth > 0
+        late = self.delay > self.sample_time
+        if self.prediction is not None:
+            late = late or self.delay > self.feedback_time
+        return min(above) > 0 and min(others) >= 0 and filters and not late
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """What follows at a recipe.
+
+    `error`: sup |h - q^| (X); `feedback`: sup |kappa| (kb); `feedforward`: ups; `noise`: n_M, or n_P of a predicted
+    state; `top`: max(d0, f0, d1, sup D); `ultimate`: A1. The last ones are the shares of lambda times the level.
+    """
+
+    error: Ball
+    feedback: Ball
+    feedforward: Ball
+    noise: Ball
+    top: Ball
+    ultimate: Ball
+    shares: dict[str, Ball]
+
+
+def loop(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> Loop | None:
+    """What theorem H gives at a recipe; None where one of its conditions beside (H.10), (H.12) is not proven."""
+    if not at.sensible or promise.predicts != (at.prediction is not None):
+        return None
+    return _Evaluation(setting, machine, promise, at).found()
+
+
+class _Evaluation:
+    """(H.6)-(H.12), term by term."""
+
+    def __init__(self, setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> None:
+        self.setting, self.n, self.m, self.at, self.promise = setting, setting.n, machine, at, promise
+        self.lam = setting.rate
+        self.Ts, self.tau, self.Tf = exact(at.sample_time), exact(at.delay), exact(at.feedback_time)
+        self.t1 = self.Ts + self.tau
+        self.level, self.floor, self.Y = exact(at.level), exact(at.floor), exact(at.speed)
+        self.S, self.N, self.R = exact(at.bias), exact(at.ripple), exact(at.clip_radius)
+        self.th = arb(1) if at.bandwidth is None else -(-exact(at.bandwidth) * self.Ts).expm1()
+        w = setting.wind
+        wbar = exact(at.wind)
+        nothing = arb(0)
+        self.pushed, self.blown, self.matched = (
+            (nothing, nothing, nothing)
+            if w is None
+            else (w.push * wbar, w.size * wbar, w.explained * wbar)
+        )
+        self.nbar, self.explained = machine.noise_size * exact(at.noise), machine.noise_explained * exact(at.noise)
+        self.rate = self.n.h_t + self.n.h_x * self.Y  # s1
+        self.ups = self._feedforward()
+        # what a state that the feedback sees is off by: in x, and in the metric
+        if at.prediction is None:
+            self.seen, self.n_M = self.nbar, machine.noise_metric * exact(at.noise)
+        else:
+            self.seen = exact(at.prediction)
+            self.n_M = root(self.n.upper) * self.seen
+        self.kb = self.n.feedback_gain * (self.level + self.n_M)
+        self.H1 = smaller(self.n.h, self.n.h_initial + self.rate * self.t1)
+        later = self.S + larger(self.n.h_initial - self.S, nothing) + self.N + self.rate * self.t1
+        self.X = smaller(self.n.h + self.R, larger(self.H1, later))
+        self.push = self.kb + self.ups + self.X  # |u + h - u*|
+
+    def _feedforward(self) -> Ball:
+        """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old."""
+        if not self.promise.held:
+            return arb(0)
+        jump = 2 * self.n.u_star
+        oldest = larger(self.Ts, self.Tf) + self.tau
+        return jump if self.m.input_rate is None else smaller(jump, self.m.input_rate * oldest)
+
+    def found(self) -> Loop | None:
+        """Everything, if the side conditions hold."""
+        n, at = self.n, self.at
+        if not (n.h <= self.R and self._bias() <= self.S and self._ripple() <= self.N):
+            return None
+        if not n.drift_on_plan + n.B * self.push + self.blown < self.Y:  # (H.11)
+            return None
+        if at.prediction is not None and not self._prediction() <= exact(at.prediction):
+            return None
+        if not self._bending() > 0:
+            return None
+        return self._loop()
+
+    # -- the estimate
+
+    def _bias(self) -> Ball:
+        """(H.6)."""
+        n, m, Ts, Y = self.n, self.m, self.Ts, self.Y
+        turning = smaller(n.B_pinv * n.B_x, n.B_pinv_x * n.B)  # b0
+        apart = Y * Ts / 2 + self.nbar
+        whole = n.u_star + self.ups + self.kb + self.R + n.h  # |u + h|
+        e = self.rate * Ts / 2 + turning * whole * apart
+        e = e + m.drift_explained * (Y * Ts / 4 + self.nbar)
+        e = e + self._gust()
+        return (1 - self.th) / self.th * self.rate * Ts + e
+
+    def _ripple(self) -> Ball:
+        """(H.7); where the noise drifts, each of its steps is small instead."""
+        turning = self.n.B_pinv_x * (self.Y + 2 * self.nbar / self.Ts) * self.nbar
+        found = 2 * self.th / self.Ts * self.explained + turning
+        if self.promise.drift is None:
+            return found
+        return smaller(found, self.m.noise_explained * exact(self.promise.drift))
+
+    def _prediction(self) -> Ball:
+        """(H.17)."""
+        n = self.n
+        slope = n.f_x + n.b_x * (n.u_star + self.ups + self.kb)
+        growth = (slope * self.tau).expm1()
+        mean = growth / slope if slope > 0 else self.tau * (growth + 1)  # at most tau e^(D_p tau)
+        return self.nbar * (growth + 1) + (n.B * self.X + self.blown) * mean
+
+    # -- the feedback
+
+    def _bending(self) -> Ball:
+        """Chi."""
+        rho = exact(self.setting.rho)
+        return 1 - self.m.symbols * rho - self.m.symbols_slope * rho * rho / 8
+
+    def _loop(self) -> Loop:
+        n, m, lam, nothing = self.n, self.m, self.lam, arb(0)
+        rho = exact(self.setting.rho)
+        chi, top_A = self._bending(), root(n.upper)
+        flat = m.drift_difference_metric is not None and m.drift_slope_metric is not None
+        curved = m.symbols_slope * rho * rho + 2 * m.symbols * rho
+        j1, j0 = 1 + curved / (2 * chi), 1 + curved / (8 * chi)
+        # the velocities of the two ends of a geodesic, and how they differ
+        fastest = larger(self.Y, m.plan_speed)
+        V = m.drift_difference + n.B * self.push + self.blown + m.plan_defect
+        Q = (m.symbols_slope * rho * rho * fastest + 2 * m.symbols * rho * V) / chi
+        V_M, V_J = top_A * (V + Q / 2), fastest + Q / 8
+        forced = n.metric_input_gain * self.push + self.pushed + n.plan_defect_metric
+        V_d = (m.feedback_slope / 2 + lam) * self.level + forced
+        if flat:
+            assert m.drift_difference_metric is not None
+            assert m.drift_slope_metric is not None
+            drift = smaller(m.drift_difference_metric, m.drift_slope_metric * self.level)
+            V_M = smaller(V_M, drift + forced)
+            V_d = smaller(V_d, V_M)
+        slope = m.feedback_slope + n.metric_input_gain * n.feedback_gain
+        bend = m.feedback_curvature * (self.level + self.n_M) / 2
+        stretched = self.n_M + (j1 - 1) * top_A * self.seen
+        ell0 = slope * stretched + bend * j0 * self.seen  # (H.8)
+        tilt = n.feedback_gain * m.plan_tilt * m.plan_speed * self.level
+        ell = slope * V_M + bend * V_J + tilt  # (H.9), per second
+        # from here on by the age of the feedback: it starts at its delay, or at the instant that was predicted
+        youngest, oldest = (nothing, self.Tf) if self.at.prediction is not None else (self.tau, self.Tf + self.tau)
+        first = larger(oldest, self.tau)
+        least = lam * self.floor
+        base = n.plan_defect_metric + n.metric_input_gain * self.ups + self.pushed
+        begun = (V_d * first + self.n_M) / self.floor
+        moved = (V_d * oldest + self.n_M) / self.floor
+        delta_1 = larger(least, base + (ell0 + ell * first) * (1 + begun))
+        delta = larger(least, base + ell0 + ell * youngest + (ell0 + ell * oldest) * moved)
+        return self._distance(delta_1, delta, ell, base, ell0 * (1 + moved))
+
+    def _distance(self, delta_1: Ball, delta: Ball, ell: Ball, base: Ball, noisy: Ball) -> Loop:
+        """(H.12), by the comparison equation with two saw-teeth: of the input, and of the feedback.
+
+        The slower clock begins a tooth where the first phase ends. Where the other one does not, what it causes is only
+        known to stay below its periodic course: that much is added at once.
+        """
+        n, lam, beta, at = self.n, self.lam, self.n.metric_input_gain, self.at
+        late = at.feedback_time > at.sample_time
+        start = larger(self.Ts, self.Tf) + self.tau
+        early = self.X if late else self.H1  # a feedback that is slower meets the estimate in its first phase
+        share = -(-lam * start).expm1()
+        d0 = larger(n.initial_distance, self.floor)
+        d1 = d0 * (1 - share) + (beta * early + delta_1) * share / lam
+        waiting, lagging = ell * self._tooth(self.Tf), beta * self.rate * self._tooth(self.Ts)
+        ratio = at.feedback_time / at.sample_time
+        if max(ratio, 1 / ratio).denominator != 1:
+            d1 = d1 + (lagging if late else waiting) / lam
+        bound = Distance(
+            d0=d1,
+            beta=beta,
+            H0=larger(n.h_initial, self.S),
+            S=self.S,
+            e=self.N + self.rate * self.tau,
+            delta=delta + waiting + lagging,
+            rate=lam,
+            omega=exact(at.bandwidth or 1),
+            horizon=self.setting.horizon,
+        )
+        peak = larger(d1, bound.ultimate()) if at.bandwidth is None else bound.supremum()
+        gust = self._gust()
+        parts = {
+            "plan": n.plan_defect_metric,
+            "feedforward": beta * self.ups,
+            "wind": self.pushed,
+            "wind_estimate": beta * gust,
+            "bias": beta * (self.S - gust),
+            "noise_estimate": beta * self.N,
+            "lag": beta * self.rate * self.tau + lagging,
+            "noise_feedback": noisy,
+            "sampling": delta + waiting - base - noisy,
+        }
+        return Loop(
+            error=self.X,
+            feedback=self.kb,
+            feedforward=self.ups,
+            noise=self.n_M,
+            top=larger(larger(d0, d1), peak),
+            ultimate=bound.ultimate(),
+            shares={name: part / (lam * self.level) for name, part in parts.items()},
+        )
+
+    def _gust(self) -> Ball:
+        """What wind adds to the bias of the estimate."""
+        return self.matched + self.n.B_pinv_x * self.blown * (self.Y * self.Ts / 2 + self.nbar)
+
+    def _tooth(self, T: Ball) -> Ball:
+        """Mu: the weighted mean of a saw-tooth of period T, T/(1 - e^(-lambda T)) - 1/lambda."""
+        return smaller(larger(T / -(-self.lam * T).expm1() - 1 / self.lam, T / 2), T)
