@@ -8,16 +8,17 @@ verified.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tubecert.recheck import machine, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.grammar import GrammarError, read_number
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Section
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Kind, Section
 from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.obstacles import Cleared, read_cleared
 from tubecert.recheck.orientation import elasticities, run, synthesis
@@ -188,7 +189,6 @@ def read_certificate(document: Node) -> Certificate:
 
 def read_result(node: Node) -> Result:
     """`result`; one that says `certified` must have every section."""
-    last = ("constants", "tube", *KEYS, "decided_by", "elasticities")
     own = node.closed(
         "verdict",
         "formulas",
@@ -202,7 +202,16 @@ def read_result(node: Node) -> Result:
         "declared",
         "reasons",
         "proof",
-        optional=("synthesis", "metric", "clearance", *last),
+        optional=(
+            "synthesis",
+            "metric",
+            "clearance",
+            "constants",
+            "tube",
+            *KEYS,
+            "decided_by",
+            "elasticities",
+        ),
     )
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
@@ -212,6 +221,11 @@ def read_result(node: Node) -> Result:
     effort["budget"].count()
     specification = read_specification(spec["effective"])
     states = specification.plant.states
+    applying = tuple(kind for kind in KINDS if kind.applies(specification))
+    last = ("constants", "tube", *(kind.key for kind in applying), "decided_by", "elasticities")
+    for key in KEYS:
+        if key in own and key not in last:
+            raise own[key].refused("is not known in this place: the specification does not ask for it")
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)
@@ -227,13 +241,13 @@ def read_result(node: Node) -> Result:
         assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
-        recipes=_recipes(own["proof"]),
+        recipes=_recipes(own["proof"], applying),
         synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, states)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
-        constants=own.get("constants", lambda item: _constants(item, own)),
-        sections=_sections(own, len(states)) if searched else None,
+        constants=own.get("constants", lambda item: _constants(item, own, specification)),
+        sections=_sections(own, len(states), applying) if searched else None,
     )
     return _complete(node, result) if verdict == "certified" else result
 
@@ -382,11 +396,23 @@ def _coordinates(node: Node, n: int) -> Rows:
     return rows
 
 
-def _constants(node: Node, result: Members) -> dict[str, Enclosure]:
-    """Every constant there is, and no other; those that follow from gains only where such gains are printed."""
+def _constants(node: Node, result: Members, spec: Specification) -> dict[str, Enclosure]:
+    """Every constant there is, and no other; those that follow from gains only where such gains are printed.
+
+    Those of a disturbance and of a machine are there if and only if the specification has one; that the metric is
+    constant, as two of them ask, is examined with them.
+    """
     derived = (kind.derived(result[kind.key]) for kind in KINDS if kind.key in result)
-    names = (*MEASURED, *(name for names in derived for name in names))
-    own = node.closed(*names)
+    names = [*MEASURED, *(name for names in derived for name in names)]
+    if spec.disturbance is not None:
+        names += wind.CONSTANTS
+    if spec.hardware is not None:
+        names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
+    optional = machine.OF_CONSTANT_METRICS if spec.hardware is not None else ()
+    own = node.closed(*names, optional=optional)
+    if len({name in own for name in optional}) > 1:
+        raise node.refused("has one constant of a constant metric without the other")
+    names += [name for name in optional if name in own]
     n = len(result["safe_set"].mapping())
     return {name: _constant(own[name], n) for name in names}
 
@@ -407,12 +433,12 @@ def _constant(node: Node, n: int) -> Enclosure:
 # -- gains ---------------------------------------------------------------------------------------------------------
 
 
-def _sections(own: Members, n: int) -> Sections:
-    elasticities(own["elasticities"], [kind.key for kind in KINDS if kind.elastic], MEASURED)
-    read = {kind.key: kind.read(own[kind.key], n) for kind in KINDS}
+def _sections(own: Members, n: int, kinds: Sequence[Kind[Any, Any]]) -> Sections:
+    elasticities(own["elasticities"], [kind.key for kind in kinds if kind.elastic], MEASURED)
+    read = {kind.key: kind.read(own[kind.key], n) for kind in kinds}
     return Sections(read, own["decided_by"].texts())
 
 
-def _recipes(node: Node) -> dict[str, object]:
-    own = node.closed(optional=KEYS)
-    return {kind.key: kind.read_recipe(own[kind.key]) for kind in KINDS if kind.key in own}
+def _recipes(node: Node, kinds: Sequence[Kind[Any, Any]]) -> dict[str, object]:
+    own = node.closed(optional=[kind.key for kind in kinds])
+    return {kind.key: kind.read_recipe(own[kind.key]) for kind in kinds if kind.key in own}

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import claimed, clearances, consistency, geodesics, metric, planned, start
-from tubecert.recheck.balls import exact
+from tubecert.recheck import claimed, clearances, consistency, geodesics, machine, metric, planned, start
+from tubecert.recheck import wind as disturbed
+from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.certificate import (
     INFIMA,
+    MEASURED,
     MetricSection,
     Result,
     Sections,
     TubeSection,
 )
-from tubecert.recheck.conditions import USED, Numbers, Setting
+from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
+from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
@@ -32,6 +35,7 @@ from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
+from tubecert.recheck.terms import all_zero
 from tubecert.recheck.times import time_range
 
 _ROUND_UP = Fraction(1001, 1000)
@@ -95,7 +99,46 @@ class Case:
             bounds = {name: self.bound_if_any(name) for name in USED}
             # what has no bound is not a number: no comparison with what rests on it can hold
             values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
-        return Setting(self.system, Numbers(**values), self.place.rho, self.tube.rho_a)
+            return Setting(
+                self.system,
+                Numbers(**values),
+                self.place.rho,
+                self.tube.rho_a,
+                self._wind,
+                turns=not all(map(all_zero, self.place.fields.slopes(self.system.B))),
+            )
+
+    @property
+    def _wind(self) -> WindNumbers | None:
+        """What a disturbance does, if there is one."""
+        wind = self.system.wind
+        if wind is None:
+            return None
+        push, size, explained = (self._ball(name) for name in disturbed.CONSTANTS)
+        return WindNumbers(push, size, explained, None if wind.bound is None else exact(wind.bound))
+
+    @cached_property
+    def machine(self) -> MachineNumbers | None:
+        """The constants of a machine on their safe sides, if there is one."""
+        if self.result.specification.hardware is None:
+            return None
+        with ctx.workprec(SHARP):
+            own = {
+                item.name: self._ball(item.name)
+                for item in fields(MachineNumbers)
+                if item.name in self.constants
+            }
+        absent: dict[str, Ball | None] = dict.fromkeys(
+            (*machine.OF_CONSTANT_METRICS, *machine.OF_HELD_INPUTS)
+        )
+        if "input_rate" in self.constants and self.bound_if_any("input_rate") is None:
+            del own["input_rate"]  # u* jumps
+        return MachineNumbers(**(absent | own))  # type: ignore[arg-type]
+
+    def _ball(self, name: str) -> Ball:
+        """The upper end of a constant, not a number where it has none."""
+        found = self.bound_if_any(name)
+        return arb("nan") if found is None else exact(found)
 
     def bound(self, name: str) -> Fraction:
         """The side of a constant that the conditions use; raises `ValueError` where there is none."""
@@ -128,7 +171,8 @@ class Case:
     @cached_property
     def numbers(self) -> tuple[object, ...]:
         """What every claim about gains depends on."""
-        return *self.whole, self.place.rho, self.tube.rho_a, *(self.bound_if_any(name) for name in USED)
+        used = (*USED, *(name for name in self.constants if name not in MEASURED))
+        return *self.whole, self.place.rho, self.tube.rho_a, *(self.bound_if_any(name) for name in used)
 
 
 def of_every(result: Result) -> Iterator[Claim]:
@@ -282,6 +326,7 @@ def _constants(case: Case) -> Iterator[Claim]:
         )
     if H0 is not None:
         yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
+    yield from _beside(case)
     test = case.metric.geodesics
     if test is not None and test.holds:
         value = test.value.above
@@ -296,6 +341,36 @@ def _constants(case: Case) -> Iterator[Claim]:
         )
 
 
+def _beside(case: Case) -> Iterator[Claim]:
+    """The constants of a disturbance and of a machine, as far as they are bounded."""
+    place, over = case.place, case.over_tube
+    beta, eps = case.bound_if_any("metric_input_gain"), None
+    if case.system.wind is not None:
+        eps = case.bound_if_any("wind_explained")
+    matched = None if beta is None or eps is None else beta * eps
+    for name in disturbed.CONSTANTS if case.system.wind is not None else ():
+        limit = case.bound_if_any(name)
+        if limit is not None:
+            yield Claim(
+                f"{name} <= {float(limit):.6g}",
+                (*over, limit, matched),
+                lambda name=name, limit=limit: disturbed.bounded(place, name, limit, matched),  # type: ignore[misc]
+            )
+    asked = case.result.specification.hardware
+    if asked is None:
+        return
+    noise = asked.noise if isinstance(asked.noise, tuple) else None
+    known = tuple(case.bound_if_any(name) for name in ("upper", "B_pinv", "f_x"))
+    for name in machine.NAMES:
+        limit = case.bound_if_any(name) if name in case.constants else None
+        if limit is not None:
+            yield Claim(
+                f"{name} <= {float(limit):.6g}",
+                (*over, limit, known),
+                lambda name=name, limit=limit: machine.bounded(place, name, limit, noise, case.bound_if_any),  # type: ignore[misc]
+            )
+
+
 def _largest(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
     """smax(Theta B) <= |B| sqrt(A); None where one of them is not bounded."""
     if B is None or upper is None:
@@ -305,12 +380,17 @@ def _largest(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
 
 def _gains(case: Case) -> Iterator[Claim]:
     sections, recipes = case.sections, case.result.recipes
-    radii = [r for kind in KINDS for r in kind.projection_radii(sections.by_key[kind.key])]
+    present = [kind for kind in KINDS if kind.key in sections.by_key]
+    radii = [r for kind in present for r in kind.projection_radii(sections.by_key[kind.key])]
     ground = Ground(
         setting=case.setting,
         constants=case.constants,
         depends=case.numbers,
         projection_radius=radii[0] if radii else Fraction(0),
+        place=case.place,
+        around=case.over_tube,
+        specification=case.result.specification,
+        machine=case.machine,
     )
-    for kind in KINDS:
+    for kind in present:
         yield from kind.claims(sections.by_key[kind.key], recipes.get(kind.key), ground)

@@ -52,13 +52,57 @@ USED = tuple(item.name for item in fields(Numbers))
 
 
 @dataclass(frozen=True, slots=True)
+class WindNumbers:
+    """What a disturbance does per |w|, as balls: smax(Theta E), |E|, |B^+ E|; None: `bound` is searched for."""
+
+    push: Ball
+    size: Ball
+    explained: Ball
+    bound: Ball | None
+
+
+@dataclass(frozen=True, slots=True)
 class Setting:
-    """Constants, radii and options of one certificate."""
+    """Constants, radii and options of one certificate; `turns`: whether B depends on the state."""
 
     system: System
     n: Numbers
     rho: Fraction
     rho_a: Fraction
+    wind: WindNumbers | None = None
+    turns: bool = True
+
+    @property
+    def wind_bound(self) -> Ball:
+        """|w|; not a number where it is searched for."""
+        assert self.wind is not None
+        return arb("nan") if self.wind.bound is None else self.wind.bound
+
+    @property
+    def still(self) -> bool:
+        """Whether no disturbance moves the state beside the inputs."""
+        return self.wind is None or bool(self.wind.size * self.wind_bound <= 0)
+
+    @property
+    def pushed(self) -> Ball:
+        """delta, and beta_w |w| with it: what lengthens the distance beside h."""
+        defect = self.n.plan_defect_metric
+        return defect if self.wind is None else defect + self.wind.push * self.wind_bound
+
+    @property
+    def drifting(self) -> Ball:
+        """phi, and |E| |w| with it."""
+        return self.n.drift_on_plan + self.blown
+
+    @property
+    def blown(self) -> Ball:
+        """|E| |w|."""
+        return arb(0) if self.wind is None else self.wind.size * self.wind_bound
+
+    @property
+    def taken(self) -> Ball:
+        """|B^+ E| |w|: what an estimate takes for a part of h."""
+        return arb(0) if self.wind is None else self.wind.explained * self.wind_bound
 
     @property
     def rate(self) -> Ball:
@@ -130,7 +174,7 @@ def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
 def margins_26(setting: Setting, gains: Gains) -> dict[str, Ball]:
     """The margins of (26a), (26b), (26c); not numbers where the projection or the gains do not serve."""
     nothing = dict.fromkeys(("26a", "26b", "26c"), arb("nan"))
-    if not gains.sensible or not setting.radius_serves(gains.projection_radius):
+    if not setting.still or not gains.sensible or not setting.radius_serves(gains.projection_radius):
         return nothing
     n = setting.n
     d, a = derived(setting, gains), n.lower
@@ -154,15 +198,34 @@ class DistanceProof:
 def _error(setting: Setting, gains: Gains, Y: Ball) -> Ball:
     """Deta(Y)/sqrt(Gamma) of (2.12)."""
     n, p = setting.n, predictor(setting.system, gains)
-    Dxt = prediction_error(n, exact(gains.projection_radius), n.h_t + n.h_x * Y, p.q)
+    R, s1, rate = exact(gains.projection_radius), n.h_t + n.h_x * Y, exact(gains.adaptation_rate)
     gain = n.B_pinv_x * Y + n.B_pinv * (exact(gains.bandwidth) + p.shifted)
-    return gain * Dxt / root(exact(gains.adaptation_rate))
+    if setting.still:
+        return gain * prediction_error(n, R, s1, p.q) / root(rate)
+    return gain * _blown_prediction(setting, gains, R, s1) + setting.taken
+
+
+def _blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
+    """The bound of |xt| with a disturbance that enters it as zb (7.8).
+
+    V = |xt|^2 + |s~|^2/Gamma has V' <= -q |xt|^2 + 2 zb |xt| + 2 (Dh + R) s1/Gamma, negative beyond the root r of
+    q r^2 - 2 zb r = 2 (Dh + R) s1/Gamma; so V <= r^2 + (Dh + R)^2/Gamma. If A_m = -g I and B is constant, the part of
+    xt in the range of B has an equation of its own, with B B^+ E w only.
+    """
+    n, p, Gamma = setting.n, predictor(setting.system, gains), exact(gains.adaptation_rate)
+    zb = setting.blown
+    if p.scalar and not setting.turns:
+        zb = smaller(zb, n.B * setting.taken)
+    both = n.h + R
+    drag = zb / p.q
+    radius = drag + root(drag * drag + 2 * both * s1 / (p.q * Gamma))
+    return root(both * both / Gamma + radius * radius) if p.q > 0 else arb("nan")
 
 
 def speed_needed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
-    """phi + DB [du dbar + min(Dh + R_H, error)]."""
+    """phi + D_E |w| + DB [du dbar + min(Dh + R_H, error)]."""
     n = setting.n
-    return n.drift_on_plan + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
+    return setting.drifting + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
 
 
 def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Distance | None:
@@ -183,7 +246,7 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
         H0=n.h_initial,
         S=S,
         e=e,
-        delta=n.plan_defect_metric,
+        delta=setting.pushed,
         rate=setting.rate,
         omega=omega,
         horizon=setting.horizon,

@@ -98,7 +98,8 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
     if sections is None:
         return
     for kind in KINDS:
-        yield from kind.asked(sections.by_key[kind.key], given.gains)
+        if kind.key in sections.by_key:
+            yield from kind.asked(sections.by_key[kind.key], given.gains)
 
 
 def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:

@@ -44,6 +44,7 @@ from tubecert.recheck.terms import (
     turned,
     unit_matrix,
 )
+from tubecert.recheck.wind import adapted, adds
 
 _FIRST = 500  # boxes before another way is tried
 
@@ -191,6 +192,28 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
 
 
 def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
+    s = place.system
+    if s.wind is not None and s.wind.rate is not None:
+        return _adapted(place, limit, name)
+    return _own_uncertainty(place, limit, name)
+
+
+def _adapted(place: Place, limit: Fraction, name: str) -> Outcome:
+    """Of h + B^+ E w: what the second part adds at most is found here, and the first has the rest."""
+    if name == "h" and place.system.h is not None and name not in place.system.declared:
+        more = adapted(place)
+        assert more is not None
+        found = _norms(place, [place.system.h, more], limit)
+        if found.holds:
+            return found
+    added = adds(place, name, limit)
+    if added is None or added > limit:
+        return Outcome(verdict="undecided", why="what a disturbance adds is not below it")
+    return _own_uncertainty(place, limit - added, name)
+
+
+def _own_uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
+    """The same without what a disturbance adds."""
     s = place.system
     if name in s.declared and not _covers(limit, place, name):
         return stated(False, f"it is below the declared {float(s.declared[name]):g}")

@@ -6,14 +6,23 @@ nothing is searched for here. What is no number serves nothing, because every co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import exp, inf, isfinite, log
 
-from flint import arb
+from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.filtering import Distance
+
+_ROUGH = 64  # bits, for proposals
+_RISES = 60
+_CLOSE, _INFLATED, _LITTLE = Fraction(1, 10**12), Fraction(1, 10**9), Fraction(1, 10**30)
+_GRID, _ZOOMS, _GOLDEN = 10, 14, 0.6180339887498949
+_FLOORS = (log(1e-5), 0.0)  # of the level
+_FASTEST = 40.0  # omega Ts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +113,80 @@ def loop(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digita
     return _Evaluation(setting, machine, promise, at).found()
 
 
+def proposed(
+    setting: Setting, machine: MachineNumbers, promise: Promise, like: Digital, *, fixed: bool
+) -> Digital | None:
+    """A recipe for the loop and the level of `like` that may serve, None if none was found: a proposal.
+
+    `fixed`: the bandwidth is not to be chosen. Of each bandwidth the least Y, S, N, np, then the best floor.
+    """
+
+    def quality(omega: Fraction | None) -> tuple[float, Digital | None]:
+        at = _settled(setting, machine, promise, replace(like, bandwidth=omega))
+        if at is None:
+            return inf, None
+        scales = _least(lambda x: _top(setting, machine, promise, _floored(at, x)), _FLOORS)
+        return _top(setting, machine, promise, _floored(at, scales)), _floored(at, scales)
+
+    with ctx.workprec(_ROUGH):
+        found = [quality(like.bandwidth)] if fixed else [quality(None)]
+        if not fixed:
+            Ts = float(like.sample_time)
+            ends = log(float(setting.rate)), log(_FASTEST / Ts)
+            x = _least(lambda x: quality(Fraction(exp(x)))[0], ends)
+            found.append(quality(Fraction(exp(x))))
+    top, best = min(found, key=lambda pair: pair[0])
+    return best if top < inf else None
+
+
+def _floored(at: Digital, x: float) -> Digital:
+    """With the floor as a share of the level."""
+    return replace(at, floor=at.level * Fraction(exp(x)))
+
+
+def _least(value: Callable[[float], float], ends: tuple[float, float]) -> float:
+    """Where a function with one valley is about least."""
+    low, high = ends
+    points = [low + (high - low) * k / _GRID for k in range(_GRID + 1)]
+    k = min(range(len(points)), key=lambda k: value(points[k]))
+    low, high = points[max(0, k - 1)], points[min(_GRID, k + 1)]
+    for _ in range(_ZOOMS):
+        first, second = high - (high - low) * _GOLDEN, low + (high - low) * _GOLDEN
+        low, high = (low, second) if value(first) <= value(second) else (first, high)
+    return (low + high) / 2
+
+
+def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> Digital | None:
+    """With Y, S, N, np as small as they can be, and a little more."""
+    now = replace(at, speed=_LITTLE, bias=Fraction(0), ripple=Fraction(0))
+    if promise.predicts:
+        now = replace(now, prediction=Fraction(0))
+    for step in range(_RISES):
+        found = _Evaluation(setting, machine, promise, now).needed()
+        values = [float(x.upper()) for x in found]
+        if not all(isfinite(x) for x in values):
+            return None
+        Y, S, N, np_ = (Fraction(x) for x in values)
+        settled = step > 1 and now.speed * (1 + _CLOSE) >= Y and now.bias * (1 + _CLOSE) + _LITTLE >= S
+        now = replace(now, speed=Y, bias=S, ripple=N, prediction=np_ if promise.predicts else None)
+        if settled:
+            break
+    more = 1 + _INFLATED
+    return replace(
+        now,
+        speed=now.speed * more,
+        bias=now.bias * more + _LITTLE,
+        ripple=now.ripple * more + _LITTLE,
+        prediction=None if now.prediction is None else now.prediction * more + _LITTLE,
+    )
+
+
+def _top(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> float:
+    """max(d0, f0, d1, sup D) per level; infinite where that is no number."""
+    top = float(_Evaluation(setting, machine, promise, at).course().top.upper() / exact(at.level))
+    return top if isfinite(top) else inf
+
+
 class _Evaluation:
     """(H.6)-(H.12), term by term."""
 
@@ -119,11 +202,12 @@ class _Evaluation:
         wbar = exact(at.wind)
         nothing = arb(0)
         self.pushed, self.blown, self.matched = (
-            (nothing, nothing, nothing)
-            if w is None
-            else (w.push * wbar, w.size * wbar, w.explained * wbar)
+            (nothing, nothing, nothing) if w is None else (w.push * wbar, w.size * wbar, w.explained * wbar)
         )
-        self.nbar, self.explained = machine.noise_size * exact(at.noise), machine.noise_explained * exact(at.noise)
+        self.nbar, self.explained = (
+            machine.noise_size * exact(at.noise),
+            machine.noise_explained * exact(at.noise),
+        )
         self.rate = self.n.h_t + self.n.h_x * self.Y  # s1
         self.ups = self._feedforward()
         # what a state that the feedback sees is off by: in x, and in the metric
@@ -146,18 +230,18 @@ class _Evaluation:
         oldest = larger(self.Ts, self.Tf) + self.tau
         return jump if self.m.input_rate is None else smaller(jump, self.m.input_rate * oldest)
 
+    def needed(self) -> tuple[Ball, Ball, Ball, Ball]:
+        """What Y has to exceed (H.11), and what S, N and np have to reach."""
+        Y = self.n.drift_on_plan + self.n.B * self.push + self.blown
+        prediction = arb(0) if self.at.prediction is None else self._prediction()
+        return Y, self._bias(), self._ripple(), prediction
+
     def found(self) -> Loop | None:
         """Everything, if the side conditions hold."""
-        n, at = self.n, self.at
-        if not (n.h <= self.R and self._bias() <= self.S and self._ripple() <= self.N):
+        Y, S, N, seen = self.needed()
+        if not (Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)):
             return None
-        if not n.drift_on_plan + n.B * self.push + self.blown < self.Y:  # (H.11)
-            return None
-        if at.prediction is not None and not self._prediction() <= exact(at.prediction):
-            return None
-        if not self._bending() > 0:
-            return None
-        return self._loop()
+        return self.course() if self._bending() > 0 else None
 
     # -- the estimate
 
@@ -195,7 +279,8 @@ class _Evaluation:
         rho = exact(self.setting.rho)
         return 1 - self.m.symbols * rho - self.m.symbols_slope * rho * rho / 8
 
-    def _loop(self) -> Loop:
+    def course(self) -> Loop:
+        """(H.8)-(H.12), whatever the side conditions say."""
         n, m, lam, nothing = self.n, self.m, self.lam, arb(0)
         rho = exact(self.setting.rho)
         chi, top_A = self._bending(), root(n.upper)
@@ -222,7 +307,9 @@ class _Evaluation:
         tilt = n.feedback_gain * m.plan_tilt * m.plan_speed * self.level
         ell = slope * V_M + bend * V_J + tilt  # (H.9), per second
         # from here on by the age of the feedback: it starts at its delay, or at the instant that was predicted
-        youngest, oldest = (nothing, self.Tf) if self.at.prediction is not None else (self.tau, self.Tf + self.tau)
+        youngest, oldest = (
+            (nothing, self.Tf) if self.at.prediction is not None else (self.tau, self.Tf + self.tau)
+        )
         first = larger(oldest, self.tau)
         least = lam * self.floor
         base = n.plan_defect_metric + n.metric_input_gain * self.ups + self.pushed

@@ -31,11 +31,12 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class Predictor:
-    """|A_m|, |A_m + omega I| and lmin(Q), Q = -(A_m + A_m')."""
+    """|A_m|, |A_m + omega I| and lmin(Q), Q = -(A_m + A_m'); whether A_m is known to be -g I."""
 
     norm: Ball
     shifted: Ball
     q: Ball
+    scalar: bool
 
 
 def predictor(s: System, gains: Gains) -> Predictor:
@@ -47,9 +48,9 @@ def predictor(s: System, gains: Gains) -> Predictor:
         )
         nothing = arb("nan")
         return (
-            Predictor(exact(g), abs(omega - exact(g)), exact(2 * g))
+            Predictor(exact(g), abs(omega - exact(g)), exact(2 * g), scalar=True)
             if same
-            else Predictor(nothing, nothing, nothing)
+            else Predictor(nothing, nothing, nothing, scalar=False)
         )
     if given is None:
         raise ValueError("an automatic predictor needs its gain")
@@ -66,4 +67,4 @@ def _matrix_predictor(given: tuple[tuple[Fraction, ...], ...], omega: Fraction) 
             [exact(e + (omega if i == j else 0)) for j, e in enumerate(row)] for i, row in enumerate(given)
         ]
         Q = [[exact(-(given[i][j] + given[j][i])) for j in range(n)] for i in range(n)]
-        return Predictor(sharp_norm(A), sharp_norm(moved), sharp_least(Q))
+        return Predictor(sharp_norm(A), sharp_norm(moved), sharp_least(Q), scalar=False)

@@ -46,8 +46,9 @@ def _sampled(setting: Setting, gains: SampledGains, Y: Ball) -> _Sampled:
     m = smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
     H1 = smaller(n.h, n.h_initial + s1 * Ts)
     S_T = s1 * Ts / (-(-omega * Ts).expm1()) + m * (s1 + b * Y)
+    S_T = S_T + setting.taken + n.B_pinv_x * setting.blown * m * Y
     share = -(-lam * Ts).expm1()
-    d1 = n.initial_distance * (1 - share) + (n.metric_input_gain * H1 + n.plan_defect_metric) * share / lam
+    d1 = n.initial_distance * (1 - share) + (n.metric_input_gain * H1 + setting.pushed) * share / lam
     return _Sampled(H1, S_T, d1)
 
 
@@ -71,7 +72,7 @@ def sampled_margin(setting: Setting, gains: SampledGains, speed: Ball | None) ->
         H0=state.H1,
         S=state.S_T,
         e=arb(0),
-        delta=n.plan_defect_metric,
+        delta=setting.pushed,
         rate=setting.rate,
         omega=exact(gains.bandwidth),
         horizon=setting.horizon,

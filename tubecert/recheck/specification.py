@@ -11,7 +11,7 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.obstacles import Obstacle, read_obstacle
-from tubecert.recheck.specified.hardware import Disturbance, Hardware, read_disturbance, read_hardware
+from tubecert.recheck.specified.hardware import MACHINE, Disturbance, Hardware, read_machine
 from tubecert.recheck.specified.idle import IDLE, read_idle
 from tubecert.recheck.specified.loop import Loop, read_loop
 from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
@@ -57,13 +57,14 @@ def read_specification(node: Node) -> Specification:
         "adaptation",
         "conditions",
         "metric",
-        optional=(*IDLE[1:], "hardware", "disturbance"),
+        optional=(*IDLE[1:], *MACHINE),
     )
     _version(own["tubecert"])
     own["name"].text()
     plant = read_plant(own["system"], own["safe_set"])
     n = len(plant.states)
     tube = _tube(own["tube"], plant)
+    hardware, disturbance = read_machine(own, plant.states)
     found = Specification(
         plant=plant,
         uncertainty=read_uncertainty(own["uncertainty"], plant),
@@ -79,17 +80,14 @@ def read_specification(node: Node) -> Specification:
         if "obstacles" in own
         else (),
         limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
-        hardware=own.get("hardware", lambda item: read_hardware(item, plant.states)),
-        disturbance=own.get("disturbance", lambda item: read_disturbance(item, plant.states)),
+        hardware=hardware,
+        disturbance=disturbance,
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
     )
     read_idle(own, plant)
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
-    wind = found.disturbance
-    if wind is not None and wind.bound is None and (found.hardware is None or wind.rate is not None):
-        raise own["disturbance"].refused("must have a bound, but that of a machine where it has no rate")
     return found
 
 

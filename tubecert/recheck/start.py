@@ -22,8 +22,9 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import NOUGHT, Term, matrix_replaced, matrix_slopes, number, variable
+from tubecert.recheck.terms import NOUGHT, Matrix, Term, matrix_replaced, matrix_slopes, number, variable
 from tubecert.recheck.tube import Tube
+from tubecert.recheck.wind import adapted
 
 _PIECES = (1, 16, 128, 1024, 4096)
 _SHARES = 12
@@ -216,20 +217,30 @@ class _Speed:
 
 def uncertainty(place: Place, limit: Fraction) -> Outcome:
     """|h(0, x(0))| <= limit; where a bound of |h| is declared, that bound."""
-    s = place.system
+    s, more = place.system, adapted(place)
+    beside = [] if more is None else [more]
     if "h" in s.declared:
-        return stated(limit >= s.declared["h"], "it is below the declared bound of |h|")
+        room = limit - s.declared["h"]
+        found = stated(room >= 0, "it is below the declared bound of |h|")
+        return _norms(place, beside, room) if found.holds and beside else found
     assert s.h is not None
-    at_start = matrix_replaced(s.h, {TIME: NOUGHT})
+    return _norms(place, [matrix_replaced(s.h, {TIME: NOUGHT}), *beside], limit)
+
+
+def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:
+    """The sum of the norms at every x(0)."""
+    s = place.system
     if s.x0 is not None:
-        fixed = matrix_replaced(at_start, dict(zip(s.states, map(number, s.x0), strict=True)))
-        return prove(norms_below([fixed], limit), Boxed({}), 1)
+        point = dict(zip(s.states, map(number, s.x0), strict=True))
+        fixed = [matrix_replaced(a, point) for a in at_start]
+        return prove(norms_below(fixed, limit), Boxed({}), 1)
     if s.box is not None:
         known = {name: number(low) for name, (low, high) in s.box.items() if low == high}
-        return prove(norms_below([matrix_replaced(at_start, known)], limit), Boxed(s.box), place.budget)
+        free = [matrix_replaced(a, known) for a in at_start]
+        return prove(norms_below(free, limit), Boxed(s.box), place.budget)
     assert s.within is not None
     curve = place.curve
     still = curve
     if not curve.ranges:
         still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
-    return prove(norms_below([at_start], limit), Tube(still, Round(s.within), s.states, ()), place.budget)
+    return prove(norms_below(at_start, limit), Tube(still, Round(s.within), s.states, ()), place.budget)

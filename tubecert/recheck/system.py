@@ -14,6 +14,7 @@ from tubecert.recheck.grammar import Owed
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.specified.metric import Metric
 from tubecert.recheck.specified.numbers import Numbers, Range, Rows
 from tubecert.recheck.specified.plant import Uncertainty
@@ -50,7 +51,8 @@ class System:
     smooth: Fraction | None
     kernel: str
     horizon: Fraction | None
-    duties: tuple[Owed, ...]  # of f, B and W, on the safe set
+    duties: tuple[Owed, ...]  # of f, B, W and E, on the safe set
+    wind: Disturbance | None = None
 
     @property
     def h(self) -> Matrix | None:
@@ -111,7 +113,7 @@ def along(slopes_by_state: list[Matrix], direction: Matrix) -> Matrix:
 
 def system_of(spec: Specification) -> System:
     """The system of a specification with a metric."""
-    metric, loop = spec.metric, spec.loop
+    metric, loop, wind = spec.metric, spec.loop, spec.disturbance
     assert isinstance(metric, Metric), "a certificate without a metric has no system to examine"
     return System(
         states=spec.plant.states,
@@ -129,7 +131,8 @@ def system_of(spec: Specification) -> System:
         smooth=loop.smooth,
         kernel=loop.kernel,
         horizon=spec.trajectory.horizon,
-        duties=(*spec.plant.duties, *metric.duties),
+        duties=(*spec.plant.duties, *metric.duties, *(() if wind is None else wind.duties)),
+        wind=wind,
     )
 
 

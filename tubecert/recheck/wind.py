@@ -11,15 +11,17 @@ from fractions import Fraction
 from functools import cached_property
 
 from tubecert.recheck.branches import norms_below
-from tubecert.recheck.cover import Domain, Outcome, prove
 from tubecert.recheck.coordinates import Fields
+from tubecert.recheck.cover import Domain, Outcome, prove
 from tubecert.recheck.metric import adjugate, determinant, stated
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.statements import PositiveDefinite
-from tubecert.recheck.terms import Matrix, all_zero, plus, scaled, times, turned
+from tubecert.recheck.terms import Matrix, all_zero, names, plus, scaled, times, turned
 
-_HALVINGS = 12
+CONSTANTS = ("wind_push", "wind_size", "wind_explained")
+
+_HALVINGS, _FINE = 12, 50  # of a limit; of one that is no supremum
 _FIRST = 4_000  # boxes for each share of a limit
 
 
@@ -55,6 +57,15 @@ def blown(place: Place) -> Blown:
     if place.system.wind is None:
         raise ValueError("the specification has no disturbance")
     return Blown(place.system.wind, place.fields)
+
+
+def bounded(place: Place, name: str, limit: Fraction, matched: Fraction | None) -> Outcome:
+    """Whether one of `CONSTANTS` is at most `limit`; `matched` is a bound of beta eps_w."""
+    if limit < 0:
+        return stated(False, "it is negative")
+    if name == CONSTANTS[0]:
+        return push(place, limit, matched)
+    return size(place, limit) if name == CONSTANTS[1] else explained(place, limit)
 
 
 def push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
@@ -109,9 +120,31 @@ def adapted(place: Place) -> Matrix | None:
     return scaled(wind.bound, blown(place).explained)
 
 
-def adapted_rate(place: Place) -> Matrix:
-    """rate B^+ E: what the rate of w adds to that of h."""
-    wind = place.system.wind
+def adds(place: Place, name: str, limit: Fraction) -> Fraction | None:
+    """What B^+ E w adds to |h|, its slope in x or its rate: a bound that is proven over the tube, None if none is."""
+    wind, more = place.system.wind, adapted(place)
     assert wind is not None
     assert wind.rate is not None
-    return scaled(wind.rate, blown(place).explained)
+    assert more is not None
+    parts = {
+        "h": lambda: [more],
+        "h_x": lambda: [slope for slope in place.fields.slopes(more) if not all_zero(slope)],
+        "h_t": lambda: [scaled(wind.rate, blown(place).explained)],
+    }
+    own = [a for a in parts[name]() if not all_zero(a)]
+    return _least(own, place, limit) if own else Fraction(0)
+
+
+def _least(matrices: list[Matrix], place: Place, most: Fraction) -> Fraction | None:
+    """About the least bound of a sum of norms that can be proven, `most` at most."""
+    low, high = Fraction(0), most
+
+    def serves(limit: Fraction) -> bool:
+        return prove(norms_below(matrices, limit), place.tube(), min(_FIRST, place.budget)).holds
+
+    if not serves(high):
+        return None
+    for _ in range(_HALVINGS if names(e for a in matrices for row in a for e in row) else _FINE):
+        middle = (low + high) / 2
+        low, high = (low, middle) if serves(middle) else (middle, high)
+    return high

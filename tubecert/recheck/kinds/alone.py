@@ -95,7 +95,7 @@ class Alone(Kind[AloneSection, NoGains]):
 def settled(setting: Setting, h: Ball) -> Ball:
     """A1 of (4.0) for |h| <= h."""
     n = setting.n
-    return (n.metric_input_gain * h + n.plan_defect_metric) / setting.rate
+    return (n.metric_input_gain * h + setting.pushed) / setting.rate
 
 
 def supremum(setting: Setting, h: Ball) -> Ball:

@@ -10,9 +10,13 @@ from typing import ClassVar, Generic, TypeVar
 
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome
+from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
+from tubecert.recheck.place import Place
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.hardware import Hardware
 
 VERDICTS = ("certified", "refuted", "undecided")
 
@@ -53,17 +57,33 @@ class Asked:
 class Ground:
     """What claims about gains rest on: the constants on their safe sides, and as they are printed.
 
-    `depends` is everything that the setting was made of; `projection_radius` is that of the pairs of A and B.
+    `depends` is everything that the setting was made of, `around` everything that the tube, the `place`, was made of;
+    `projection_radius` is that of the pairs of A and B; `machine` are the constants of a machine, if there is one.
     """
 
     setting: Setting
     constants: Mapping[str, Enclosure]
     depends: tuple[object, ...]
     projection_radius: Fraction
+    place: Place
+    around: tuple[object, ...]
+    specification: Specification
+    machine: MachineNumbers | None
 
     def claim(self, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
         """A claim about formulas at decimals, which depends on `parts` beside the setting."""
         return Claim(name, (*self.depends, *parts), examine, SHARP)
+
+    def over_tube(self, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
+        """A claim about the tube or the plan, which depends on `parts` beside these."""
+        return Claim(name, (*self.around, *parts), examine)
+
+    @property
+    def asked(self) -> Hardware:
+        """The machine of the specification; `ValueError` where there is none."""
+        if self.specification.hardware is None:
+            raise ValueError("the specification has no machine")
+        return self.specification.hardware
 
 
 S = TypeVar("S", bound=Section)
@@ -97,6 +117,11 @@ class Kind(ABC, Generic[S, R]):
     @abstractmethod
     def claims(self, section: S, recipe: R | None, ground: Ground) -> Iterator[Claim]:
         """Everything that is examined of it. One that is not certified does not claim its gains, but the rest."""
+
+    def applies(self, specification: Specification) -> bool:
+        """Whether a certificate of a specification has this section."""
+        del specification
+        return True
 
     def asked(self, section: S, given: Asked) -> Statements:
         """That what was asked for is what is judged."""

@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import Members, Node
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.reading import Reader
 from tubecert.recheck.specified.numbers import Numbers, not_negative, positive
 from tubecert.recheck.terms import Matrix
 
+MACHINE = ("hardware", "disturbance")
 _LARGEST, _ONE_SAMPLE, _AUTO = "largest", "one sample", "auto"
 _MOST_COLUMNS = 32
 _MOST_STATES = 12  # with noise of their own: all corners of a box are examined
@@ -48,8 +49,16 @@ class Disturbance:
     duties: tuple[Owed, ...]
 
 
-def read_hardware(node: Node, states: Sequence[str]) -> Hardware:
-    """`hardware`."""
+def read_machine(own: Members, states: Sequence[str]) -> tuple[Hardware | None, Disturbance | None]:
+    """`hardware` and `disturbance`, where they are; what is not bounded is that of a machine."""
+    machine = own.get("hardware", lambda item: _hardware(item, states))
+    wind = own.get("disturbance", lambda item: _disturbance(item, states))
+    if wind is not None and wind.bound is None and (machine is None or wind.rate is not None):
+        raise own["disturbance"].refused("must have a bound, but that of a machine where it has no rate")
+    return machine, wind
+
+
+def _hardware(node: Node, states: Sequence[str]) -> Hardware:
     keys = ("sample_time", "delay", "noise", "feedforward", "predict", "bandwidth")
     own = node.closed(*keys, optional=("noise_rate", "feedback_rate"))
     feedback = own.get("feedback_rate", positive)
@@ -83,8 +92,7 @@ def _noise(node: Node, states: Sequence[str]) -> Fraction | Numbers | None:
     return tuple(not_negative(own[name]) for name in states)
 
 
-def read_disturbance(node: Node, states: Sequence[str]) -> Disturbance:
-    """`disturbance`."""
+def _disturbance(node: Node, states: Sequence[str]) -> Disturbance:
     own = node.closed("E", "bound", optional=("rate",))
     reader = Reader.of(states)
     rows = own["E"].sized(len(states))

@@ -1,0 +1,374 @@
+"""Certificate H: sampled, late and noisy control, with wind beside the inputs. Implements: theory 8."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import ClassVar
+
+from tubecert.recheck.balls import exact, root
+from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.digital import Digital, Loop, Promise, loop, proposed
+from tubecert.recheck.document import Node
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.examination import Claim
+from tubecert.recheck.kinds import printed
+from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
+from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section
+from tubecert.recheck.machine import clips
+from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.hardware import Hardware
+from tubecert.recheck.specified.numbers import Range
+from tubecert.recheck.statements import NotNegative
+from tubecert.recheck.terms import number
+
+LEVEL, STAYS = "hardware_level", "hardware"
+SHARES = (
+    "plan",
+    "feedforward",
+    "wind",
+    "wind_estimate",
+    "bias",
+    "noise_estimate",
+    "lag",
+    "noise_feedback",
+    "sampling",
+)
+_MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
+_PROOF = ("floor", "speed", "bias", "ripple")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwareSection(Section):
+    """The machine, the level that is proven for it, and what follows; None, and nothing, where there is no recipe."""
+
+    machine: dict[str, Fraction]
+    bandwidth: Fraction | None
+    deadbeat: bool
+    predict: bool
+    largest: str | None
+    clip: tuple[Range, ...]
+    radius: Fraction | None
+    half_widths: dict[str, Fraction]
+    inputs: dict[str, Range]
+    margin: Enclosure | None
+    level_margin: Enclosure | None
+    ultimate_radius: Fraction | None
+    budget: dict[str, Fraction] | None
+    curve: tuple[tuple[Fraction, Fraction], ...]
+
+
+class OfMachines(Kind[HardwareSection, Digital]):
+    """Certificate H."""
+
+    key: ClassVar = "hardware"
+    conditions: ClassVar = (LEVEL, STAYS)
+
+    def applies(self, specification: Specification) -> bool:
+        """Where the specification has a machine."""
+        return specification.hardware is not None
+
+    def read(self, node: Node, n: int) -> HardwareSection:
+        """The section `hardware`."""
+        del n
+        return _section(node)
+
+    def read_recipe(self, node: Node) -> Digital:
+        """The machine and the numbers of the proof."""
+        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction")
+        found = {key: own[key].decimal() for key in (*_MACHINE, *_PROOF)}
+        return Digital(
+            **found,
+            bandwidth=own.known("bandwidth", Node.decimal),
+            prediction=own.known("prediction", Node.decimal),
+        )
+
+    def said(self, section: HardwareSection) -> dict[str, object]:
+        """Both margins."""
+        if section.margin is None or section.level_margin is None:
+            return {}
+        return {"margins": {STAYS: section.margin.below, LEVEL: section.level_margin.below}}
+
+    def claims(self, section: HardwareSection, recipe: Digital | None, ground: Ground) -> Iterator[Claim]:
+        """The machine, its clip, the level by the recipe, what follows from it, the curve."""
+        if section.verdict != "certified":
+            yield ground.claim("H: what is told of it", (section,), lambda: _told(section))
+            if section.curve:
+                yield ground.claim("H: the curve", (section,), lambda: stated(False, "nothing is certified"))
+            return
+        if recipe is None:
+            yield ground.claim("H: it has a recipe", (), lambda: stated(False, "it has none"))
+            return
+        parts = (section, recipe)
+        yield ground.claim(
+            "H: the machine is the one that is asked for", parts, lambda: _agrees(section, recipe, ground)
+        )
+        yield ground.over_tube(
+            "H: the estimate is clipped to a set that holds h",
+            (section.clip, recipe),
+            lambda: _clipped(section, recipe, ground),
+        )
+        words = f"Ts = {float(recipe.sample_time):.6g}, tau = {float(recipe.delay):.6g}"
+        yield ground.claim(
+            f"H: d < {float(recipe.level):.6g} at {words}", parts, lambda: _holds(section, recipe, ground)
+        )
+        yield from _states(section, recipe, ground)
+        yield from _inputs(section, recipe, ground)
+        yield ground.claim("H: the curve is feasible", parts, lambda: _curve_holds(section, recipe, ground))
+
+
+# -- reading
+
+
+def _section(node: Node) -> HardwareSection:
+    others = (
+        "verdict",
+        "bandwidth",
+        "deadbeat",
+        "predict",
+        "largest",
+        "clip",
+        "radius",
+        "half_widths",
+        "inputs",
+    )
+    rest = ("margin", "level_margin", "ultimate_radius", "budget", "curve", "shortfalls")
+    own = node.closed(*_MACHINE, *others, *rest)
+    verdict = own["verdict"].word(*VERDICTS)
+    present = [own[key].value is not None for key in (*_MACHINE, "margin", "level_margin")]
+    if any(present) != all(present) or (verdict == "certified" and not all(present)):
+        raise node.refused("has a part of its machine only")
+    return HardwareSection(
+        verdict=verdict,
+        machine={key: own[key].decimal() for key in _MACHINE} if all(present) else {},
+        bandwidth=own.known("bandwidth", Node.decimal),
+        deadbeat=own["deadbeat"].flag(),
+        predict=own["predict"].flag(),
+        largest=own.known("largest", Node.text),
+        clip=tuple(_range(item) for item in own["clip"].entries()),
+        radius=own.known("radius", Node.number),
+        half_widths={name: item.number() for name, item in own["half_widths"].items()},
+        inputs={name: _range(item) for name, item in own["inputs"].items()},
+        margin=own.known("margin", enclosure),
+        level_margin=own.known("level_margin", enclosure),
+        ultimate_radius=own.known("ultimate_radius", Node.number),
+        budget=own.known("budget", _budget),
+        curve=tuple(_point(item) for item in own["curve"].entries()),
+        shortfalls=printed.read_shortfalls(own["shortfalls"]),
+    )
+
+
+def _range(node: Node) -> Range:
+    low, high = node.pair()
+    return low.decimal(), high.decimal()
+
+
+def _budget(node: Node) -> dict[str, Fraction]:
+    own = node.closed(*SHARES)
+    return {key: own[key].number() for key in SHARES}
+
+
+def _point(node: Node) -> tuple[Fraction, Fraction]:
+    own = node.closed("sample_time", "level")
+    return own["sample_time"].decimal(), own["level"].decimal()
+
+
+# -- claims
+
+
+def _told(section: HardwareSection) -> Outcome:
+    """A section that is not certified: nothing follows from a level, and no margins say that it holds."""
+    follows = (section.radius, section.ultimate_radius, section.budget)
+    if any(item is not None for item in follows) or section.half_widths or section.inputs:
+        return stated(False, "something is stated that would follow from a level")
+    margins = [margin for margin in (section.margin, section.level_margin) if margin is not None]
+    return not_shown_to_hold(margins) if margins else CONFIRMED
+
+
+def _agrees(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
+    """The section, the recipe and the specification speak of one machine."""
+    asked = ground.asked
+    for key in _MACHINE:
+        if section.machine[key] != getattr(recipe, key):
+            return stated(False, f"the recipe has another {key}")
+    searched = [name for name, value in _given(asked, ground, recipe) if value is None]
+    statements = [
+        (recipe.bandwidth == section.bandwidth, "the recipe has another bandwidth"),
+        (section.deadbeat == (section.bandwidth is None), "`deadbeat` says otherwise than the bandwidth"),
+        (section.predict == asked.predict, "`predict` is not that of the specification"),
+        (
+            asked.predict == (recipe.prediction is not None),
+            "the recipe predicts otherwise than the specification",
+        ),
+        (asked.bandwidth in (None, recipe.bandwidth), "the bandwidth is not that of the specification"),
+        (section.largest == (searched[0] if searched else None), "`largest` is not what is searched for"),
+    ]
+    own = {
+        "sample_time": recipe.sample_time,
+        "delay": recipe.delay,
+        "noise": recipe.noise,
+        "wind": recipe.wind,
+    }
+    statements += [
+        (value is None or value == own[name], f"{name} is not that of the specification")
+        for name, value in _given(asked, ground, recipe)
+    ]
+    feedback = recipe.sample_time if asked.feedback_time is None else asked.feedback_time
+    statements.append((recipe.feedback_time == feedback, "feedback_time is not that of the specification"))
+    return all_of(stated(*statement) for statement in statements)
+
+
+def _given(asked: Hardware, ground: Ground, recipe: Digital) -> list[tuple[str, Fraction | None]]:
+    """What the specification says of the machine and of the wind; None where the largest is searched for."""
+    noise = Fraction(1) if isinstance(asked.noise, tuple) else asked.noise
+    wind = ground.specification.disturbance
+    return [
+        ("sample_time", asked.sample_time),
+        ("delay", recipe.sample_time if asked.one_sample else asked.delay),
+        ("noise", noise),
+        ("wind", Fraction(0) if wind is None else wind.bound),
+    ]
+
+
+def _clipped(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
+    """R bounds the set that the estimate is clipped to, and h lies in that set."""
+    Dh, place = ground.constants["h"].above, ground.place
+    if not section.clip:
+        return stated(Dh is not None and Dh <= recipe.clip_radius, "the radius of the clip is less than |h|")
+    if len(section.clip) != len(place.system.inputs):
+        return stated(False, "there is not one range for each input")
+    square = sum(max(low**2, high**2) for low, high in section.clip)
+    if square > recipe.clip_radius**2:
+        return stated(False, "the radius of the clip is less than a corner of its box")
+    return clips(place, section.clip, Dh)
+
+
+def promise(asked: Hardware) -> Promise:
+    """What the specification promises of the machine."""
+    drift = asked.noise_rate
+    if drift is not None and isinstance(asked.noise, tuple):
+        # a vector of that length is within so many units of noise: its other entries are 0
+        drift = drift / min((size for size in asked.noise if size), default=Fraction(1))
+    return Promise(held=asked.held, predicts=asked.predict, drift=drift)
+
+
+def _loop(recipe: Digital, ground: Ground) -> Loop | None:
+    if ground.machine is None:
+        return None
+    return loop(ground.setting, ground.machine, promise(ground.asked), recipe)
+
+
+def _holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
+    """Theorem H by the recipe, with what is printed of it."""
+    found = _loop(recipe, ground)
+    if found is None:
+        return stated(False, "a condition of the theorem does not hold at the numbers of the recipe")
+    if section.margin is None or section.level_margin is None:
+        return stated(False, "it has no margin")
+    level, least = exact(recipe.level), root(ground.setting.n.lower)
+    outcomes = [
+        margin_at_least(
+            1 - (level + found.noise) / ground.setting.reach, section.level_margin, "the level (H.10)"
+        ),
+        margin_at_least(1 - found.top / level, section.margin, "the distance (H.12)"),
+    ]
+    if section.radius is None or section.budget is None:
+        return stated(False, "what follows from the level is missing")
+    outcomes.append(at_most(level / least, section.radius, "the radius"))
+    if section.ultimate_radius is not None:
+        outcomes.append(at_most(found.ultimate / least, section.ultimate_radius, "the ultimate radius"))
+    for key, share in section.budget.items():
+        outcomes.append(at_most(found.shares[key].max(0), share, f"the share of {key}"))
+    return all_of(outcomes)
+
+
+def _states(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterator[Claim]:
+    """|x_i - x_i*| < level sup sqrt(W_ii): width^2 >= level^2 W_ii over the tube."""
+    place = ground.place
+    named = section.half_widths.keys() == set(place.system.states)
+    yield ground.claim(
+        "H: every state has a half-width", (section,), lambda: stated(named, "they are of others")
+    )
+    for i, name in enumerate(place.system.states):
+        width = section.half_widths.get(name)
+        if width is not None:
+            yield ground.over_tube(
+                f"H: half-width of {name} <= {float(width):.6g}",
+                (width, recipe.level),
+                lambda i=i, width=width: _within(i, width, recipe.level, ground),  # type: ignore[misc]
+            )
+
+
+def _within(state: int, width: Fraction, level: Fraction, ground: Ground) -> Outcome:
+    if width <= 0:
+        return stated(False, "it is not positive")
+    place, a = ground.place, ground.constants["lower"].below
+    if place.coordinates is None and a is not None and width**2 * a >= level**2:
+        return CONFIRMED  # the radius of the tube
+    square = number(width**2 / level**2)
+    return prove(NotNegative(square - place.system.W[state][state]), place.tube(), place.budget)
+
+
+def _inputs(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterator[Claim]:
+    """u_i in [inf u*_i - ups - kb - hi_i, sup u*_i + ups + kb - lo_i]."""
+    place = ground.place
+    named = section.inputs.keys() == set(place.system.inputs)
+    yield ground.claim("H: every input has a range", (section,), lambda: stated(named, "they are of others"))
+    R = recipe.clip_radius
+    clip = section.clip or ((-R, R),) * len(place.system.inputs)
+    for i, name in enumerate(place.system.inputs):
+        own = section.inputs.get(name)
+        if own is not None and i < len(clip):
+            yield ground.over_tube(
+                f"H: {name} in [{float(own[0]):.6g}, {float(own[1]):.6g}]",
+                (own, clip[i], recipe, ground.depends),
+                lambda i=i, own=own: _in_range(i, own, clip[i], recipe, ground),  # type: ignore[misc]
+            )
+
+
+def _in_range(i: int, own: Range, clip: Range, recipe: Digital, ground: Ground) -> Outcome:
+    found, place = _loop(recipe, ground), ground.place
+    if found is None:
+        return stated(False, "the level is not proven")
+    feedback = Fraction(float((found.feedback + found.feedforward).upper())) * _MORE
+    u = place.curve.u[i]
+    rooms = (u - number(own[0] + feedback + clip[1]), number(own[1] - feedback + clip[0]) - u)
+    return all_of(place.along(lambda room=room: NotNegative(room, place.numbers)) for room in rooms)  # type: ignore[misc]
+
+
+_MORE = 1 + Fraction(1, 2**50)
+
+
+def _curve_holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
+    """Every point of the curve is feasible for the same machine, by a recipe that is found here."""
+    if ground.machine is None:
+        return stated(False, "there is no machine")
+    return all_of(_feasible(point, recipe, ground) for point in section.curve)
+
+
+def _feasible(point: tuple[Fraction, Fraction], recipe: Digital, ground: Ground) -> Outcome:
+    Ts, level = point
+    why = f"the point at Ts = {float(Ts):.6g} is not feasible"
+    if Ts <= 0 or level <= 0 or ground.machine is None:
+        return stated(False, why)
+    asked = ground.asked
+    like = replace(
+        recipe,
+        sample_time=Ts,
+        level=level,
+        feedback_time=Ts if asked.feedback_time is None else asked.feedback_time,
+        delay=Ts if asked.one_sample else recipe.delay,
+    )
+    fixed = asked.bandwidth is not None
+    found = proposed(ground.setting, ground.machine, promise(asked), like, fixed=fixed)
+    if found is None:
+        return Outcome(verdict="undecided", why=why)
+    own = loop(ground.setting, ground.machine, promise(asked), found)
+    whole = (
+        own is not None
+        and bool(own.top < exact(level))
+        and bool(exact(level) + own.noise <= ground.setting.reach)
+    )
+    return CONFIRMED if whole else Outcome(verdict="undecided", why=why)
