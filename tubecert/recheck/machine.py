@@ -137,19 +137,18 @@ def _feedback_curvature(place: Place, limit: Fraction) -> Outcome:
     moving = [T for T in turns if not all_zero(T)]
     if not moving:
         return stated(True, "")
-    found = prove(SlopesBelow(moving, unit, limit), place.tube(), min(place.budget, _FIRST))
-    if found.holds or len(moving) == 1:
-        if found.verdict != "undecided" or place.budget <= _FIRST:
+    if len(moving) > 1:
+        found = prove(SlopesBelow(moving, unit, limit), place.tube(), min(place.budget, _FIRST))
+        if found.verdict != "undecided":
             return found
-        return prove(SlopesBelow(moving, unit, limit), place.tube(), place.budget)
     outcomes = []
     for total, size, others in _directions(moving):
+        bound = [[number(limit) * size * e for e in row] for row in unit]
         for sign in (1, -1):
-            S = plus([[number(limit) * size * e for e in row] for row in unit], total, sign)
-            test = PositiveDefinite(S, unit)
-            outcomes.append(prove(test, place.tube(others), place.budget))
+            test = PositiveDefinite(plus(bound, total, sign), unit)
+            outcomes.append(prove(test, place.tube(others), min(place.budget, _MANY)))
             if not outcomes[-1].holds:
-                return together(outcomes)
+                break
     return together(outcomes)
 
 
