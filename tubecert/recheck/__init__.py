@@ -20,7 +20,8 @@ formula or rounding in the producer must not pass both.
 | `plans`, `enclosures`, `reasons`, `orientation` | their parts |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
-| `filtering`, `predictor`, `conditions`, `sampling` | the theorems A, B and C at printed gains |
+| `wind`, `machine` | claims about a disturbance, and about what certificate H needs to know |
+| `filtering`, `predictor`, `conditions`, `sampling`, `digital` | the theorems A, B, C and H at printed numbers |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |
