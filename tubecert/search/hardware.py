@@ -29,6 +29,7 @@ _ROOM = 9  # digits of what only the proof needs
 _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _STEPS = 9  # of the fixed point of Y, S, N, np; a search needs no more, and what is printed is verified
 _ZOOMS = 12
+_TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
 _CURVE_POINTS = 13
 
@@ -126,7 +127,8 @@ class Search:
     def needed(self, at: Lanes, chosen: Choice) -> Array:
         """What dhat has to exceed, over dhat, and what dbar has to, over dbar: below 1 where the theorem holds."""
         x = theorem_h.evaluated(self.plant, self.settled(at, chosen))
-        stays = x.course.supremum() / x.loop.dhat
+        # of what serves alike, what is less in the long run
+        stays = (x.course.supremum() + _TIE * x.course.bound.ultimate()) / x.loop.dhat
         fits = (x.loop.dhat + x.estimate.n_fb) / self.dbar
         worst = np.maximum(stays, fits)
         good = np.isfinite(worst) & (x.loss.chi > 0) & at.possible
