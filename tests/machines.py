@@ -35,10 +35,11 @@ ALIVE = {
 
 def hardware_constants(**values: float | None) -> HardwareConstants:
     """Constants by name; what is not named is 0, and None where that is allowed."""
-    known = {item.name: values.get(item.name, 0.0 if item.default is not None else None) for item in fields(HardwareConstants)}
-    return HardwareConstants(
-        **{name: None if value is None else Constant(below=value, above=value) for name, value in known.items()}  # type: ignore[arg-type]
-    )
+    found: dict[str, Any] = {}
+    for item in fields(HardwareConstants):
+        value = values.get(item.name, None if item.default is None else 0.0)
+        found[item.name] = None if value is None else Constant(below=value, above=value)
+    return HardwareConstants(**found)
 
 
 def asked_of(**values: Any) -> Hardware:

@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from machines import alive_machine
 from problems import ALIVE, alive, three_state
 
 from tubecert import certificate
@@ -264,10 +265,13 @@ def test_gains_that_stand_for_others_prove_nothing():
 
 
 def test_a_constant_without_a_bound_proves_nothing():
+    machine = alive_machine().machine
     for kind in KINDS:
-        recipe = PROPOSERS[kind.theorem.recipe].propose(alive(), Asked()).decisive
-        for name in kind.theorem.needs(alive()):
-            endless = alive(values={name: (0.9 * ALIVE[name], float("inf"))})
+        problem = replace(alive(), machine=machine)
+        recipe = PROPOSERS[kind.theorem.recipe].propose(problem, Asked()).decisive
+        assert isinstance(check(problem, recipe), Proof)
+        for name in kind.theorem.needs(problem):
+            endless = alive(values={name: (0.9 * ALIVE[name], float("inf"))}, machine=machine)
             assert isinstance(check(endless, recipe), Unproven), name
             judgement = judge(endless, kind.theorem, Proposal(decisive=recipe))
             assert judgement.verdict is Verdict.UNDECIDED, name

@@ -38,6 +38,7 @@ from tubecert.conditions.theorem import Margins, Theorem
 from tubecert.conditions.verdict import Shortfall, unbounded
 from tubecert.enclosure.interval import Interval
 
+_DUST = 1e-100  # what rounding outwards makes of 0
 LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
 
 
@@ -615,7 +616,8 @@ def _budget(x: Evaluated[Interval]) -> Budget:
     whole = n.lam * loop.dhat
 
     def share(part: Interval) -> float:
-        return max(float((part / whole).sanitised().hi), 0.0)
+        most = float((part / whole).sanitised().hi)
+        return most if most > _DUST else 0.0
 
     return Budget(
         plan=share(n.delta),

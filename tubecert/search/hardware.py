@@ -7,6 +7,7 @@ is not monotone in Ts. Implements: theory section 8.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -241,7 +242,7 @@ class Setting:
 
 def setting_at(problem: TubeProblem, machine: Machine, value: Fraction) -> Setting:
     """The machine that is asked for, with `value` for the number that is searched for, if one is."""
-    asked, wind = machine.asked, getattr(problem, "wind", None)
+    asked, wind = machine.asked, problem.wind
     Ts = value if asked.sample_time is None else asked.sample_time
     delay = Ts if asked.one_sample else value if asked.delay is None else asked.delay
     noise = Fraction(1) if isinstance(asked.noise, tuple) else value if asked.noise is None else asked.noise
@@ -352,6 +353,22 @@ def _ends(search: Search) -> tuple[float, float]:
     return 1e-9 / search.rate, 1e2 / search.rate
 
 
+def _largest_values(search: Search) -> Iterator[Fraction]:
+    """Decimals to try for what is searched for, the largest first."""
+    asked = search.machine.asked
+    found = largest_value(search)
+    if (
+        asked.largest == "delay"
+        and asked.sample_time is not None
+        and found > 0.999 * float(asked.sample_time)
+    ):
+        yield asked.sample_time
+    for attempt in range(4 if found > 0 else 0):
+        yield round_down(found * (1 - 1e-9) * (1 - attempt * 2e-4), DIGITS)
+    if asked.largest != "sample_time":
+        yield Fraction(0)
+
+
 def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:
     """The least level at the machine that is asked for, or at the largest one of what is searched for."""
     del asked  # gains of the other loops; this one is the specification's
@@ -362,11 +379,7 @@ def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRec
     if machine.asked.largest is None:
         recipe = recipe_at(search, setting_at(problem, machine, Fraction(1)))
         return Proposal() if recipe is None else Proposal(decisive=recipe, role="machine")
-    found = largest_value(search)
-    for attempt in range(4):
-        value = round_down(found * (1 - 1e-9) * (1 - attempt * 2e-4), DIGITS) if found > 0 else Fraction(0)
-        if value == 0 and machine.asked.largest == "sample_time":
-            break
+    for value in _largest_values(search):
         recipe = recipe_at(search, setting_at(problem, machine, value))
         if recipe is not None and serves(problem, recipe):
             return Proposal(decisive=recipe, role="largest")
