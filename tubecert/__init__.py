@@ -1,3 +1,109 @@
-"""tubecert: certified tracking tubes for control-affine systems with matched uncertainty."""
+"""tubecert: certified tracking tubes for control-affine systems with matched uncertainty.
+
+`import tubecert as tc` offers what docs/library.md tells: `tc.load`, `tc.certify` and the rest of `__all__`. Nothing
+of it is imported before it is used.
+"""
+
+import sys
+from types import ModuleType
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from tubecert.errors import SpecError, TargetError, TubecertError
+    from tubecert.library.certification import Certification, Gains, read
+    from tubecert.library.certifying import certify
+    from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
+    from tubecert.library.specification import Specification, load, specification
+    from tubecert.stages.options import Step
+    from tubecert.verdict import Verdict
 
 __version__ = "0.1.0"
+__all__ = [
+    "Certification",
+    "Gains",
+    "SpecError",
+    "Specification",
+    "Step",
+    "SynthesisedMetric",
+    "TargetError",
+    "TubecertError",
+    "Verdict",
+    "VerifiedMetric",
+    "__version__",
+    "certify",
+    "load",
+    "read",
+    "specification",
+    "synthesise",
+    "verify",
+]
+
+_HOMES = {
+    "Certification": "library.certification",
+    "Gains": "library.certification",
+    "read": "library.certification",
+    "certify": "library.certifying",
+    "SynthesisedMetric": "library.metrics",
+    "VerifiedMetric": "library.metrics",
+    "synthesise": "library.metrics",
+    "verify": "library.metrics",
+    "Specification": "library.specification",
+    "load": "library.specification",
+    "specification": "library.specification",
+    "SpecError": "errors",
+    "TargetError": "errors",
+    "TubecertError": "errors",
+    "Step": "stages.options",
+    "Verdict": "verdict",
+}
+_ROOMS = {"recheck": "library.rechecking", "report": "library.pages", "simulate": "library.simulating"}
+
+
+class _Room(ModuleType):
+    """A room of the package whose name is that of a function of the library: it can be called as that function."""
+
+    def __call__(self, *arguments: object, **options: object) -> object:
+        return self._function()(*arguments, **options)
+
+    @property
+    def __signature__(self) -> object:
+        import inspect
+
+        return inspect.signature(self._function())
+
+    def _function(self):  # type: ignore[no-untyped-def]
+        name = self.__name__.rpartition(".")[2]
+        return getattr(_module(_ROOMS[name]), name)
+
+
+class _Package(ModuleType):
+    """The package: whoever imports one of those rooms first, it can be called."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in _ROOMS and isinstance(value, ModuleType):
+            value.__class__ = _Room
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+if not TYPE_CHECKING:  # a type checker knows what there is
+
+    def __getattr__(name):
+        if name in _HOMES:
+            value = getattr(_module(_HOMES[name]), name)
+        elif name in _ROOMS:
+            value = _module(name)
+        else:
+            raise AttributeError(f"module 'tubecert' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+    def __dir__():
+        return sorted({*globals(), *__all__})
+
+
+def _module(name: str) -> ModuleType:
+    from importlib import import_module
+
+    return import_module(f"tubecert.{name}")

@@ -14,10 +14,10 @@ from tubecert import certificate, pipeline
 from tubecert.certificate import digest, dump, seal
 from tubecert.certificate.belonging import compared
 from tubecert.claims import MetricDefinite, Reason
-from tubecert.cli.report import open_certificate
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, NAMES, words_of
+from tubecert.library.certification import read as read_file
 from tubecert.model import build
 from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted, certified_plan, require_tube
@@ -289,7 +289,7 @@ def test_what_recheck_refuses_simulate_refuses_with_the_same_code(tmp_path, chan
     broken = certified("flat")[1].to_json()
     change(broken)
     path = written(tmp_path, broken)
-    error, finding = refused(open_certificate, path)
+    error, finding = refused(read_file, path)
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
     error, finding = refused(recheck, (tmp_path / "c.json").read_text(), path, 10)
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
@@ -315,7 +315,7 @@ def test_half_widths_keep_their_states_through_a_file(tmp_path):
         )
     )
     result = pipeline.certify(spec, pipeline.Options())
-    read = open_certificate(written(tmp_path, result)).result
+    read = read_file(written(tmp_path, result)).result
     assert list(read.tube.half_widths) == ["p", "v"]
     for found in (result, read):
         widths = setting_of(spec, found).certified.half_widths

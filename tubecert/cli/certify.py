@@ -5,33 +5,31 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-import time
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
-from tubecert.cli.report import check_pages, read_certificate, write_pages
+from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.settings import settings_of
-from tubecert.cli.targets import deadline_after, plan_of, refused, spare
+from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
-from tubecert.libraries import versions
-from tubecert.library.numbers import Numbers
+from tubecert.library.asked import certification_numbers
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Certificate, Result
+    from tubecert.certificate.result import Result
+    from tubecert.library.certification import Certification
     from tubecert.spec import Spec
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Certify; `given` holds the options by the names of their parameters."""
-    numbers = _numbers(given)
+    numbers = certification_numbers(given, flag)
     deadline = numbers.pop("deadline", None)
     settings = settings_of(given)
     target = _target(given)
@@ -43,39 +41,26 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     if given["metric"] is not None:
         system = with_metric(system, str(given["metric"]))
     kept = _kept_place(given, system, target)
-    from tubecert import pipeline  # numpy and the rest, once the input is known to be readable
+    from tubecert.library.certifying import (
+        certified,  # numpy and the rest, once the input is known to be readable
+    )
     from tubecert.report import progress
+    from tubecert.stages.options import Options
 
-    started, clock = datetime.now(UTC), time.perf_counter()
     words: dict[str, Any] = {
         name: str(given[name]) for name in ("conditions", "formulas") if given[name] is not None
     }
-    options = pipeline.Options(**numbers, **words, metric=given["metric"])
+    options = Options(**numbers, **words, metric=given["metric"])
+    command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        result = pipeline.certify(system, options, report, deadline=deadline_after(deadline))
-    sealed = certificate.seal(result.to_json(), _record(started, time.perf_counter() - clock))
+        found = certified(system, options, report, seconds=deadline, command=command)
     if target != certificate.STDOUT:
-        certificate.write(target, sealed)
-    metric = _kept_metric(result, kept)
-    told = read_certificate(sealed)
-    write_pages(pages, told)
-    _report(sealed, told, target, {"metric": metric, "pages": pages}, output)
-    return result.verdict.exit_code
-
-
-def _numbers(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers among the options, exact; raises `SpecError` with everything that is wrong with them."""
-    numbers = Numbers()
-    values: dict[str, Any] = {
-        name: numbers.positive(flag(name), given[name]) for name in ("rho_a", "epsilon", "deadline")
-    }
-    for name in ("bandwidth", "adaptation_rate"):
-        values[name] = numbers.gain(flag(name), given[name])
-    values["gap"] = numbers.positive("--gap", given["gap"], below=1)
-    values["budget"] = numbers.count("--budget", given["budget"])
-    numbers.check()
-    return {name: value for name, value in values.items() if value is not None}
+        certificate.write_text(target, found.text)
+    metric = _kept_metric(found.result, kept)
+    write_pages(pages, found.certificate)
+    _report(found, target, {"metric": metric, "pages": pages}, output)
+    return found.verdict.exit_code
 
 
 def _target(given: Mapping[str, Any]) -> str:
@@ -146,25 +131,13 @@ def _kept_metric(result: Result, target: str | None) -> str | None:
     return target
 
 
-def _record(started: datetime, seconds: float) -> dict[str, Any]:
-    """How the certificate was made; no part of what is hashed."""
-    return {
-        "command": visible(shlex.join(["tubecert", *sys.argv[1:]])),
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": round(seconds, 3),
-        "versions": versions(),
-    }
-
-
-def _report(
-    sealed: Mapping[str, Any], told: Certificate, target: str, files: Mapping[str, Any], output: Output
-) -> None:
+def _report(found: Certification, target: str, files: Mapping[str, Any], output: Output) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
     present(
         output,
-        console.verdict_line(told.result),
-        lambda: console.report(told, target=target, verbose=output.verbose, **files),
-        certificate.dump(sealed) if output.json or target == certificate.STDOUT else None,
+        console.verdict_line(found.result),
+        lambda: console.report(found.certificate, target=target, verbose=output.verbose, **files),
+        found.text if output.json or target == certificate.STDOUT else None,
     )

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tubecert.cli.report import open_certificate
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Severity
 from tubecert.printable import visible
@@ -29,7 +28,9 @@ def _family(path: str) -> Spec:
     from tubecert.spec import load, load_text
 
     if Path(path).suffix.lower() == ".json":
-        effective = open_certificate(path).result.spec.effective
+        from tubecert.library.certification import read
+
+        effective = read(path).result.spec.effective
         spec = load_text(json.dumps(dict(effective.data)), path)
     else:
         spec = load(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
@@ -13,8 +13,8 @@ from tubecert.cli.options import Output
 from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
 from tubecert.files import STDIN
+from tubecert.library.certification import read
 from tubecert.printable import printable_json, visible
-from tubecert.records import FormError
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
@@ -29,7 +29,7 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
         raise refused("a certificate on stdin has no name that the page could have", "give -o FILE.html")
     pages = list(targets) if targets else [_beside(source)]
     check_pages(pages, {"certificate": source})
-    told = open_certificate(source)
+    told = read(source).certificate
     texts = {page: _render(page, told) for page in pages}
     for page, text in texts.items():
         certificate.write_text(page, text, _REMEDY)
@@ -37,22 +37,6 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
         write_stdout("".join(f"page {visible(page)}\n" for page in pages))
-
-
-def open_certificate(source: str) -> Certificate:
-    """The values of the certificate in a file (`-`: on stdin). Raises `TargetError`."""
-    sealed = certificate.load(source)
-    try:
-        return read_certificate(sealed)
-    except FormError as error:  # with a hash that is right: somebody sealed what is no result
-        raise certificate.incomplete(source, str(error)) from error
-
-
-def read_certificate(sealed: Mapping[str, Any]) -> Certificate:
-    """The values of a certificate; raises `FormError`."""
-    from tubecert.certificate.result import Certificate
-
-    return Certificate.from_json(sealed)
 
 
 def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
-from tubecert.cli.report import open_certificate, read_certificate
 from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
@@ -163,10 +162,11 @@ def _certificate(
     given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Step | None
 ) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
+    from tubecert.library.certification import certification_of, read
     from tubecert.simulate.certified import adopted, require_tube
 
     if given["certificate"] is not None:
-        certified = open_certificate(str(given["certificate"]))
+        certified = read(str(given["certificate"])).certificate
         system = adopted(system, certified.result)
         require_tube(certified.result)
         return system, certified
@@ -183,7 +183,7 @@ def _certificate(
     sealed = certificate.seal(result.to_json(), {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)
-    return adopted(system, result), read_certificate(sealed)
+    return adopted(system, result), certification_of(sealed).certificate
 
 
 def _campaign(system: Spec, result: Result, wishes: Wishes, report: Step | None) -> Campaign:

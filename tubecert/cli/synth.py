@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Never
+from typing import TYPE_CHECKING, Any, Final
 
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
-from tubecert.errors import ExitCode, SpecError
-from tubecert.findings import Finding, NamedPlace
-from tubecert.kinds import DISTANCE
-from tubecert.library.numbers import Numbers
+from tubecert.errors import ExitCode
+from tubecert.library.asked import SynthesisNumbers, Wishes, one_of, synthesis_numbers, wanted_of
 from tubecert.report.terminal import Terminal
-from tubecert.spec import Spec, Synthesis
-from tubecert.spec.synthesis import solver_name
+from tubecert.spec.synthesis import COORDINATES
 
 if TYPE_CHECKING:
     from tubecert.pipeline import Synthesised
+    from tubecert.spec import Spec
 
-_DECIDES = DISTANCE.option  # what metrics are compared by, where the specification says nothing
+_WORDS: Final = ("objective", "route", "solver")
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     """Synthesise; `given` holds the options by the names of their parameters."""
-    numbers = Numbers()
-    values = {
-        name: numbers.positive(flag(name), given[name])
-        for name in ("rate", "condition_number", "rho_a", "epsilon", "deadline")
-    }
-    seconds = values.pop("deadline")
-    budget = numbers.count("--budget", given["budget"])
-    numbers.check()
+    numbers = synthesis_numbers(given, flag)
     settings = settings_of(given)
     target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
     for place in (target, *([given["plot"]] if given["plot"] else [])):
@@ -47,24 +37,20 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 
     system = spec.load(given["spec"], settings)
     spare(target, {"plan": plan_of(given, system)})
-    wanted = _wanted(system, given, values)
+    wanted = wanted_of(system, _wishes(given, numbers), flag)
     from tubecert import pipeline
+    from tubecert.library.metrics import options_of
     from tubecert.report import progress
 
-    options = pipeline.Options(
-        rho_a=values["rho_a"], epsilon=values["epsilon"], conditions=system.decides or _DECIDES
-    )
-    if budget is not None:
-        options = replace(options, budget=budget)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         found = pipeline.synthesise(
             system,
             wanted,
-            options,
+            options_of(system, numbers),
             report,
             sweep=bool(given["sweep"] or given["plot"]),
-            deadline=deadline_after(seconds),
+            deadline=deadline_after(numbers.deadline),
             told=lambda so_far: _tell(so_far, system, terminal, output),
         )
     if found.file is not None and target != certificate.STDOUT:
@@ -87,58 +73,18 @@ def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) 
         terminal.show(synthesis.verdict_line(found.data(), found.file, system.name))
 
 
-def _wanted(system: Spec, given: Mapping[str, Any], values: Mapping[str, Any]) -> Synthesis:
-    """What is asked for: the specification's section, changed by the command line.
-
-    Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
-    """
-    own = system.synthesis
-    if own is None:
-        rate = None if system.metric is None else system.metric.rate
-        own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
-    changes: dict[str, Any] = {
-        name: values[name] for name in ("rate", "condition_number") if values[name] is not None
-    }
-    if given["solver"] is not None:
-        changes["solver"] = _solver(given["solver"])
-    for name in ("degree", "route", "objective", "coordinates"):
-        if given[name] is not None:
-            changes[name] = given[name] if name == "degree" else str(given[name])
-    if given["variables"] is not None:
-        changes["variables"] = _names(system, given["variables"])
-    objective = changes.get("objective", own.objective)
-    if objective == "rate" or (
-        objective in ("adaptation", "tube") and given["rate"] is None and own.objective != objective
-    ):
-        changes["rate"] = None  # searched for
-    elif "rate" in changes and "objective" not in changes and own.rate is None:
-        changes["objective"] = "condition"
-    wanted = replace(own, **changes)
-    if wanted.objective == "rate" and given["rate"] is not None:
-        _refuse("--objective", "rate", "the objective rate searches for the rate; --rate cannot be given")
-    if wanted.objective in ("condition", "margin") and wanted.rate is None:
-        _refuse("--objective", wanted.objective, f"the objective {wanted.objective} needs --rate, in 1/s")
-    return wanted
-
-
-def _solver(text: str) -> str:
-    found = solver_name(text)
-    if found is None:
-        _refuse("--solver", text, "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows")
-    return found
-
-
-def _names(system: Spec, text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    for name in names:
-        if name not in system.states:
-            _refuse("--variables", text, f"{name} is no state; the states are {', '.join(system.states)}")
-    return names
-
-
-def _refuse(option: str, text: str, message: str) -> Never:
-    place = NamedPlace(file=option, line=1, column=1, source=text, width=len(text))
-    raise SpecError([Finding(code="TC112", message=message, location=place)])
+def _wishes(given: Mapping[str, Any], numbers: SynthesisNumbers) -> Wishes:
+    """What the command line says of the metric."""
+    words = {name: None if given[name] is None else str(given[name]) for name in _WORDS}
+    names, coordinates = given["variables"], given["coordinates"]
+    return Wishes(
+        rate=numbers.rate,
+        condition_number=numbers.condition_number,
+        degree=given["degree"],
+        variables=None if names is None else tuple(name.strip() for name in names.split(",") if name.strip()),
+        coordinates=one_of("--coordinates", coordinates, COORDINATES),
+        **words,
+    )
 
 
 def _report(found: Synthesised, system: Spec, target: str, output: Output) -> None:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output
+from tubecert.cli.options import Output, flag
 from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
-from tubecert.library.numbers import Numbers
+from tubecert.library.asked import at_rate, verification_numbers
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec
 
 _METRICS = (".json", ".csv", ".npz", ".mat")
-_BUDGET, _GAP = 2_000_000, Fraction(1, 1000)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,12 +46,9 @@ class Given:
 
 def run(given: Given, output: Output) -> ExitCode:
     """Verify every metric."""
-    numbers = Numbers()
-    rate = numbers.positive("--rate", given.rate)
-    gap = numbers.positive("--gap", given.gap, below=1)
-    budget = numbers.count("--budget", given.budget)
-    numbers.check()
-    cases = list(_cases(given.files, rate))
+    texts = {"rate": given.rate, "gap": given.gap, "budget": given.budget}
+    numbers = verification_numbers(texts, flag)
+    cases = list(_cases(given.files, numbers.rate))
     target = given.target
     if target is not None:
         if len(cases) != 1:
@@ -63,7 +59,7 @@ def run(given: Given, output: Output) -> ExitCode:
     from tubecert.pipeline.verification import verify
     from tubecert.report import progress, verification
 
-    effort = Effort(gap=float(gap or _GAP), budget=budget or _BUDGET)
+    effort = Effort(gap=float(numbers.gap), budget=numbers.budget)
     terminal = Terminal.stderr(color=output.color)
     shown = Terminal.stdout(color=output.color)
     found: list[tuple[str, Verified]] = []
@@ -126,9 +122,7 @@ def _case(file: str, spec: Spec, rate: Fraction | None) -> Case:
     if spec.metric is None:
         remedy = "give metric.dual_metric and metric.rate, or a metric file after the specification"
         raise _error(file, "there is no metric to verify", remedy)
-    return Case(
-        file=file, spec=spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
-    )
+    return Case(file=file, spec=at_rate(spec, rate))
 
 
 def _error(file: str, message: str, help: str) -> TubecertError:

@@ -58,10 +58,11 @@ def planes(result: Result) -> list[Plane]:
         pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
     else:
         pairs = [(i, i + 1) if i + 1 < n else (i - 1, i) for i in range(0, n, 2)]
-    return [_plane(result, states, pair) for pair in pairs]
+    return [plane(result, states, pair) for pair in pairs]
 
 
-def _plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
+def plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
+    """What is known in the plane of two states, by their places."""
     i, j = pair
     units = result.spec.effective.system.units
     widths = None if result.tube is None else result.tube.half_widths

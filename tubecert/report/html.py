@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 def render(certificate: Certificate) -> str:
     """The page of a certificate."""
-    environment = _environment()
-    return environment.get_template("page.html").render(page=page_of(certificate)) + "\n"
+    return environment().get_template("page.html").render(page=page_of(certificate)) + "\n"
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """The templates, which escape every text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

@@ -16,11 +16,11 @@ from tubecert.report.sections import family_words, safe_set
 def system(result: Result) -> Iterator[Block]:
     """The effective specification in words and equations."""
     effective = result.spec.effective
-    yield Listing(text="\n".join(_equations(effective)))
+    yield Listing(text="\n".join(equations(effective)))
     yield Facts(facts=tuple(_facts(result, effective)))
 
 
-def _equations(effective: Effective) -> Iterator[str]:
+def equations(effective: Effective) -> Iterator[str]:
     """The dynamics, one line per state, then h."""
     model = effective.system
     several = len(model.inputs) > 1

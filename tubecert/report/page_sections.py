@@ -97,7 +97,8 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
     yield Section(key="check", title="Check it again", blocks=tuple(check_again(certificate)))
 
 
-def _reasons(result: Result, *, certified: bool) -> tuple[Block, ...]:
+def reasons(result: Result) -> tuple[Reason, ...]:
+    """Why the verdict is what it is, in words."""
     return tuple(
         Reason(
             verdict=reason.verdict,
@@ -107,20 +108,40 @@ def _reasons(result: Result, *, certified: bool) -> tuple[Block, ...]:
             relax=advice(reason.relax),
         )
         for reason in result.reasons
-        if (reason.verdict is Verdict.CERTIFIED) is certified
     )
+
+
+def not_certified(result: Result) -> tuple[tuple[Cell, Cell], ...]:
+    """What is not certified: the claim, and why with what would help."""
+    return tuple(
+        (Cell(text=item.claim), Cell(text=item.message, note=f"help: {item.relax}" if item.relax else ""))
+        for item in reasons(result)
+        if item.verdict != Verdict.CERTIFIED
+    )
+
+
+def _reasons(result: Result, *, certified: bool) -> tuple[Block, ...]:
+    return tuple(reason for reason in reasons(result) if (reason.verdict == Verdict.CERTIFIED) is certified)
+
+
+def gains_table(result: Result) -> Table | None:
+    """Every set of gains, a row each; None if there is none."""
+    found = list(rows(result))
+    if not found:
+        return None
+    columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "Ts (s)", "margin left")
+    note = (
+        "Each row was proven on its own: do not take ω from one row and Γ from another. The row marked * "
+        "decides the verdict."
+    )
+    decided = any(row.decides for row in found)
+    return Table(columns=columns, rows=tuple(map(_gains_row, found)), note=note if decided else "")
 
 
 def _gains(result: Result) -> Iterator[Block]:
     found = list(rows(result))
-    if found:
-        columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "Ts (s)", "margin left")
-        note = (
-            "Each row was proven on its own: do not take ω from one row and Γ from another. The row marked * "
-            "decides the verdict."
-        )
-        decided = any(row.decides for row in found)
-        yield Table(columns=columns, rows=tuple(map(_gains_row, found)), note=note if decided else "")
+    if (table := gains_table(result)) is not None:
+        yield table
     if missing := [
         NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
     ]:

@@ -1,0 +1,176 @@
+"""What is asked of a command or a function, beside the specification: numbers and words, checked in one place.
+
+In: texts, and what findings call each (`--rho-a` in a command, `rho_a` in code). Out: exact values that go together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Final, Literal, Never, TypeAlias, TypeVar
+
+from tubecert.errors import SpecError
+from tubecert.expression import suggestion
+from tubecert.findings import Finding, NamedPlace
+from tubecert.library.numbers import Numbers
+from tubecert.spec import Spec, Synthesis
+from tubecert.spec.synthesis import MAX_DEGREE, solver_name
+
+T = TypeVar("T", bound=str)
+Named: TypeAlias = Callable[[str], str]
+_BUDGET: Final = 2_000_000  # of a verification
+_GAP: Final = Fraction(1, 1000)
+
+
+def certification_numbers(given: Mapping[str, str | None], named: Named) -> dict[str, Any]:
+    """The numbers that a certification may be asked with, exact; `named` is what findings call each.
+
+    Raises `SpecError` with everything that is wrong with them.
+    """
+    numbers = Numbers()
+    values: dict[str, Any] = {
+        name: numbers.positive(named(name), given[name]) for name in ("rho_a", "epsilon", "deadline")
+    }
+    for name in ("bandwidth", "adaptation_rate"):
+        values[name] = numbers.gain(named(name), given[name])
+    values["gap"] = numbers.positive(named("gap"), given["gap"], below=1)
+    values["budget"] = numbers.count(named("budget"), given["budget"])
+    numbers.check()
+    return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerificationNumbers:
+    """The numbers that a verification may be asked with, exact."""
+
+    rate: Fraction | None
+    gap: Fraction
+    budget: int
+
+
+def verification_numbers(given: Mapping[str, str | None], named: Named) -> VerificationNumbers:
+    """The numbers of a verification; raises `SpecError` with everything that is wrong with them."""
+    numbers = Numbers()
+    rate = numbers.positive(named("rate"), given["rate"])
+    gap = numbers.positive(named("gap"), given["gap"], below=1)
+    budget = numbers.count(named("budget"), given["budget"])
+    numbers.check()
+    return VerificationNumbers(rate=rate, gap=gap or _GAP, budget=budget or _BUDGET)
+
+
+def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
+    """The specification with another rate of its metric, if one is given; raises `SpecError` if it has no metric."""
+    if spec.metric is None:
+        place = NamedPlace(file=spec.path, line=1, column=1)
+        help = "give metric.dual_metric and metric.rate, or a metric beside the specification"
+        message = "there is no metric to verify"
+        raise SpecError([Finding(code="TC105", message=message, location=place, help=help)])
+    return spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisNumbers:
+    """The numbers that a synthesis may be asked with, exact."""
+
+    rate: Fraction | None
+    condition_number: Fraction | None
+    rho_a: Fraction | None
+    epsilon: Fraction | None
+    deadline: Fraction | None
+    budget: int | None
+
+
+def synthesis_numbers(given: Mapping[str, str | None], named: Named) -> SynthesisNumbers:
+    """The numbers of a synthesis; raises `SpecError` with everything that is wrong with them."""
+    numbers = Numbers()
+    names = ("rate", "condition_number", "rho_a", "epsilon", "deadline")
+    values = {name: numbers.positive(named(name), given[name]) for name in names}
+    budget = numbers.count(named("budget"), given["budget"])
+    numbers.check()
+    return SynthesisNumbers(**values, budget=budget)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What is asked of a metric beside the specification's own section; None: what that says."""
+
+    rate: Fraction | None
+    objective: str | None
+    degree: int | None
+    variables: tuple[str, ...] | None
+    condition_number: Fraction | None
+    coordinates: Literal["auto", "identity"] | None
+    route: str | None
+    solver: str | None
+
+
+def wanted_of(system: Spec, wishes: Wishes, named: Named) -> Synthesis:
+    """What is asked for: the specification's section, changed by wishes; `named` is what findings call each.
+
+    Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
+    """
+    own = system.synthesis
+    if own is None:
+        rate = None if system.metric is None else system.metric.rate
+        own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
+    names = ("rate", "condition_number", "degree", "route", "objective", "coordinates")
+    changes: dict[str, Any] = {name: value for name in names if (value := getattr(wishes, name)) is not None}
+    if wishes.solver is not None:
+        changes["solver"] = _solver(wishes.solver, named)
+    if wishes.variables is not None:
+        changes["variables"] = _known_states(system, wishes.variables, named)
+    objective = changes.get("objective", own.objective)
+    if objective == "rate" or (
+        objective in ("adaptation", "tube") and wishes.rate is None and own.objective != objective
+    ):
+        changes["rate"] = None  # searched for
+    elif "rate" in changes and "objective" not in changes and own.rate is None:
+        changes["objective"] = "condition"
+    wanted = replace(own, **changes)
+    if wanted.objective == "rate" and wishes.rate is not None:
+        text = f"the objective rate searches for the rate; {named('rate')} cannot be given"
+        refuse(named("objective"), "rate", text)
+    if wanted.objective in ("condition", "margin") and wanted.rate is None:
+        text = f"the objective {wanted.objective} needs {named('rate')}, in 1/s"
+        refuse(named("objective"), wanted.objective, text)
+    return wanted
+
+
+def _solver(text: str, named: Named) -> str:
+    found = solver_name(text)
+    if found is None:
+        known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
+        refuse(named("solver"), text, known)
+    return found
+
+
+def _known_states(system: Spec, names: tuple[str, ...], named: Named) -> tuple[str, ...]:
+    for name in names:
+        if name not in system.states:
+            known = f"{name} is no state; the states are {', '.join(system.states)}"
+            refuse(named("variables"), ",".join(names), known)
+    return names
+
+
+def degree_of(degree: int | None) -> int | None:
+    """The degree, if it is one that W can have; raises `SpecError`."""
+    if degree is not None and not 0 <= degree <= MAX_DEGREE:
+        refuse("degree", str(degree), f"the degree is between 0 and {MAX_DEGREE}")
+    return degree
+
+
+def one_of(name: str, word: str | None, known: Sequence[T]) -> T | None:
+    """The word, if it is one of those known, or None; raises `SpecError`."""
+    if word is None:
+        return None
+    found = next((each for each in known if each == word), None)
+    if found is None:
+        refuse(name, word, f"{name} is {word[:60]!r}; {suggestion(word, known, what='choices')}")
+    return found
+
+
+def refuse(name: str, text: str, message: str) -> Never:
+    """Raises the `SpecError` about the value of an option or an argument."""
+    place = NamedPlace(file=name, line=1, column=1, source=text, width=len(text))
+    raise SpecError([Finding(code="TC112", message=message, location=place)])

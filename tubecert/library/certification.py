@@ -1,0 +1,305 @@
+"""A certificate as a value for code: the verdict in words, gains and constants by name, curves and plan as arrays.
+
+In: a certificate that was made or read. Out: views of what it says. Nothing is decided here: `certified` is what the
+certificate says, and `recheck` tells whether that is so.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tubecert.certificate import file
+from tubecert.certificate.result import Bound, Certificate, MetricData, Result
+from tubecert.enclosure.interval import Array
+from tubecert.kinds import name_of
+from tubecert.kinds.data import Pair
+from tubecert.library.specification import File, Specification
+from tubecert.records import FormError
+from tubecert.report import gains as report_gains
+from tubecert.report.page import Reason
+from tubecert.spec import load_text
+from tubecert.verdict import Verdict
+from tubecert.words.assumptions import assumed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """One set of gains of one kind of certificate, proven (or not, see `verdict`) on its own: never mix two sets.
+
+    `kind` is its letter; `chosen` says what they are chosen for; `decides`: whether the verdict is about them.
+    `omega` in rad/s, `Gamma`, `sample_time` in s are None where the loop has none of it, and are the decimals that the
+    certificate prints (`exact` has them as fractions). `margins`, by condition: what is proven to be left, from below
+    and from above, as a share of what is allowed.
+    """
+
+    kind: str
+    title: str
+    chosen: str
+    verdict: Verdict
+    decides: bool
+    omega: float | None
+    Gamma: float | None
+    sample_time: float | None
+    margins: Mapping[str, tuple[float, float]]
+    exact: Pair = field(repr=False)
+
+    @property
+    def certified(self) -> bool:
+        """Whether these gains are proven to suffice."""
+        return self.verdict is Verdict.CERTIFIED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Points of the plan: times `t` (K,) in s and states `x` (K, n)."""
+
+    t: Array
+    x: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Certification:
+    """What a certification came to, whatever its verdict.
+
+    `certificate` has every key of the certificate as a value; `text` is its file. `specification` is what was
+    certified, with the metric and the radii that were given beside it.
+    """
+
+    certificate: Certificate = field(repr=False)
+    text: str = field(repr=False)
+    given: Specification | None = field(default=None, repr=False)
+
+    # the verdict
+
+    @property
+    def result(self) -> Result:
+        """What was proven, as the certificate holds it."""
+        return self.certificate.result
+
+    @property
+    def verdict(self) -> Verdict:
+        """`certified`, `refuted` or `undecided`."""
+        return self.result.verdict
+
+    @property
+    def certified(self) -> bool:
+        """Whether the tube is certified. Neither refuted nor undecided is: look at `reasons`."""
+        return self.verdict is Verdict.CERTIFIED
+
+    @property
+    def hash(self) -> str:
+        """The hash of all that was proven, assumed and asked."""
+        return self.certificate.hash
+
+    @property
+    def name(self) -> str:
+        """The name of the specification."""
+        return self.result.spec.effective.name
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why the verdict is what it is, in words: `claim`, `message`, `at` and `relax` (what would help)."""
+        from tubecert.report.page_sections import reasons
+
+        return reasons(self.result)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What the claim rests on and does not show, in words."""
+        return tuple(map(assumed, self.result.assumptions))
+
+    # the gains
+
+    @property
+    def gains(self) -> tuple[Gains, ...]:
+        """Every set of gains that was found, of every kind of certificate."""
+        return tuple(map(_gains, report_gains.rows(self.result)))
+
+    @property
+    def deciding(self) -> Gains | None:
+        """The gains that the verdict is about; of the first kind, if several decide."""
+        return next((gains for gains in self.gains if gains.decides), None)
+
+    @property
+    def omega(self) -> float | None:
+        """The filter bandwidth in rad/s that is certified; None if nothing is, or no filter is needed."""
+        return None if (gains := self._proven()) is None else gains.omega
+
+    @property
+    def Gamma(self) -> float | None:
+        """The adaptation rate that is certified together with `omega`."""
+        return None if (gains := self._proven()) is None else gains.Gamma
+
+    @property
+    def sample_time(self) -> float | None:
+        """The sample time in s that is certified together with `omega`."""
+        return None if (gains := self._proven()) is None else gains.sample_time
+
+    @property
+    def margins(self) -> Mapping[str, tuple[float, float]]:
+        """Of the gains that the verdict is about: by condition what is left, proven from below and from above."""
+        return MappingProxyType({}) if self.deciding is None else self.deciding.margins
+
+    def curve(self, kind: str) -> Array:
+        """Points (K, 2) that are proven for a kind, by its letter: bandwidth in rad/s, and what it needs.
+
+        That is the adaptation rate, for sampled adaptation the sample time in s. (0, 2) where there is none. Raises
+        `KeyError` for a kind that there is not.
+        """
+        section = self.result.sections.get(name_of(kind).key)
+        return _array([] if section is None else section.points()).reshape(-1, 2)
+
+    # the tube
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of the states (n), in the order of every vector."""
+        return self.result.spec.effective.system.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the inputs (m)."""
+        return self.result.spec.effective.system.inputs
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of states and inputs, as far as the specification says."""
+        return MappingProxyType(dict(self.result.spec.effective.system.units))
+
+    @property
+    def rho(self) -> float | None:
+        """The radius of the tube, rounded up: |x - x*| <= rho, in coordinates of the tube if it has its own."""
+        tube = self.result.tube
+        if tube is None:
+            return None
+        near = float(tube.rho)
+        return near if Fraction(repr(near)) >= tube.rho else float(np.nextafter(near, np.inf))
+
+    @property
+    def half_widths(self) -> Mapping[str, float]:
+        """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set."""
+        tube = self.result.tube
+        return MappingProxyType({} if tube is None or tube.half_widths is None else dict(tube.half_widths))
+
+    @property
+    def constants(self) -> Mapping[str, Bound]:
+        """The constants of the proof: `below` and `above`, `symbol`, `unit`, `equation`, `at`."""
+        return MappingProxyType(dict(self.result.constants))
+
+    @property
+    def metric(self) -> MetricData | None:
+        """The metric, and what is proven of it."""
+        return self.result.metric
+
+    @property
+    def plan(self) -> Points | None:
+        """Points of the plan, to draw it; None for a family of plans."""
+        samples = self.result.plan.samples
+        return None if samples is None else Points(t=_array(samples.t), x=_array(samples.x))
+
+    @property
+    def specification(self) -> Specification:
+        """What was certified.
+
+        Of a certificate that was read it is taken from there; raises `TubecertError` if the plan is in a file (CSV)
+        that is not where it was.
+        """
+        if self.given is not None:
+            return self.given
+        return Specification(spec=load_text(file.dump(self.result.spec.effective.data), "<certificate>"))
+
+    # files, figures
+
+    def save(self, path: File) -> None:
+        """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
+        file.write_text(os.fspath(path), self.text, "choose another file")
+
+    def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
+        """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
+
+        A single state is drawn against time. Needs matplotlib (the extra `simulate`).
+        """
+        from tubecert.library import figures
+
+        return figures.tube(self.result, ax, states)
+
+    def plot_tradeoff(self, ax: Axes | None = None) -> Axes:
+        """Draw what each bandwidth needs of the adaptation rate, by kind of certificate; returns the axes.
+
+        Every point is proven. Needs matplotlib (the extra `simulate`).
+        """
+        from tubecert.library import figures
+
+        return figures.tradeoff(self.result, ax)
+
+    def __str__(self) -> str:
+        from tubecert.report import console
+
+        return console.verdict_line(self.result).plain
+
+    def __repr__(self) -> str:
+        return f"<Certification: {self}>"
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        return notebook.certificate(self.certificate)
+
+    def _proven(self) -> Gains | None:
+        return self.deciding if self.certified else None
+
+
+def read(path: File) -> Certification:
+    """The certificate in a file that `save` or `tubecert certify` wrote.
+
+    Raises `TargetError` for a file that is none, or that was changed afterwards. Its claims are not examined: that is
+    what `recheck` does.
+    """
+    source = os.fspath(path)
+    sealed = file.load(source)
+    try:
+        return certification_of(sealed)
+    except FormError as error:  # with a hash that is right: somebody sealed what is no result
+        raise file.incomplete(source, str(error)) from error
+
+
+def certification_of(sealed: Mapping[str, Any], given: Specification | None = None) -> Certification:
+    """A sealed certificate as a value; raises `FormError`."""
+    return Certification(certificate=Certificate.from_json(sealed), text=file.dump(sealed), given=given)
+
+
+def _gains(row: report_gains.Gains) -> Gains:
+    pair, name = row.pair, name_of(row.section)
+    return Gains(
+        kind=name.letter,
+        title=name.title,
+        chosen=row.which,
+        verdict=row.verdict,
+        decides=row.decides,
+        omega=_float(pair.bandwidth),
+        Gamma=_float(pair.adaptation_rate),
+        sample_time=_float(pair.sample_time),
+        margins=MappingProxyType({name: (m.below, m.above) for name, m in pair.margins.items()}),
+        exact=pair,
+    )
+
+
+def _float(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _array(values: Any) -> Array:
+    """The values as an array that nobody writes to."""
+    found = np.array(values, dtype=float)
+    found.flags.writeable = False
+    return found

@@ -1,0 +1,92 @@
+"""Certification from code, and what the command shares with it: a question in, a sealed certificate out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+from tubecert import certificate, pipeline
+from tubecert.letters import ALL, words_of
+from tubecert.libraries import versions
+from tubecert.library.asked import certification_numbers, one_of, refuse
+from tubecert.library.certification import Certification, certification_of
+from tubecert.library.metrics import MetricLike, with_metric
+from tubecert.library.plain import Number, number_texts
+from tubecert.library.specification import Specifiable, Specification, spec_of
+from tubecert.pipeline import Options, Progress
+from tubecert.spec import Spec
+from tubecert.stages.options import overridden
+
+
+def certify(
+    spec: Specifiable,
+    *,
+    rho_a: Number | None = None,
+    epsilon: Number | None = None,
+    metric: MetricLike | None = None,
+    conditions: str | None = None,
+    formulas: Literal["corrected", "as-printed"] = "corrected",
+    bandwidth: Number | None = None,
+    adaptation_rate: Number | None = None,
+    gap: Number | None = None,
+    budget: int | None = None,
+    deadline: Number | None = None,
+    progress: Progress | None = None,
+) -> Certification:
+    """Prove the tube around the plan and find the smallest gains: `tubecert certify`, with the same options.
+
+    `metric` stands in for the specification's own: a file, a mapping with `rate` and `dual_metric`, or what
+    `synthesise` found. `conditions`: the letter of the certificate that decides the verdict, or `all`. `progress` is
+    called with every `Step` that is told. Numbers are exact; a float stands for its shortest decimal.
+
+    Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless.
+    """
+    texts = number_texts(
+        rho_a=rho_a,
+        epsilon=epsilon,
+        bandwidth=bandwidth,
+        adaptation_rate=adaptation_rate,
+        gap=gap,
+        budget=budget,
+        deadline=deadline,
+    )
+    numbers = certification_numbers(texts, str)
+    _check_words(conditions, formulas, numbers)
+    whole, seconds = spec_of(spec), numbers.pop("deadline", None)
+    options = Options(**numbers, conditions=conditions, formulas=formulas)
+    if metric is not None:
+        whole, name = with_metric(whole, metric)
+        options = replace(options, metric=Path(name))
+    return certified(whole, options, progress, seconds=seconds, command="tubecert.certify")
+
+
+def certified(
+    spec: Spec, options: Options, progress: Progress | None, *, seconds: Fraction | None, command: str
+) -> Certification:
+    """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric."""
+    started, clock = datetime.now(UTC), time.perf_counter()
+    deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
+    result = pipeline.certify(spec, options, progress, deadline=deadline)
+    run = {
+        "command": command,
+        "started": started.isoformat(timespec="seconds"),
+        "seconds": round(time.perf_counter() - clock, 3),
+        "versions": versions(),
+    }
+    return certification_of(
+        certificate.seal(result.to_json(), run), Specification(spec=overridden(spec, options))
+    )
+
+
+def _check_words(conditions: str | None, formulas: str, numbers: Mapping[str, Any]) -> None:
+    """Raises `SpecError` for words that mean nothing, and for half of a pair of gains."""
+    one_of("conditions", conditions, (*words_of(), ALL))
+    one_of("formulas", formulas, ("corrected", "as-printed"))
+    for one, other in (("bandwidth", "adaptation_rate"), ("adaptation_rate", "bandwidth")):
+        if one in numbers and other not in numbers:
+            refuse(one, str(numbers[one]), f"{one} and {other} are given together")

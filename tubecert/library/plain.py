@@ -1,0 +1,141 @@
+"""Values of Python as the text of a specification: mappings, lists, arrays, exact and binary numbers, expressions.
+
+In: what a user writes in code. Out: text that `spec` reads as it reads a file; what it says is decided there. A float
+stands for its shortest decimal. Expressions of sympy need no sympy here: what they print is what is read, and what
+would print as something else is refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, Final, NoReturn, Protocol, SupportsFloat, TypeAlias, runtime_checkable
+
+from tubecert.errors import SpecError
+from tubecert.findings import Finding, NamedPlace
+
+Number: TypeAlias = int | float | str | Fraction | Decimal
+Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
+Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
+_TYPE: Final = "TC105"
+_DEEPEST: Final = 60  # the reader of specifications refuses less
+_ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
+
+
+@runtime_checkable
+class _Array(Protocol):
+    """An array, or a matrix of sympy."""
+
+    def tolist(self) -> object: ...
+
+
+@runtime_checkable
+class _Expression(Protocol):
+    """An expression of sympy."""
+
+    free_symbols: set[object]
+
+    def atoms(self) -> Iterable[object]: ...
+
+
+def number_text(value: Number, name: str) -> str:
+    """A number as it is written; raises `SpecError` for what is none."""
+    if isinstance(value, str):
+        return value
+    text = _number(value)
+    if text is None:
+        _refuse(
+            name, f"{_shown(value)} is no number", "give an int, a float, a Fraction, a Decimal or a text"
+        )
+    return text
+
+
+def number_texts(**values: Number | None) -> dict[str, str | None]:
+    """The same for several, by name; what is None stays so."""
+    return {name: None if value is None else number_text(value, name) for name, value in values.items()}
+
+
+def document_text(data: Data) -> str:
+    """A mapping as text, one entry on a line, so that findings show the entry; raises `SpecError`."""
+    return json.dumps(_plain(data, "", 0), indent=1, ensure_ascii=False) + "\n"
+
+
+def _plain(value: object, path: str, depth: int) -> Plain:
+    """The value in texts, lists and mappings of them."""
+    if depth > _DEEPEST:
+        _refuse(path, "the value is nested too deeply, or holds itself", "give lists and mappings of texts")
+    if value is None or isinstance(value, (str, bool)):
+        return value
+    if isinstance(value, Mapping):
+        return {
+            _key(key, path): _plain(item, _below(path, _key(key, path)), depth + 1)
+            for key, item in value.items()
+        }
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, f"{path}[{i}]", depth + 1) for i, item in enumerate(value)]
+    if (text := _number(value)) is not None:
+        return text
+    if isinstance(value, _Array):
+        return _plain(value.tolist(), path, depth + 1)
+    if isinstance(value, _Expression):
+        return _expression(value, path)
+    return _refuse(
+        path, f"{_shown(value)} has no place in a specification", "give a text, a number, a list or a mapping"
+    )
+
+
+def _below(path: str, key: str) -> str:
+    return f"{path}.{key}" if path else key
+
+
+def _key(key: object, path: str) -> str:
+    if isinstance(key, str):
+        return key
+    if getattr(key, "is_Symbol", False):
+        return str(key)
+    return _refuse(path, f"the key {_shown(key)} is no name", "give a text")
+
+
+def _number(value: object) -> str | None:
+    """Its exact text; a float's is the shortest that is read as the same float."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, Decimal)):
+        return str(value)
+    if isinstance(value, Fraction):
+        return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else str(value.numerator)
+    return repr(float(value)) if isinstance(value, float) else None
+
+
+def _expression(value: _Expression, path: str) -> str:
+    """What an expression of sympy prints, if that means the same here."""
+    for atom in value.atoms():
+        _check_atom(atom, path)
+    return str(value).replace("Abs(", "abs(")
+
+
+def _check_atom(atom: object, path: str) -> None:
+    """Refuses an atom that prints as something else than it is: E as a name, a float with fewer digits than it has."""
+    text = str(atom)
+    if text == "pi" and not getattr(atom, "is_Symbol", False):
+        return
+    if not any(getattr(atom, kind, False) for kind in _ATOMS):
+        _refuse(
+            path, f"{text} of {type(atom).__name__} has no meaning here", "write it as a text, or as a number"
+        )
+    if getattr(atom, "is_Symbol", False) and not (text.isidentifier() and text != "pi"):
+        _refuse(path, f"the symbol {text[:40]!r} is no name", "use letters, digits and _")
+    if getattr(atom, "is_Float", False) and isinstance(atom, SupportsFloat) and float(text) != float(atom):
+        help = "write the number as a Rational or the expression as a text: here it is exact"
+        _refuse(path, f"{text} is not all of the number {float(atom)!r}", help)
+
+
+def _shown(value: object) -> str:
+    return f"{repr(value)[:60]} ({type(value).__name__})"
+
+
+def _refuse(path: str, message: str, help: str) -> NoReturn:
+    place = NamedPlace(file=path or "the specification", line=1, column=1)
+    raise SpecError([Finding(code=_TYPE, message=message, location=place, help=help)])

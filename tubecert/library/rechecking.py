@@ -1,0 +1,95 @@
+"""A certificate examined again, from code: `tubecert recheck`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+from tubecert.certificate.file import KIND, unreadable
+from tubecert.files import STDIN, read, read_stdin
+from tubecert.library.certification import Certification
+from tubecert.library.numbers import Numbers
+from tubecert.library.plain import number_texts
+from tubecert.library.specification import File
+from tubecert.pipeline import Progress, Step
+from tubecert.recheck.run import BUDGET, Examined, Recheck
+from tubecert.recheck.run import recheck as examined
+
+WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rechecked:
+    """What the second arithmetic says of a certificate: `found` has every claim and its outcome."""
+
+    found: Recheck = field(repr=False)
+    name: str
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the certificate says `certified` and every claim of it is confirmed."""
+        return self.found.stated == "certified" and self.found.verdict == "confirmed"
+
+    @property
+    def verdict(self) -> str:
+        """`confirmed`, `contradicted` or `undecided`: of what the certificate says, whatever its verdict is."""
+        return self.found.verdict
+
+    @property
+    def claims(self) -> tuple[Examined, ...]:
+        """Every claim: its `name` and its `outcome`."""
+        return self.found.claims
+
+    @property
+    def first_failing(self) -> Examined | None:
+        """The first claim that is contradicted, else the first that is undecided."""
+        return self.found.failing
+
+    def __str__(self) -> str:
+        return verdict_line(self.found, self.name)
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        failing = self.first_failing
+        details = (
+            [] if failing is None else [("first failing claim", f"{failing.name}: {failing.outcome.why}")]
+        )
+        return notebook.of_line(str(self), self.verdict, [*details, ("claims", str(len(self.claims)))])
+
+
+def recheck(
+    result: Certification | File, *, budget: int | None = None, progress: Progress | None = None
+) -> Rechecked:
+    """Examines every claim of a certificate, or of the file of one, in ball arithmetic and without a solver.
+
+    `budget`: boxes per claim before giving up. Raises `TubecertError` for what is no certificate.
+    """
+    numbers = Numbers()
+    most = numbers.count("budget", number_texts(budget=budget)["budget"])
+    numbers.check()
+    if isinstance(result, Certification):
+        text, name = result.text, result.name
+    else:
+        name = os.fspath(result)
+        text = text_of(name)
+    report = None if progress is None else _told(progress)
+    return Rechecked(found=examined(text, name, BUDGET if most is None else most, report), name=name)
+
+
+def text_of(name: str) -> str:
+    """The text of a certificate's file (`-`: on stdin). Raises `TargetError`."""
+    data = read_stdin(KIND) if name == STDIN else read(name, KIND)
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        raise unreadable(name, "it is not UTF-8") from None
+
+
+def verdict_line(found: Recheck, name: str) -> str:
+    """The verdict, and what the certificate says."""
+    return f"{WORDS[found.verdict]} {name}: the certificate says {found.stated}"
+
+
+def _told(progress: Progress):
+    return lambda claim: progress(Step(name=claim, boxes=0, unit="claims"))

@@ -1,0 +1,114 @@
+"""Specifications for code: from a file, a mapping, or a text.
+
+In: what a user has. Out: a `Specification`, which holds the `Spec` that commands read, or every problem as findings.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, TypeAlias
+
+from tubecert.certificate.file import digest
+from tubecert.library import plain
+from tubecert.library.plain import Data, Plain
+from tubecert.spec import Spec, canonical
+from tubecert.spec.load import VERSION, load_source
+from tubecert.spec.source import Source, read_source
+
+File: TypeAlias = str | os.PathLike[str]
+NAME: Final = "<specification>"  # what findings call a specification that is no file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Specification:
+    """A system with its safe set, uncertainty, plan and options; `spec` has all of it, exact.
+
+    Two specifications are equal if they are the same but for spelling.
+    """
+
+    spec: Spec
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.spec.name
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of the states (n), in the order of every vector."""
+        return self.spec.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the inputs (m)."""
+        return self.spec.inputs
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of states and inputs, as far as the specification says."""
+        return MappingProxyType(dict(self.spec.units))
+
+    @property
+    def data(self) -> dict[str, Plain]:
+        """The effective specification in texts, lists and mappings, defaults written out; itself a specification."""
+        return canonical(self.spec)
+
+    @property
+    def hash(self) -> str:
+        """The hash of `data`: the same for the same system, however it is written."""
+        return digest(self.data)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Specification) and self.data == other.data
+
+    def __hash__(self) -> int:
+        return hash(self.hash)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Specification {self.name}: states {', '.join(self.states)}; inputs {', '.join(self.inputs)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        return notebook.specification(self.data)
+
+
+Specifiable: TypeAlias = Specification | File | Data
+
+
+def load(source: Specifiable) -> Specification:
+    """The specification in a file (its path), or in a mapping (see `specification`).
+
+    Raises `TargetError` if the file cannot be read, and `SpecError` with every problem of it.
+    """
+    return Specification(spec=spec_of(source))
+
+
+def specification(data: Data | str) -> Specification:
+    """The specification in a mapping with the keys of the format, or in a text (YAML).
+
+    Values may be texts, numbers (a float stands for its shortest decimal), lists, arrays, and expressions and matrices
+    of sympy; `tubecert: 1` may be left out. Raises `SpecError` with every problem.
+    """
+    return Specification(spec=load_source(_source(data)))
+
+
+def spec_of(source: Specifiable, *, alone: bool = False) -> Spec:
+    """What `load` reads; `alone`: what is no part of a system with its metric may be missing, and is not read."""
+    if isinstance(source, Specification):
+        return source.spec
+    if isinstance(source, Mapping):
+        return load_source(_source(source), alone=alone)
+    return load_source(read_source(os.fspath(source)), alone=alone)
+
+
+def _source(data: Data | str) -> Source:
+    if isinstance(data, str):
+        return Source.of(NAME, data)
+    whole = data if "tubecert" in data else {"tubecert": VERSION, **data}
+    return Source.of(NAME, plain.document_text(whole))

@@ -1,0 +1,93 @@
+"""What a value of the library looks like in a notebook: a card with its verdict, a sentence, and a table or two.
+
+In: certificates, canonical specifications, verdict lines. Out: HTML that stands for itself. The template escapes every
+text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tubecert.certificate.effective import Effective
+from tubecert.certificate.result import Certificate, Result
+from tubecert.report import console, sections
+from tubecert.report.html import environment
+from tubecert.report.page import Cell, Table
+from tubecert.report.page_origin import equations
+from tubecert.report.page_sections import gains_table, not_certified
+from tubecert.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """A verdict (`style` is how it looks), what it is about, a sentence, and tables."""
+
+    verdict: str
+    name: str
+    style: str = ""
+    summary: str = ""
+    meaning: str = ""
+    tables: Sequence[Table] = ()
+
+
+def render(card: Card) -> str:
+    """The card as HTML."""
+    return environment().get_template("card.html").render(card=card)
+
+
+def of_line(line: str, style: str, details: Sequence[tuple[str, str]] = ()) -> str:
+    """The card of a verdict line (`certified NAME: what follows`), with names and values below it."""
+    start, _, summary = line.partition(": ")
+    verdict, _, name = start.rpartition(" ")
+    rows = tuple((Cell(text=what), Cell(text=value)) for what, value in details)
+    tables = [Table(columns=("", ""), rows=rows)] if rows else []
+    return render(Card(verdict=verdict, name=name, style=style, summary=summary, tables=tables))
+
+
+def certificate(certificate: Certificate) -> str:
+    """The card of a certificate: its verdict, what it means or why it is none, and the gains of every kind."""
+    result = certificate.result
+    failed = not_certified(result)
+    tables = [Table(columns=("not certified", ""), rows=failed)] if failed else []
+    if (gains := gains_table(result)) is not None:
+        tables.append(gains)
+    if widths := _half_widths(result):
+        tables.append(widths)
+    return render(
+        Card(
+            verdict=result.verdict,
+            name=console.name(result),
+            style=result.verdict,
+            summary=console.verdict_line(result).plain.partition(": ")[2],
+            meaning=console.meaning(result).plain,
+            tables=tables,
+        )
+    )
+
+
+def _half_widths(result: Result) -> Table | None:
+    tube = result.tube
+    if result.verdict is not Verdict.CERTIFIED or tube is None or not tube.half_widths:
+        return None
+    return Table(
+        columns=("half-widths of the tube",),
+        rows=((Cell(text=sections.half_widths(result, tube.half_widths)),),),
+    )
+
+
+def specification(data: Mapping[str, Any]) -> str:
+    """The card of a specification: its equations and its safe set."""
+    effective = Effective.of(data)
+    rows = [(Cell(text=line, kind="code"),) for line in equations(effective)]
+    box = effective.part("safe_set")
+    sides = ", ".join(f"{name} in [{', '.join(map(str, side))}]" for name, side in box.items())
+    rows.append((Cell(text=f"safe set: {sides}"),))
+    return render(
+        Card(
+            verdict="specification",
+            name=effective.name,
+            tables=[Table(columns=("",), rows=tuple(rows))],
+        )
+    )
