@@ -9,10 +9,15 @@ from types import ModuleType
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tubecert.errors import SpecError, TargetError, TubecertError
     from tubecert.library.certification import Certification, Gains, read
     from tubecert.library.certifying import certify
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
+    from tubecert.library.pages import Report, report
+    from tubecert.library.rechecking import Rechecked, recheck
+    from tubecert.library.simulating import Simulation, simulate
     from tubecert.library.specification import Specification, load, specification
     from tubecert.stages.options import Step
     from tubecert.verdict import Verdict
@@ -21,6 +26,9 @@ __version__ = "0.1.0"
 __all__ = [
     "Certification",
     "Gains",
+    "Rechecked",
+    "Report",
+    "Simulation",
     "SpecError",
     "Specification",
     "Step",
@@ -33,6 +41,9 @@ __all__ = [
     "certify",
     "load",
     "read",
+    "recheck",
+    "report",
+    "simulate",
     "specification",
     "synthesise",
     "verify",
@@ -47,6 +58,9 @@ _HOMES = {
     "VerifiedMetric": "library.metrics",
     "synthesise": "library.metrics",
     "verify": "library.metrics",
+    "Rechecked": "library.rechecking",
+    "Report": "library.pages",
+    "Simulation": "library.simulating",
     "Specification": "library.specification",
     "load": "library.specification",
     "specification": "library.specification",
@@ -71,9 +85,10 @@ class _Room(ModuleType):
 
         return inspect.signature(self._function())
 
-    def _function(self):  # type: ignore[no-untyped-def]
+    def _function(self) -> "Callable[..., object]":
         name = self.__name__.rpartition(".")[2]
-        return getattr(_module(_ROOMS[name]), name)
+        function: Callable[..., object] = getattr(_module(_ROOMS[name]), name)
+        return function
 
 
 class _Package(ModuleType):

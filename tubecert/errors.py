@@ -29,13 +29,13 @@ class ExitCode(IntEnum):
 
 
 class TubecertError(Exception):
-    """Something the user has to know, as findings, with the exit code it leads to."""
+    """Something the user has to know, as findings, with the exit code it leads to; its text is that of the findings."""
 
     exit_code = ExitCode.INVALID
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         self.findings = tuple(findings)
-        super().__init__("; ".join(f"{item.code}: {item.message}" for item in self.findings))
+        super().__init__("\n".join(map(str, self.findings)))
 
     def __reduce__(self) -> tuple[type[TubecertError], tuple[tuple[Finding, ...]]]:
         """From its findings, as it was made: an error crosses processes like any value."""

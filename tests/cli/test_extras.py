@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app
-from tubecert.cli.simulate import EXTRA
+from tubecert.library.simulating import EXTRA
 
 ROOT = Path(__file__).parents[2]
 ORBIT = ROOT / "configs" / "two_state_orbit.yaml"

@@ -162,6 +162,7 @@ def loaded_by(statement: str) -> set[str]:
     [
         "import tubecert.cli",
         "from typer.testing import CliRunner; from tubecert.cli.app import app; CliRunner().invoke(app, ['--help'])",
+        "import tubecert as tc; dir(tc); tc.TubecertError, tc.Verdict",
         "import tubecert.expression",
         "import tubecert.errors, tubecert.findings",
     ],

@@ -8,18 +8,15 @@ import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tubecert.certificate import KIND, unreadable
 from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
-from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.numbers import Numbers
+from tubecert.library.rechecking import text_of, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
-
-_WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
 
 def run(given: Mapping[str, Any], output: Output) -> ExitCode:
@@ -28,21 +25,13 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     budget = numbers.count("--budget", given["budget"])
     numbers.check()
     name = str(given["certificate"])
-    text = _text(name)
+    text = text_of(name)
     note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
     with _progress(output) as report:
         found = recheck(text, name, BUDGET if budget is None else budget, report)
     shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
     write_stdout(shown)
     return found.exit_code
-
-
-def _text(name: str) -> str:
-    data = read_stdin(KIND) if name == STDIN else read(name, KIND)
-    try:
-        return data.decode()
-    except UnicodeDecodeError:
-        raise unreadable(name, "it is not UTF-8") from None
 
 
 def _as_json(found: Recheck, name: str, note: str) -> str:
@@ -71,7 +60,7 @@ def _as_json(found: Recheck, name: str, note: str) -> str:
 
 def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
     failing = found.failing
-    lines = [f"{_WORDS[found.verdict]} {name}: the certificate says {found.stated}"]
+    lines = [verdict_line(found, name)]
     if failing is not None:
         lines.append(f"  first failing claim: {failing.name}: {failing.outcome.why}")
     elif found.stated != "certified":

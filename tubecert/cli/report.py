@@ -14,13 +14,11 @@ from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
 from tubecert.files import STDIN
 from tubecert.library.certification import read
+from tubecert.library.pages import REMEDY, Report, require_page
 from tubecert.printable import printable_json, visible
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
-
-_HTML, _MARKDOWN = (".html", ".htm"), (".md", ".markdown")
-_REMEDY = "give a file FILE.html or FILE.md in a folder that exists"
 
 
 def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
@@ -30,9 +28,7 @@ def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
     pages = list(targets) if targets else [_beside(source)]
     check_pages(pages, {"certificate": source})
     told = read(source).certificate
-    texts = {page: _render(page, told) for page in pages}
-    for page, text in texts.items():
-        certificate.write_text(page, text, _REMEDY)
+    write_pages(pages, told)
     if output.json:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
@@ -46,9 +42,8 @@ def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) ->
     """
     kept = {what: path for what, path in taken.items() if path is not None}
     for page in pages:
-        if Path(page).suffix.lower() not in (*_HTML, *_MARKDOWN):
-            raise _refused(page, "a page is HTML or Markdown", _REMEDY)
-        certificate.check_target(page, _REMEDY)
+        require_page(page)
+        certificate.check_target(page, REMEDY)
         for what, path in kept.items():
             if Path(path).resolve() == Path(page).resolve() or certificate.same_file(page, path):
                 raise _refused(page, f"it is the {what} itself", "choose another file for the page")
@@ -58,17 +53,7 @@ def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) ->
 def write_pages(pages: Sequence[str], sealed: Certificate) -> None:
     """Write the pages of a certificate. Raises `TargetError`."""
     for page in pages:
-        certificate.write_text(page, _render(page, sealed), _REMEDY)
-
-
-def _render(page: str, sealed: Certificate) -> str:
-    if Path(page).suffix.lower() in _MARKDOWN:
-        from tubecert.report import markdown
-
-        return markdown.render(sealed)
-    from tubecert.report import html
-
-    return html.render(sealed)
+        Report(certificate=sealed).save(page)
 
 
 def _beside(source: str) -> str:

@@ -5,5 +5,10 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 
 | module | what it does |
 |---|---|
-| `numbers` | numbers that are asked for, exact |
+| `numbers`, `asked` | what is asked for beside a specification: exact numbers, words that go together |
+| `plain`, `specification` | values of Python as a specification |
+| `certification`, `certifying` | a certificate as a value; how one is made |
+| `metrics` | metrics found, or decided |
+| `simulating`, `rechecking`, `pages` | what can be done with a certificate |
+| `figures` | the tube and the trade-off, drawn into axes |
 """

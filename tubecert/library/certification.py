@@ -30,6 +30,7 @@ from tubecert.words.assumptions import assumed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -294,11 +295,11 @@ def _gains(row: report_gains.Gains) -> Gains:
     )
 
 
-def _float(value: Any) -> float | None:
+def _float(value: Fraction | None) -> float | None:
     return None if value is None else float(value)
 
 
-def _array(values: Any) -> Array:
+def _array(values: ArrayLike) -> Array:
     """The values as an array that nobody writes to."""
     found = np.array(values, dtype=float)
     found.flags.writeable = False

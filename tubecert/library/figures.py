@@ -78,7 +78,7 @@ def tradeoff(result: Result, ax: Axes | None) -> Axes:
         axes.plot(*at, marker="o", ms=size, color=color, ls="none", label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel("bandwidth omega [rad/s]")
+    axes.set_xlabel("bandwidth omega (rad/s)")
     axes.set_ylabel("adaptation rate Gamma")
     return axes
 

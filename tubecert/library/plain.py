@@ -15,11 +15,11 @@ from typing import Any, Final, NoReturn, Protocol, SupportsFloat, TypeAlias, run
 
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, NamedPlace
+from tubecert.spec import codes
 
 Number: TypeAlias = int | float | str | Fraction | Decimal
 Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
 Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
-_TYPE: Final = "TC105"
 _DEEPEST: Final = 60  # the reader of specifications refuses less
 _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
 
@@ -138,4 +138,4 @@ def _shown(value: object) -> str:
 
 def _refuse(path: str, message: str, help: str) -> NoReturn:
     place = NamedPlace(file=path or "the specification", line=1, column=1)
-    raise SpecError([Finding(code=_TYPE, message=message, location=place, help=help)])
+    raise SpecError([Finding(code=codes.WRONG_TYPE, message=message, location=place, help=help)])

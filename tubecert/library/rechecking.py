@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tubecert.certificate.file import KIND, unreadable
+from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import number_texts
 from tubecert.library.specification import File
-from tubecert.pipeline import Progress, Step
 from tubecert.recheck.run import BUDGET, Examined, Recheck
 from tubecert.recheck.run import recheck as examined
+from tubecert.stages.options import Progress, Step
 
 WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
@@ -28,7 +30,7 @@ class Rechecked:
     @property
     def confirmed(self) -> bool:
         """Whether the certificate says `certified` and every claim of it is confirmed."""
-        return self.found.stated == "certified" and self.found.verdict == "confirmed"
+        return self.found.exit_code is ExitCode.CERTIFIED
 
     @property
     def verdict(self) -> str:
@@ -91,5 +93,5 @@ def verdict_line(found: Recheck, name: str) -> str:
     return f"{WORDS[found.verdict]} {name}: the certificate says {found.stated}"
 
 
-def _told(progress: Progress):
+def _told(progress: Progress) -> Callable[[str], None]:
     return lambda claim: progress(Step(name=claim, boxes=0, unit="claims"))

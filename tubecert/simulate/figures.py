@@ -30,18 +30,29 @@ def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     import matplotlib as mpl
 
-    drawers: dict[str, Callable[[Campaign], Figure | None]] = {
+    for name in _drawers():
+        with mpl.rc_context(STYLE):
+            figure = drawn(name, campaign)
+            if figure is not None:
+                yield from _files(name, figure)
+
+
+def drawn(name: str, campaign: Campaign) -> Figure | None:
+    """A figure by its name; None if there is nothing to draw. Raises `KeyError` for a name that is none."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        return _drawers()[name](campaign)
+
+
+def _drawers() -> dict[str, Callable[[Campaign], Figure | None]]:
+    return {
         "states": _states,
         "plane": plane,
         "inputs": _inputs,
         "tube_use": _tube_use,
         "monte_carlo": _monte_carlo,
     }
-    for name, draw in drawers.items():
-        with mpl.rc_context(STYLE):
-            figure = draw(campaign)
-            if figure is not None:
-                yield from _files(name, figure)
 
 
 def _files(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:

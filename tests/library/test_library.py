@@ -1,0 +1,557 @@
+"""The library: what it reads, what it gives, and that it says what the commands say."""
+
+import copy
+import dataclasses
+import json
+import subprocess
+import sys
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+import tubecert as tc
+from tubecert.cli.app import app
+from tubecert.letters import NAMES
+from tubecert.library import plain
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+DATA = {
+    "name": "cart",
+    "system": {
+        "states": ["p", "v"],
+        "inputs": ["u"],
+        "units": {"p": "m<b>", "v": "m/s"},
+        "f": ["v", "-p - v"],
+        "B": [[0], [1]],
+    },
+    "safe_set": {"p": [-2, 2], "v": [-2, 2]},
+    "uncertainty": {"h": ["0.2*sin(t)"]},
+    "trajectory": {"kind": "equilibrium", "at": [0, 0], "horizon": 4},
+    "initial_state": {"at": [0.05, 0]},
+    "metric": {"rate": 0.4, "dual_metric": [[1, -0.5], [-0.5, 1]]},
+    "tube": {"epsilon": 0.2, "rho_a": 0.2},
+}
+TEXT = """
+tubecert: 1
+name: cart
+system: {states: [p, v], inputs: [u], units: {p: m<b>, v: m/s}, f: [v, "-p - v"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], v: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0], horizon: 4}
+initial_state: {at: [0.05, 0]}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.2, rho_a: 0.2}
+"""
+
+
+def changed(**parts):
+    """The data with some parts replaced, by path: `system__f`."""
+    data = copy.deepcopy(DATA)
+    for path, value in parts.items():
+        *outer, last = path.split("__")
+        place = data
+        for key in outer:
+            place = place[key]
+        place[last] = value
+    return data
+
+
+@cache
+def certified():
+    """The certification of the data, made once."""
+    return tc.certify(DATA)
+
+
+def refused(code, function, *arguments, **options):
+    """The only finding of the error."""
+    with pytest.raises(tc.TubecertError) as caught:
+        function(*arguments, **options)
+    [finding] = caught.value.findings
+    assert finding.code == code, finding
+    return finding
+
+
+# specifications
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_a_mapping_is_the_same_system_as_its_file(path):
+    data = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.BaseLoader)
+    if data["trajectory"]["kind"] == "csv":
+        pytest.skip("a plan in a file stands beside its specification")
+    spec = tc.load(path)
+    assert tc.specification(data).hash == spec.hash
+    assert tc.load(data) == spec
+    assert tc.specification(spec.data) == spec  # the effective specification is one
+
+
+def test_a_text_is_one_too(tmp_path):
+    (tmp_path / "cart.yaml").write_text(TEXT, encoding="utf-8")
+    spec = tc.load(tmp_path / "cart.yaml")
+    assert tc.specification(TEXT) == spec == tc.load(DATA) == tc.load(spec)
+    assert hash(tc.specification(TEXT)) == hash(spec)
+    assert spec != tc.load(changed(tube__rho_a=0.1))
+    assert (spec.states, spec.inputs, spec.units["v"]) == (("p", "v"), ("u",), "m/s")
+
+
+def test_values_of_python_are_exact():
+    p, v, t = sympy.symbols("p v t")
+    f = sympy.Matrix([v, -p - v])
+    spec = tc.specification(
+        changed(
+            system__states=[p, v],
+            system__f=f.T.tolist()[0],
+            system__B=np.array([[0], [1]]),
+            safe_set={p: [-2, 2], v: (Decimal("-2.0"), np.float64(2))},
+            uncertainty__h=[sympy.sin(t) / 5],
+            tube__rho_a=Fraction(1, 5),
+            metric__dual_metric=np.array([[1, -0.5], [-0.5, 1]]),
+        )
+    )
+    assert spec == tc.load(DATA)
+    assert tc.specification(changed(tube__rho_a=1 / 3)).data["tube"]["rho_a"] == "0.3333333333333333"
+
+
+def test_expressions_of_sympy_mean_here_what_they_mean_there():
+    """Whatever is read from them has the values that sympy gives."""
+    from tubecert.enclosure.tape import Tape
+
+    p, v = sympy.symbols("p v")
+    chosen = [
+        sympy.sin(p) ** 2 / (2 + sympy.cos(v)) - v / 3,
+        -(p**2) * (v - 1) ** 3 * sympy.exp(-v) + sympy.pi * p,
+        sympy.tanh(p / sympy.Rational(1, 7)) + (2 + p) ** (-2) + 0.1 * p,
+    ]
+    for expression in chosen:
+        spec = tc.specification(changed(system__f=[v, expression])).spec
+        tape = Tape([spec.f[1].expression], ("p", "v"))
+        at = [0.37, -0.81]
+        value = np.asarray(tape.run_floats([np.array([x]) for x in at], (1,))).ravel()[0]
+        assert value == pytest.approx(float(expression.subs({p: at[0], v: at[1]})), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        sympy.E * sympy.Symbol("p"),  # prints as a name
+        sympy.Float(1) / 3,  # prints fewer digits than it has
+        sympy.Symbol("p + v") * 2,  # prints as a sum
+        sympy.Symbol("pi"),  # a name that is a number here
+        sympy.I,
+        sympy.oo,
+        sympy.Piecewise((sympy.Symbol("p"), sympy.Symbol("p") > 0), (0, True)),
+        1j,
+        float,
+        object(),
+        b"p",
+    ],
+    ids=str,
+)
+def test_what_would_be_read_as_something_else_is_refused(entry):
+    finding = refused("TC106", tc.specification, changed(system__f=["v", entry]))
+    assert str(finding.location) == "system.f[1]"
+    assert finding.help
+
+
+def test_a_value_that_holds_itself_is_refused():
+    loop = []
+    loop.append(loop)
+    refused("TC106", tc.specification, changed(system__f=loop))
+    refused("TC106", tc.specification, {**DATA, 3: "x"})
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_float_stands_for_its_shortest_decimal(value):
+    assert float(Fraction(plain.number_text(value, "x"))) == value
+    assert Fraction(plain.number_text(value, "x")) == Fraction(repr(value))
+
+
+def test_findings_show_the_entry():
+    finding = refused("TC110", tc.specification, changed(system__f=["v", "-p - w"]))
+    assert "-p - w" in finding.location.source
+    assert finding.location.file == "<specification>"
+    with pytest.raises(tc.SpecError, match=r"(?s)specification>:.*TC110.*-p - w.*\^") as caught:
+        tc.specification(changed(system__f=["v", "-p - w"]))
+    assert isinstance(caught.value, tc.TubecertError)
+
+
+# certification
+
+
+@pytest.mark.slow
+def test_certify_says_what_the_command_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("cart.yaml").write_text(TEXT, encoding="utf-8")
+    options = ["--rho-a", "0.3", "--conditions", "B", "--gap", "0.02", "-o", "command.json"]
+    assert CliRunner().invoke(app, ["certify", "cart.yaml", *options]).exit_code == 0
+    result = tc.certify("cart.yaml", rho_a=0.3, conditions="B", gap=Fraction(1, 50))
+    result.save("library.json")
+    command, library = (Path(name).read_text("utf-8") for name in ("command.json", "library.json"))
+    ours, theirs = json.loads(library), json.loads(command)
+    assert ours["hash"] == theirs["hash"] == result.hash
+    assert ours["run"].pop("command") == "tubecert.certify"
+    for name in ("started", "seconds"):  # when it was made is no part of what is proven
+        assert f'  "{name}": {json.dumps(ours["run"][name])}' in library
+        library = library.replace(json.dumps(ours["run"][name]), json.dumps(theirs["run"][name]))
+    library = library.replace('"tubecert.certify"', json.dumps(theirs["run"]["command"]))
+    assert library == command
+
+
+def test_what_is_saved_is_read_back(tmp_path):
+    result = certified()
+    result.save(tmp_path / "x.json")
+    read = tc.read(tmp_path / "x.json")
+    assert (read.text, read.hash, read.certified) == (result.text, result.hash, True)
+    assert read.specification == tc.load(DATA)
+    (tmp_path / "x.json").write_text(result.text.replace('"rho_a": 0.2', '"rho_a": 0.3'), encoding="utf-8")
+    refused("TC601", tc.read, tmp_path / "x.json")
+
+
+def test_the_values_are_those_of_the_certificate():
+    result, data = certified(), json.loads(certified().text)["result"]
+    section = data["conditions_26"]
+    assert (result.omega, result.Gamma) == (section["bandwidth"], section["adaptation_rate"])
+    assert result.deciding.kind == "A"
+    assert result.deciding.exact.bandwidth == Fraction(str(section["bandwidth"]))
+    assert set(result.margins) == {"26a", "26b", "26c"}
+    assert all(low > 0 for low, _ in result.margins.values())
+    assert result.rho == data["tube"]["rho"]
+    assert dict(result.half_widths) == data["tube"]["half_widths"]
+    assert result.constants["h"].above == data["constants"]["h"]["above"]
+    assert result.units == {"p": "m<b>", "v": "m/s"}
+    assert result.curve("B").shape[1] == 2
+    assert result.curve("B")[0, 0] == data["distance"]["curve"][0]["bandwidth"]
+    assert {gains.kind for gains in result.gains} <= {name.letter for name in NAMES}
+    assert result.assumptions
+    assert str(result).startswith("certified cart: rho = ")
+
+
+def test_numbers_are_rounded_to_the_safe_side():
+    result = tc.certify(changed(tube__epsilon="1/3"))
+    assert Fraction(repr(result.rho)) >= result.result.tube.rho
+
+
+def test_what_is_not_certified_has_no_gains_to_use():
+    result = tc.certify(DATA, bandwidth=1, adaptation_rate=10)
+    assert not result.certified
+    assert (result.omega, result.Gamma, result.sample_time) == (None, None, None)
+    assert result.reasons[0].message
+    assert not [gains for gains in result.gains if gains.decides and gains.certified]
+    assert "not certified" in result._repr_html_()
+
+
+def test_results_are_frozen():
+    result = certified()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        result.text = "certified"
+    with pytest.raises(TypeError):
+        result.half_widths["p"] = 0
+    with pytest.raises(TypeError):
+        result.constants["h"] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        result.curve("A")[0, 0] = 1
+    with pytest.raises(ValueError, match="read-only"):
+        result.plan.x[0, 0] = 1
+    with pytest.raises((AttributeError, TypeError)):  # which one depends on the version of Python
+        result.verdict = tc.Verdict.UNDECIDED
+
+
+def test_progress_is_told():
+    told = []
+    tc.certify(DATA, progress=told.append)
+    assert told
+    assert all(isinstance(step, tc.Step) and step.name for step in told)
+    told.clear()
+    tc.recheck(certified(), progress=told.append)
+    assert len(told) == len(tc.recheck(certified()).claims)
+
+
+@pytest.mark.parametrize(
+    ("code", "options"),
+    [
+        ("TC112", {"rho_a": 0}),
+        ("TC112", {"rho_a": -1.5}),
+        ("TC108", {"rho_a": "a"}),
+        ("TC108", {"rho_a": float("nan")}),
+        ("TC106", {"rho_a": [1]}),
+        ("TC112", {"budget": 1.5}),
+        ("TC112", {"gap": 2}),
+        ("TC112", {"conditions": "Z"}),
+        ("TC112", {"formulas": "mine"}),
+        ("TC112", {"bandwidth": 3}),
+        ("TC112", {"adaptation_rate": 3}),
+        ("TC100", {"metric": "nowhere.json"}),
+        ("TC105", {"metric": {"rate": 1}}),
+    ],
+    ids=str,
+)
+def test_options_that_mean_nothing_are_refused(code, options):
+    with pytest.raises(tc.TubecertError) as caught:
+        tc.certify(DATA, **options)
+    assert code in {finding.code for finding in caught.value.findings}, str(caught.value)
+
+
+def test_everything_that_is_wrong_with_numbers_is_told_at_once():
+    with pytest.raises(tc.SpecError) as caught:
+        tc.certify(DATA, rho_a=-1, epsilon="x", budget=0)
+    assert [str(item.location) for item in caught.value.findings] == ["rho_a", "epsilon", "budget"]
+
+
+def test_a_file_that_is_not_there():
+    refused("TC100", tc.load, "nowhere.yaml")
+    refused("TC600", tc.read, "nowhere.json")
+
+
+# metrics
+
+
+@pytest.mark.slow
+def test_a_metric_that_was_found_is_proven_again(tmp_path):
+    found = tc.synthesise(DATA, rate="0.3")
+    assert found.proven
+    assert (found.rate, found.verdict) == (0.3, "certified")
+    found.save(tmp_path / "m.json")
+    verified = tc.verify(DATA, found)
+    assert verified.proven
+    assert verified.largest_rate.below >= 0.3
+    by_file, by_value = (tc.certify(DATA, metric=m, conditions="B") for m in (tmp_path / "m.json", found))
+    given_ = {"rate": found.rate, "dual_metric": found.dual_metric}
+    by_data = tc.certify(DATA, metric=given_, conditions="B")
+    assert by_file.certified
+    assert by_file.omega == by_value.omega == by_data.omega
+    assert by_value.text.count("given in code") == 1
+    assert tc.recheck(by_value).confirmed
+
+
+def test_a_metric_that_does_not_hold():
+    verified = tc.verify(DATA, rate=3)
+    assert (verified.verdict, verified.proven) == ("refuted", False)
+    assert verified.reason
+    refused("TC105", verified.save, "m.json")
+    assert tc.verify({key: DATA[key] for key in ("name", "system", "safe_set", "metric")}).proven
+    refused("TC105", tc.verify, {key: value for key, value in DATA.items() if key != "metric"})
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"objective": "best"},
+        {"degree": 9},
+        {"variables": ["w"]},
+        {"solver": "none"},
+        {"route": "x"},
+        {"objective": "rate", "rate": 1},
+    ],
+    ids=str,
+)
+def test_wishes_that_mean_nothing_are_refused(options):
+    refused("TC112", tc.synthesise, DATA, **options)
+
+
+# recheck, report, simulate
+
+
+def test_a_certificate_is_examined_again(tmp_path):
+    found = tc.recheck(certified())
+    assert found.confirmed
+    assert found.first_failing is None
+    certified().save(tmp_path / "x.json")
+    assert tc.recheck(tmp_path / "x.json").found == found.found
+
+
+def test_a_certificate_that_lies_is_not_confirmed():
+    honest = certified()
+    data = json.loads(honest.text)
+    data["result"]["conditions_26"]["adaptation_rate"] = 1.0
+    forged = dataclasses.replace(honest, text=json.dumps(data))
+    assert not tc.recheck(forged).confirmed
+    undecided = tc.certify(DATA, formulas="as-printed")
+    assert not undecided.certified
+    assert not tc.recheck(undecided).confirmed
+
+
+def test_a_page_is_that_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    certified().save("x.json")
+    page = tc.report("x.json")
+    assert CliRunner().invoke(app, ["report", "x.json", "-o", "x.html", "-o", "x.md"]).exit_code == 0
+    assert page.html == tc.report(certified()).html == Path("x.html").read_text("utf-8")
+    assert page.markdown == Path("x.md").read_text("utf-8")
+    page.save("y.md")
+    assert Path("y.md").read_text("utf-8") == page.markdown
+    refused("TC120", page.save, "y.pdf")
+
+
+@pytest.mark.slow
+def test_a_simulation(tmp_path):
+    told = []
+    found = tc.simulate(certified(), runs=2, controllers="ccm,l1", progress=told.append)
+    assert told
+    assert (found.outcome, found.falsified) == ("not falsified", False)
+    assert found.controllers == ("ccm", "l1")
+    assert found.run("l1").x.shape[0] == 1
+    assert found.states("l1").shape == (len(found.run("l1").t), 2)
+    assert found.figure("plane").axes
+    with pytest.raises(KeyError):
+        found.run("nominal")
+    with pytest.raises(KeyError):
+        found.figure("nothing")
+    names = found.save(tmp_path / "runs")
+    assert json.loads((tmp_path / "runs" / "summary.json").read_text("utf-8")) == found.summary
+    assert {"runs.npz", "plane.png"} <= set(names)
+    assert "not falsified" in found._repr_html_()
+
+
+def test_a_simulation_is_refused():
+    refused("TC112", tc.simulate, certified(), controllers="l2")
+    refused("TC112", tc.simulate, certified(), gains="Z")
+    refused("TC112", tc.simulate, certified(), runs=-1)
+    refused("TC604", tc.simulate, certified(), spec=changed(system__f=["v", "-2*p - v"]))
+
+
+# looks
+
+
+def test_texts_are_escaped_in_notebooks(tmp_path):
+    spec, result = tc.load(DATA), certified()
+    metric = tmp_path / "<script>.json"
+    metric.write_text('{"format": "tubecert-metric/1", "rate": 0.4, "dual_metric": [[1, -0.5], [-0.5, 1]]}')
+    for shown in (spec, result, tc.recheck(result), tc.report(result), tc.verify(DATA, metric)):
+        html = shown._repr_html_()
+        assert "m<b>" not in html
+        assert "<script" not in html
+    assert "m&lt;b&gt;" in result._repr_html_()
+    assert "&lt;script&gt;" in tc.verify(DATA, metric)._repr_html_()
+    framed = tc.report(result)._repr_html_()
+    assert framed.startswith("<iframe srcdoc=")
+    assert framed.count('"') == 6  # nothing ends the attribute
+    assert "m&amp;lt;b&amp;gt;" in framed
+
+
+@pytest.mark.slow
+def test_figures_are_drawn_into_the_axes_that_are_given():
+    from matplotlib.figure import Figure
+
+    result = certified()
+    one, other = Figure().subplots(1, 2)
+    assert result.plot_tube(one) is one
+    assert result.plot_tradeoff(other) is other
+    assert one.get_xlabel() == "p (m<b>)"
+    labels = one.get_legend_handles_labels()[1]
+    assert {"safe set", "tube"} <= set(labels)
+    [curve] = [line for line in other.lines if line.get_label() == "B distance"]
+    np.testing.assert_array_equal(np.column_stack(curve.get_data()), result.curve("B"))
+    [chosen] = [line for line in other.lines if line.get_label() == "decides the verdict"]
+    assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (result.omega, result.Gamma)
+    axes = Figure().subplots()
+    result.plot_tube(axes, states=("v", "p"))
+    assert axes.get_xlabel() == "v (m/s)"
+    refused("TC112", result.plot_tube, axes, states=("p", "q"))
+
+
+def test_the_tube_that_is_drawn_is_as_wide_as_it_is():
+    from matplotlib.figure import Figure
+
+    result, axes = certified(), Figure().subplots()
+    result.plot_tube(axes)
+    [tube] = axes.collections
+    corners = np.vstack([path.vertices for path in tube.get_paths()])
+    widest = np.abs(corners).max(axis=0)
+    expected = [min(result.rho, result.half_widths[name]) for name in ("p", "v")]
+    np.testing.assert_allclose(widest, expected, rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_a_single_state_is_drawn_over_time():
+    from matplotlib.figure import Figure
+
+    data = {
+        "name": "one",
+        "system": {"states": ["x"], "inputs": ["u"], "f": ["-x"], "B": [[1]]},
+        "safe_set": {"x": [-1, 1]},
+        "uncertainty": {"h": ["0.01*sin(t)"]},
+        "trajectory": {"kind": "equilibrium", "at": [0]},
+        "metric": {"rate": 0.5, "dual_metric": [[1]]},
+        "tube": {"epsilon": 0.1, "rho_a": 0.1},
+    }
+    axes = tc.certify(data).plot_tube(Figure().subplots())
+    assert axes.get_xlabel() == "t (s)"
+
+
+# the package
+
+
+@pytest.mark.slow
+def test_rooms_that_have_the_names_of_functions_are_both():
+    code = """
+import tubecert.report.page, tubecert.recheck, tubecert.simulate.runs
+import tubecert as tc
+import tubecert.simulate as room
+assert room is tc.simulate and room.runs
+assert callable(tc.report) and tc.report.page and callable(tc.recheck)
+import inspect
+assert "progress" in inspect.signature(tc.simulate).parameters
+from tubecert import *
+assert callable(simulate) and callable(certify)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_everything_that_is_offered_is_there():
+    assert set(tc.__all__) <= set(dir(tc))
+    for name in tc.__all__:
+        assert getattr(tc, name) is not None
+    assert callable(tc.simulate)
+    with pytest.raises(AttributeError, match="no attribute 'certfy'"):
+        _ = tc.certfy
+
+
+@pytest.mark.slow
+def test_a_script_of_a_user_is_type_checked(tmp_path):
+    from mypy import api
+
+    script = """
+from pathlib import Path
+
+import tubecert as tc
+
+spec: tc.Specification = tc.load("plant.yaml")
+same = tc.specification({"name": "x", "safe_set": {"x": [-1, 1.5]}})
+steps: list[tc.Step] = []
+result = tc.certify(spec, rho_a=0.05, progress=steps.append)
+metric = tc.synthesise(spec, rate=1)
+run = tc.simulate(result, runs=3)
+page = tc.report(result)
+page.save(Path("x.html"))
+omega: float | None = result.omega
+width: float = result.half_widths["x"]
+x: float = result.curve("B")[0, 0]
+ok: bool = tc.recheck(result).confirmed and tc.verify(spec, metric).proven
+axes = result.plot_tube()
+axes.plot(run.states("l1")[:, 0])
+"""
+    wrong = """
+import tubecert as tc
+tc.certfy("plant.yaml")
+tc.certify("plant.yaml", rho="0.1")
+tc.simulate("plant.yaml")
+omega: str = tc.read("x.json").omega
+"""
+    for name, text in (("right.py", script), ("wrong.py", wrong)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    options = ["--strict", "--no-error-summary", "--config-file", "", "--cache-dir", str(tmp_path / "cache")]
+    said, _, _ = api.run([*options, str(tmp_path / "right.py"), str(tmp_path / "wrong.py")])
+    errors = [
+        line.removeprefix(f"{tmp_path}/").split(": ")[0] for line in said.splitlines() if "error" in line
+    ]
+    assert errors == ["wrong.py:3", "wrong.py:4", "wrong.py:5", "wrong.py:6"], said

@@ -1,0 +1,266 @@
+"""Simulation from code, and what the command shares with it: which loops, with which gains, how many runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from tubecert.certificate.result import Result
+from tubecert.enclosure.interval import Array
+from tubecert.errors import SpecError
+from tubecert.expression import suggestion
+from tubecert.findings import Finding
+from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
+from tubecert.library.asked import Named, one_of
+from tubecert.library.certification import Certification
+from tubecert.library.numbers import Numbers
+from tubecert.library.plain import Number, number_texts
+from tubecert.library.specification import File, Specifiable, spec_of
+from tubecert.spec import Spec
+from tubecert.stages.options import Progress, Step
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tubecert.simulate.campaign import Campaign
+    from tubecert.simulate.loops import Controller
+    from tubecert.simulate.runs import Runs
+
+EXTRA: Final = ("numba", "llvmlite", "matplotlib")
+RUNS: Final = 100
+SEED: Final = 0
+_POSITIVE: Final = ("epsilon", "rho_a", "duration", "control_rate")
+GAINS: Final = ("bandwidth", "adaptation_rate", "sample_time")
+Report = Callable[[str, int, int], None]  # what is done, how many, of how many
+OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Simulation:
+    """What was simulated, and whether it falsified anything: that it did not proves nothing.
+
+    `campaign` has every run; `summary` is what `summary.json` holds; `compared_with` the hash of the certificate.
+    """
+
+    campaign: Campaign = field(repr=False)
+    compared_with: str
+
+    @property
+    def outcome(self) -> str:
+        """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
+        from tubecert.simulate.summary import outcome
+
+        return outcome(self.campaign)
+
+    @property
+    def falsified(self) -> bool:
+        """Whether a promise of the certificate was broken, or a loop that adapts left the tube."""
+        return self.outcome in OUTCOMES
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """Everything that was found, as plain data."""
+        from tubecert.simulate.summary import summary
+
+        return summary(self.campaign, self.compared_with)
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """The loops that were simulated."""
+        return tuple(item.loop.controller for item in self.campaign.drawn)
+
+    def run(self, controller: str) -> Runs:
+        """The run of a loop under the uncertainty that is drawn: times `t` (K,) in s, `x` (1, K, n), `u` (1, K, m), ...
+
+        Raises `KeyError` for a loop that was not simulated.
+        """
+        for item in self.campaign.drawn:
+            if item.loop.controller == controller:
+                return item.runs
+        raise KeyError(controller)
+
+    def states(self, controller: str) -> Array:
+        """The states (K, n) of that run."""
+        return np.asarray(self.run(controller).x[0])
+
+    def figure(self, name: str = "states") -> Figure:
+        """A figure: `states`, `plane`, `inputs`, `tube_use` or `monte_carlo`; draw into its axes what you like.
+
+        Raises `KeyError` for a name that is none, or of which there is nothing to draw.
+        """
+        from tubecert.simulate.figures import drawn
+
+        found = drawn(name, self.campaign)
+        if found is None:
+            raise KeyError(f"{name}: nothing was simulated that it shows")
+        return found
+
+    def save(self, folder: File) -> list[str]:
+        """Write data, tables, figures and the summary into a folder, as the command does; their names.
+
+        Raises `TargetError`.
+        """
+        from tubecert.simulate.output import prepared, write
+
+        with prepared(os.fspath(folder)):
+            return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
+
+    def __str__(self) -> str:
+        from tubecert.report import simulation
+
+        return simulation.verdict_line(self.summary).plain
+
+    def __repr__(self) -> str:
+        return f"<Simulation: {self}>"
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        style = "falsified" if self.falsified else ""
+        rows = [(item.loop.controller, f"largest d/dbar {item.use:.4g}") for item in self.campaign.attacks]
+        return notebook.of_line(str(self), style, rows)
+
+
+def simulate(
+    result: Certification,
+    *,
+    spec: Specifiable | None = None,
+    controllers: str | Sequence[str] | None = None,
+    gains: str | None = None,
+    runs: int | None = None,
+    seed: int | None = None,
+    replay: int | None = None,
+    duration: Number | None = None,
+    control_rate: Number | None = None,
+    bandwidth: Number | None = None,
+    adaptation_rate: Number | None = None,
+    sample_time: Number | None = None,
+    progress: Progress | None = None,
+) -> Simulation:
+    """Integrates the closed loops of a certificate and attacks the tube: `tubecert simulate`, with the same options.
+
+    `spec` is needed where the certificate was read and its plan is in a file. Needs the extra `simulate`. Raises
+    `TubecertError` if there is no tube that could be left, or the specification is another one.
+    """
+    require_extra()
+    texts = number_texts(
+        duration=duration,
+        control_rate=control_rate,
+        bandwidth=bandwidth,
+        adaptation_rate=adaptation_rate,
+        sample_time=sample_time,
+        runs=runs,
+        seed=seed,
+        replay=replay,
+    )
+    numbers = simulation_numbers(texts, str)
+    chosen = controllers_of(controllers, str)
+    one_of("gains", gains, words_of(ADAPTIVE))
+    from tubecert.simulate.certified import adopted, require_plan, require_tube
+
+    system = result.specification.spec if spec is None else spec_of(spec)
+    require_plan(system)
+    system = adopted(system, result.result)
+    require_tube(result.result)
+    wishes = wishes_of(system, numbers, chosen, gains)
+    campaign = campaign_of(system, result.result, wishes, None if progress is None else _told(progress))
+    return Simulation(campaign=campaign, compared_with=result.hash)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What is asked for, then the specification's section `simulation`, then defaults."""
+
+    controllers: tuple[str, ...]
+    gains: str
+    runs: int
+    seed: int
+    replay: int | None
+    numbers: Mapping[str, Fraction | None]
+
+
+def require_extra() -> None:
+    """Raises `SpecError` without the libraries that nothing else needs."""
+    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+    if missing:
+        message = f"simulate needs {' and '.join(missing)}"
+        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
+
+
+def simulation_numbers(given: Mapping[str, str | None], named: Named) -> dict[str, Any]:
+    """The numbers of a simulation, exact; raises `SpecError` with everything that is wrong with them."""
+    numbers = Numbers()
+    values: dict[str, Any] = {name: numbers.positive(named(name), given.get(name)) for name in _POSITIVE}
+    values |= {name: numbers.gain(named(name), given[name]) for name in GAINS}
+    values |= {name: numbers.whole(named(name), given[name]) for name in ("runs", "seed", "replay")}
+    numbers.check()
+    return values
+
+
+def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str, ...]:
+    """The loops that are asked for; raises `SpecError` for a name that is none."""
+    from tubecert.spec.simulation import CONTROLLERS
+
+    parts = given.split(",") if isinstance(given, str) else given or ()
+    words = tuple(dict.fromkeys(word.strip() for word in parts if word.strip()))
+    for word in words:
+        if word not in CONTROLLERS:
+            help = suggestion(word, CONTROLLERS, what="controllers")
+            message = f"{named('controllers')}: {word[:40]!r} is no controller"
+            raise SpecError([Finding(code="TC112", message=message, help=help)])
+    return words
+
+
+def wishes_of(system: Spec, numbers: Mapping[str, Any], chosen: tuple[str, ...], gains: str | None) -> Wishes:
+    """What is simulated of a specification."""
+    from tubecert.simulate.promise import KINDS
+    from tubecert.spec import Simulation as Section
+
+    default = system.simulation or Section()
+    option = name_of(gains or default.gains or DISTANCE.option).option
+    adaptive = KINDS[option].controller
+    values = dict(numbers)
+    if values["control_rate"] is None:
+        values["control_rate"] = default.control_rate
+
+    def first(name: str, otherwise: int) -> int:
+        own = numbers[name]
+        wanted = getattr(default, name) if own is None else own
+        return otherwise if wanted is None else int(wanted)
+
+    return Wishes(
+        controllers=chosen or default.controllers or ("ccm", adaptive),
+        gains=option,
+        runs=first("runs", RUNS),
+        seed=first("seed", SEED),
+        replay=numbers["replay"],
+        numbers=values,
+    )
+
+
+def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Report | None) -> Campaign:
+    """Every loop that is wished for, integrated and attacked."""
+    from tubecert.simulate.campaign import simulate as campaign
+    from tubecert.simulate.compiled import told
+    from tubecert.simulate.setting import Choice, loop_of, setting_of
+
+    numbers = wishes.numbers
+    setting = setting_of(system, result, numbers["duration"])
+    choice = Choice(source=wishes.gains, **{name: numbers[name] for name in GAINS})
+    rate = numbers["control_rate"]
+    loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in wishes.controllers]
+    with told(report):
+        return campaign(
+            setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report
+        )
+
+
+def _told(progress: Progress) -> Report:
+    return lambda name, done, total: progress(Step(name=name, boxes=done, unit=f"of {total}"))
