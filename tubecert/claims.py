@@ -195,6 +195,25 @@ class ObstacleCleared(Claim):
     clearance: Constant
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputWithinLimits(Claim):
+    """An input of the plan and of the loop stays within its limits; on `side` it may reach `reaches`, beyond `limit`.
+
+    `plan` is what u* itself reaches there: at least, where it is beyond the limit, else at most. `feedback` and
+    `adaptation` add to it at most, by the theorem of `section`; without them nothing is known of the loop.
+    """
+
+    tag: ClassVar[str] = "input_within_limits"
+    input: str
+    side: Side
+    limit: Fraction
+    plan: float | None
+    section: str | None = None
+    reaches: float | None = None
+    feedback: float | None = None
+    adaptation: float | None = None
+
+
 METRIC_CLAIMS = (MetricDefinite, MetricContraction, MetricKilling)
 
 
@@ -415,6 +434,13 @@ class ReduceRadii(Relax):
     """Smaller epsilon, rho_a or initial error."""
 
     tag: ClassVar[str] = "reduce_radii"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeavePlanRoom(Relax):
+    """A plan with more room between its inputs and their limits."""
+
+    tag: ClassVar[str] = "leave_plan_room"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ import numpy as np
 
 from tubecert.conditions import alone, distance, hardware, rates, sampled
 from tubecert.conditions.arithmetic import Array
+from tubecert.conditions.inputs import InputShares
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.conditions.theorem import R, Recipe, Theorem
@@ -71,6 +72,12 @@ class Proof(Generic[R]):
         """|x - x*| is at most this in the long run; None if the theorem does not say."""
         ultimate = theorem_of(type(self.recipe)).ultimate
         return None if ultimate is None else ultimate(self.problem, self.recipe)
+
+    @property
+    def input_shares(self) -> InputShares | None:
+        """What the loop adds to u* at most; None if the theorem does not say."""
+        inputs = theorem_of(type(self.recipe)).inputs
+        return None if inputs is None else inputs(self.problem, self.recipe)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

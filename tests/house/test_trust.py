@@ -38,6 +38,7 @@ TRUSTED_ROOMS = {
 SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
 ALSO_SAY = {  # of one claim each, no gains
     "bounds/clearance.py": "the tube keeps away from an obstacle",
+    "conditions/inputs.py": "an input stays within its limits",
     "enclosure/branch_and_bound.py": "an objective stays below a threshold",
     "model.py": "the rank of a B with a minor that is a constant",
     "metric/verify.py": "C1-C3",

@@ -6,7 +6,7 @@ is strict: what is missing, not known, or of another kind is a `FormError` that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
@@ -282,6 +282,42 @@ class ClearanceData:
     inside: tuple[float, float] | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanInputData:
+    """Enclosures of inf u* and of sup u* on the plan, of one input."""
+
+    least: Constant
+    greatest: Constant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputBoundData:
+    """The input stays in [least, greatest] with the gains in `proof`; what feedback and adaptation add at most."""
+
+    least: float
+    greatest: float
+    feedback: float
+    adaptation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputData:
+    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
+
+    input: str
+    limits: tuple[Fraction, Fraction]
+    verdict: Verdict
+    plan: PlanInputData
+    bounds: Mapping[str, InputBoundData]
+
+    def use(self, kinds: Iterable[str]) -> float | None:
+        """The share of its limits that it uses at most: 0 in the middle, 1 at a limit; None without bounds."""
+        low, high = self.limits
+        found = [self.bounds[key] for key in kinds if key in self.bounds]
+        ends = [Fraction(end) for bound in found for end in (bound.least, bound.greatest)]
+        return float(max(abs(2 * end - low - high) for end in ends) / (high - low)) if ends else None
+
+
 def _sections() -> dict[str, type[SectionData]]:
     return {kind.key: kind.form for kind in KINDS}
 
@@ -321,6 +357,7 @@ class Result:
     metric: MetricData | None = None
     tube: TubeData | None = None
     clearance: tuple[ClearanceData, ...] = ()
+    inputs: tuple[InputData, ...] = ()
     constants: Mapping[str, Bound] = field(default_factory=dict)
     sections: Mapping[str, SectionData] = field(default_factory=dict, metadata=keyed(_sections))
     elasticities: Mapping[str, Mapping[str, float]] | None = None

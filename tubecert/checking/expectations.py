@@ -17,7 +17,7 @@ from tubecert.pipeline.verification import Verified
 from tubecert.spec import Expectation, Spec
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
-from tubecert.words.claims import message, title
+from tubecert.words.claims import input_title, message, title
 from tubecert.words.conditions import SECTIONS
 
 VERDICT_MISMATCH = "TC502"
@@ -62,13 +62,19 @@ def outcome(result: Result) -> Outcome:
 
 
 def _numbers(result: Result) -> Iterator[tuple[str, float]]:
-    """rho, the least clearance, and the gains of the first certificate that decides; the sample time is that of C."""
+    """rho, the least clearance, the largest share of limits, the gains of the first certificate that decides.
+
+    The sample time is that of C.
+    """
     if result.metric is not None and result.metric.largest_rate is not None:
         yield from _largest_rate(result.metric.largest_rate)
     if result.tube is not None:
         yield "rho", float(result.tube.rho)
     if result.clearance:
         yield "clearance", min(each.clearance.below for each in result.clearance)
+    uses = [each.use(result.decided_by) for each in result.inputs]
+    if uses and None not in uses:
+        yield "inputs", max(use for use in uses if use is not None)
     pair = next(iter(result.deciding().values()), None)
     if pair is not None:
         if pair.bandwidth is not None:
@@ -114,6 +120,9 @@ def _claims(result: Result) -> Iterator[Claim]:
     for number, each in enumerate(result.clearance, start=1):
         if each.decides and each.verdict is Verdict.CERTIFIED:
             yield Claim(name=f"clearance from obstacle {number}", verdict=each.verdict)
+    for own in result.inputs:
+        if own.verdict is Verdict.CERTIFIED:
+            yield Claim(name=input_title(own.input), verdict=own.verdict)
     for section in result.decided_by:
         if section in result.sections and section not in named:
             yield Claim(name=SECTIONS[section], verdict=result.sections[section].verdict)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array, T, decay_mean, exp, maximum, quiet, sqrt
+from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
@@ -81,6 +82,13 @@ def ultimate_radius(problem: TubeProblem, recipe: NoGains) -> float:
     return float((ultimate(n) / sqrt(n.a)).hi)
 
 
+def input_shares(problem: TubeProblem, recipe: NoGains) -> InputShares | None:
+    """u = u* + k with |k| <= du sup D."""
+    del recipe
+    n = problem.proven()
+    return shares(n, supremum(n), None)
+
+
 def _formula(problem: TubeProblem, n: Numbers[Array]) -> object:
     """Everything that theorem 0 compares."""
     del problem
@@ -95,4 +103,5 @@ THEOREM = Theorem(
     obstacles=obstacles,
     provisos=provisos,
     ultimate=ultimate_radius,
+    inputs=input_shares,
 )

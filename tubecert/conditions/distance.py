@@ -18,6 +18,7 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import Array, T, least_solution, maximum, minimum, quiet, sqrt, vector
 from tubecert.conditions.derived import prediction_error
+from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.predictor import Predictor, predictor
@@ -178,6 +179,14 @@ def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     return float((distance_bound(n, Interval.of(recipe.bandwidth), S, e).ultimate() / sqrt(n.a)).hi)
 
 
+def input_shares(problem: TubeProblem, recipe: DistanceRecipe) -> InputShares | None:
+    """|k| <= du sup D, |u_a| <= R_H."""
+    n = problem.proven(recipe.projection_radius)
+    S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
+    top = distance_bound(n, Interval.of(recipe.bandwidth), S, e).supremum()
+    return shares(n, top, recipe.projection_radius)
+
+
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """Everything that theorem B compares, at some gains."""
     one = np.asarray(1.0)
@@ -194,4 +203,5 @@ THEOREM = Theorem(
     obstacles=obstacles,
     provisos=provisos,
     ultimate=ultimate_radius,
+    inputs=input_shares,
 )

@@ -22,6 +22,8 @@ from tubecert.conditions.derived import (
     rate_terms,
     zetas,
 )
+from tubecert.conditions.inputs import InputShares, shares
+from tubecert.conditions.obstacles import reach
 from tubecert.conditions.predictor import predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
@@ -116,6 +118,12 @@ def _derived(
     }
 
 
+def input_shares(problem: TubeProblem, recipe: RateRecipe) -> InputShares | None:
+    """|k| <= du dbar: theorem A says of d no more than that it stays below dbar; |u_a| <= R_H."""
+    n = problem.proven(recipe.projection_radius)
+    return shares(n, reach(n), recipe.projection_radius)
+
+
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """All of (26a)-(26c) at some gains."""
     one = np.asarray(1.0)
@@ -155,4 +163,5 @@ THEOREM = Theorem(
     formula=_at_once,
     obstacles=_obstacles,
     provisos=_provisos,
+    inputs=input_shares,
 )

@@ -30,6 +30,7 @@ from tubecert.conditions.arithmetic import (
     vector,
 )
 from tubecert.conditions.distance import drift_bound, least_from_below
+from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
@@ -182,6 +183,15 @@ def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float:
     return float((_bound(n, omega, s).ultimate() / sqrt(n.a)).hi)
 
 
+def input_shares(problem: TubeProblem, recipe: SampledRecipe) -> InputShares | None:
+    """|k| <= du max(d0, d1, sup D), |u_a| <= R_H."""
+    n = problem.proven(recipe.projection_radius)
+    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
+    age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
+    top = sampled_supremum(n, Ts, omega, age, Interval.of(recipe.speed))
+    return shares(n, top, recipe.projection_radius)
+
+
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """Everything that theorem C compares, at some gains."""
     del problem
@@ -199,5 +209,6 @@ THEOREM = Theorem(
     obstacles=obstacles,
     provisos=provisos,
     ultimate=ultimate_radius,
+    inputs=input_shares,
     own_predictor=True,
 )

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array
+from tubecert.conditions.inputs import InputShares
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
 from tubecert.conditions.verdict import Shortfall
 from tubecert.enclosure.interval import Interval
@@ -48,8 +49,9 @@ class Theorem(Generic[R]):
     recipe with the same gains, so that one that is not positive refutes the gains. `obstacles`: what no gains can
     overcome. `provisos`: why the formulas that the problem asks for prove nothing, if so. `formula`: everything that
     the margins contain, in floats at some gains, to record which constants it needs. `ultimate`: |x - x*| is at most
-    this in the long run, for a recipe that is proven. `own_predictor`: where a general matrix A_m is asked for, the
-    theorem is about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
+    this in the long run, for a recipe that is proven. `inputs`: what the loop adds to u* at most, for a recipe that is
+    proven; without it inputs have no bound. `own_predictor`: where a general matrix A_m is asked for, the theorem is
+    about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
     what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any.
     """
 
@@ -60,6 +62,7 @@ class Theorem(Generic[R]):
     obstacles: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     ultimate: Callable[[TubeProblem, R], float] | None = None
+    inputs: Callable[[TubeProblem, R], InputShares | None] | None = None
     own_predictor: bool = False
     sizes: tuple[str, ...] = ("speed", "prediction_error", "uncertainty")
     optional: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kinds_of
-from tubecert.pipeline.reasons import obstacle_reasons, reasons
+from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
 from tubecert.search.proposers import LEAST, PROPOSERS
@@ -114,7 +114,7 @@ def explain(judged: Judged) -> Explanation:
         for reason in reasons(judged.sections[key], explained[key].halved or {})
     ]
     return Explanation(
-        reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded)],
+        reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded), *input_reasons(judged)],
         elasticities={key: _told(each.slopes) for key, each in explained.items() if each.slopes is not None},
     )
 

@@ -16,6 +16,8 @@ import numpy as np
 from tubecert.claims import (
     ConditionHolds,
     HalveConstant,
+    InputWithinLimits,
+    LeavePlanRoom,
     ObstacleCleared,
     RaiseBudget,
     Reason,
@@ -23,11 +25,13 @@ from tubecert.claims import (
     Relax,
     ShrinkTube,
 )
+from tubecert.conditions.inputs import InputBound, JudgedInput, LimitedInput
 from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Section
 from tubecert.stages.bounded import Bounded, Cleared
+from tubecert.stages.judged import Judged
 
 _OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
 _NOTABLE = 0.995  # a factor above it is not worth a word
@@ -65,6 +69,56 @@ def _witness(bounded: Bounded, cleared: Cleared) -> Witness:
         for name, value in zip(cleared.obstacle.states, cleared.found.inside, strict=True):
             x[states.index(name)] = value
     return Witness(t=t, x=tuple(x))
+
+
+def input_reasons(judged: Judged) -> list[Reason]:
+    """Inputs that are not proven to stay within their limits, where the gains are proven; and plans that do not."""
+    certified = all(judged.sections[key].verdict is Verdict.CERTIFIED for key in judged.deciding)
+    return [
+        _beyond(each, judged.deciding)
+        for each in judged.inputs
+        if each.verdict is Verdict.REFUTED or (certified and each.verdict is not Verdict.CERTIFIED)
+    ]
+
+
+def _beyond(judged: JudgedInput, deciding: tuple[str, ...]) -> Reason:
+    """By which limit an input misses most, and what takes it there."""
+    own, low, high = judged.input, *judged.input.limits
+    if own.leaves is not None:
+        upper = own.greatest.below > high
+        claim = InputWithinLimits(
+            input=own.name,
+            side="upper" if upper else "lower",
+            limit=high if upper else low,
+            plan=own.greatest.below if upper else own.least.above,
+        )
+        return Reason(claim=claim, verdict=judged.verdict, at=own.leaves, relax=(LeavePlanRoom(),))
+    failing = {key: judged.bounds[key] for key in deciding if key in judged.bounds}
+    if not failing:
+        claim = InputWithinLimits(input=own.name, side="upper", limit=high, plan=None)
+        return Reason(claim=claim, verdict=judged.verdict, relax=UNBOUNDED_RELAX)
+    section, bound = max(failing.items(), key=lambda item: _excess(own, item[1]))
+    upper = Fraction(bound.greatest) - high > low - Fraction(bound.least)
+    claim = InputWithinLimits(
+        input=own.name,
+        side="upper" if upper else "lower",
+        limit=high if upper else low,
+        plan=own.greatest.above if upper else own.least.below,
+        section=section,
+        reaches=bound.greatest if upper else bound.least,
+        feedback=bound.shares.feedback,
+        adaptation=bound.shares.adaptation,
+    )
+    # without any feedback it would be less by that
+    helps = _excess(own, bound) < Fraction(bound.shares.feedback)
+    relax = (ShrinkTube(), LeavePlanRoom()) if helps else (LeavePlanRoom(),)
+    return Reason(claim=claim, verdict=judged.verdict, relax=relax)
+
+
+def _excess(own: LimitedInput, bound: InputBound) -> Fraction:
+    """By how much a bound exceeds a limit."""
+    low, high = own.limits
+    return max(low - Fraction(bound.least), Fraction(bound.greatest) - high)
 
 
 def _certified(section: Section[Any], halved: Mapping[str, float]) -> Reason:

@@ -18,6 +18,7 @@ from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.grammar import GrammarError, read_number
+from tubecert.recheck.inputs import Limited, read_limited
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Kind, Section
 from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.obstacles import Cleared, read_cleared
@@ -167,6 +168,7 @@ class Result:
     metric: MetricSection | None
     tube: TubeSection | None
     clearance: tuple[Cleared, ...]
+    inputs: tuple[Limited, ...]
     constants: dict[str, Enclosure] | None
     sections: Sections | None
 
@@ -206,6 +208,7 @@ def read_result(node: Node) -> Result:
             "synthesis",
             "metric",
             "clearance",
+            "inputs",
             "constants",
             "tube",
             *KEYS,
@@ -246,6 +249,7 @@ def read_result(node: Node) -> Result:
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, states)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
+        inputs=own.get("inputs", lambda item: tuple(map(read_limited, item.entries()))) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
         sections=_sections(own, len(states), applying) if searched else None,
     )

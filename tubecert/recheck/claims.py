@@ -6,10 +6,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 from flint import arb, ctx
 
-from tubecert.recheck import claimed, clearances, consistency, geodesics, machine, metric, planned, start
+from tubecert.recheck import (
+    claimed,
+    clearances,
+    consistency,
+    geodesics,
+    inputs,
+    machine,
+    metric,
+    planned,
+    start,
+)
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.certificate import (
@@ -29,7 +40,7 @@ from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
-from tubecert.recheck.kinds.kind import Ground
+from tubecert.recheck.kinds.kind import Ground, Kind
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
@@ -190,6 +201,7 @@ def of_certified(case: Case) -> Iterator[Claim]:
     yield from _on_set(case)
     yield from _tube(case)
     yield from _clearances(case)
+    yield from _planned_inputs(case)
     yield from _constants(case)
     yield from _gains(case)
 
@@ -304,6 +316,15 @@ def _clearances(case: Case) -> Iterator[Claim]:
         )
 
 
+def _planned_inputs(case: Case) -> Iterator[Claim]:
+    for own in case.result.inputs:
+        yield Claim(
+            f"{own.name}* of the plan is in the range that is stated",
+            (*case.over_tube, own.name, own.least, own.greatest),
+            lambda own=own: inputs.on_plan(case.place, own),  # type: ignore[misc]
+        )
+
+
 def _constants(case: Case) -> Iterator[Claim]:
     place, over = case.place, case.over_tube
     B, upper = case.bound_if_any("B"), case.bound_if_any("upper")
@@ -394,3 +415,20 @@ def _gains(case: Case) -> Iterator[Claim]:
     )
     for kind in present:
         yield from kind.claims(sections.by_key[kind.key], recipes.get(kind.key), ground)
+        yield from _inputs(case, kind, ground)
+
+
+def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]:
+    """What a kind adds to inputs that have limits."""
+    bounds = tuple(own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds)
+    recipe = case.result.recipes.get(kind.key)
+    if bounds:
+        yield ground.claim(
+            f"{kind.key}: what is added to u*",
+            (bounds, recipe),
+            lambda: (
+                metric.stated(False, "it has no recipe")
+                if recipe is None
+                else inputs.added(ground.setting, kind.shares(recipe, ground.setting), bounds)
+            ),
+        )

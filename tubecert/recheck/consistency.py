@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tubecert.recheck import clearances
+from tubecert.recheck import clearances, inputs
 from tubecert.recheck.certificate import Geodesics, Result, TubeSection
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
@@ -166,6 +166,7 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
         whole = section.verdict != "certified" or not section.shortfalls
         yield whole, f"{name} is certified and lists shortfalls"
     yield from clearances.agrees(result.specification.obstacles, result.clearance)
+    yield from inputs.agrees(result.specification.limits, result.inputs, sections.by_key, deciding)
     for reason in result.reasons:
         yield reason.verdict == "certified", f"{_CLAIMS_ONLY} a reason says otherwise"
         yield reason.claim == "gains_suffice", f"{_CLAIMS_ONLY} a reason is not that gains suffice"

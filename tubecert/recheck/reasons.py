@@ -122,6 +122,15 @@ _CLAIMS: Mapping[str, Form] = {
     "constant_bounded": ({"constant": Node.text}, {}),
     "uncertainty_bound": ({"constant": Node.text, "declared": Node.number, "reaches": maybe}, {}),
     "obstacle_cleared": ({"obstacle": Node.count, "clearance": enclosure}, {}),
+    "input_within_limits": (
+        {"input": Node.text, "side": _SIDE, "limit": Node.decimal, "plan": maybe},
+        {
+            "section": Node.text,
+            "reaches": Node.number,
+            "feedback": Node.number,
+            "adaptation": Node.number,
+        },
+    ),
     "gains_suffice": (
         {"section": Node.text, "margins": _margins},
         {"binds": Node.text, "below_twice_rate": Node.flag, "predictor_gain": Node.decimal},
@@ -201,6 +210,7 @@ _RELAX: Mapping[str, Form] = {
     "raise_budget": ({}, {"proof": Node.flag}),
     "shrink_tube": _NONE,
     "reduce_radii": _NONE,
+    "leave_plan_room": _NONE,
     "reduce_initial_error": _NONE,
     "enlarge_safe_set": _NONE,
     "shrink_safe_set": ({}, {"factor": Node.number, "rate": Node.decimal}),

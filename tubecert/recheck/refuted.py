@@ -55,6 +55,8 @@ def _refutation(case: Case, reason: Reason) -> Outcome:
         return _metric_fails(case, name, [exact(value) for value in at[1]])
     if name == "tube_in_safe_set" and at is not None:
         return _leaves(case, at[0])
+    if name == "input_within_limits":
+        return _plan_exceeds(case, str(reason.parameters["input"]), None if at is None else at[0])
     section = str(reason.parameters.get("section"))
     if name == "condition_holds" and section in KEYS and result.sections is not None:
         return _gains_fail(result, section)
@@ -118,15 +120,31 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
         own = case.result.tube.rho
         pairs = [(family.x[name], s.safe_set[name]) for name in s.states]
         return _if(any(low - own < least or high + own > most for (low, high), (least, most) in pairs))
+    _, x, _ = _near(case, at).middle()
+    ranges = (s.safe_set[name] for name in s.states)
+    return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
+
+
+def _near(case: Case, at: Fraction | None) -> Segment:
+    """A short segment of the plan near a time."""
     t = 0.0 if at is None else float(at)
     segment: Segment = case.curve.root
     while segment.halves:
         segment = min(segment.halves, key=lambda half: max(half.when[0] - t, t - half.when[1], 0.0))
         if segment.when[1] - segment.when[0] < 1e-9:
             break
-    _, x, _ = segment.middle()
-    ranges = (s.safe_set[name] for name in s.states)
-    return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
+    return segment
+
+
+def _plan_exceeds(case: Case, name: str, at: Fraction | None) -> Outcome:
+    """u* of the plan is beyond a limit near the time of the witness; of a family nothing of the kind is known."""
+    spec, inputs = case.result.specification, case.system.inputs
+    if name not in spec.limits or isinstance(spec.trajectory, AnyPlan):
+        return metric.stated(False, "it is no input with limits, or of no known plan")
+    low, high = spec.limits[name]
+    _, _, u = _near(case, at).middle()
+    value = u[inputs.index(name)]
+    return _if(bool(value > exact(high)) or bool(value < exact(low)))
 
 
 def _gains_fail(result: Result, name: str) -> Outcome:

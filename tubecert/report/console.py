@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.certificate.result import Certificate, Result
+from tubecert.claims import InputWithinLimits
 from tubecert.report import sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled
@@ -75,6 +76,10 @@ def meaning(result: Result) -> Text:
     match result.verdict:
         case Verdict.CERTIFIED:
             return _promise(result)
+        case Verdict.REFUTED if result.reason is not None and isinstance(
+            result.reason.claim, InputWithinLimits
+        ):
+            return Text("The plan itself asks more of an input than its limits allow, whatever the gains.")
         case Verdict.REFUTED if _tube_is_known(result):
             return Text(
                 "The condition below is proven not to hold. It is a sufficient one: that it fails does not "

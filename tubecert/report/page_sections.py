@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from tubecert.bounds.constants import EVERY
-from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
+from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
-from tubecert.report.numbers import UNKNOWN, down, exact, short, up
+from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.page import (
     Block,
     Cell,
@@ -85,6 +85,8 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
     if blocks := tuple(_tube(result)):
         yield Section(key="tube", title="Safe set" if result.tube is None else "Tube", blocks=blocks)
+    if result.inputs:
+        yield Section(key="inputs", title="Inputs", blocks=tuple(_inputs(result)))
     if result.sections:
         yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
@@ -201,6 +203,42 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
     yield "claimed", Cell(text=sections.span(result))
     for words, rest in sections.long_run(result):
         yield f"in the long run, {words}", Cell(text=rest)
+
+
+def _inputs(result: Result) -> Iterator[Block]:
+    loops: list[tuple[InputData, str | None]] = [
+        (own, key) for own in result.inputs for key in ((*own.bounds,) or (None,))
+    ]
+    columns = ("input", "limits", "verdict", "on the plan", "loop of", "stays within", "used")
+    yield Table(
+        columns=(*columns, "feedback", "adaptation"),
+        rows=tuple(_input_row(result, own, key) for own, key in loops),
+        note="Proven for every uncertainty of the class: what the plan needs, and what feedback and adaptation add at "
+        "most. Used: 0 % in the middle of the limits, 100 % at one of them. The verdict is about the loops that "
+        "decide.",
+    )
+
+
+def _input_row(result: Result, own: InputData, key: str | None) -> tuple[Cell, ...]:
+    unit = result.spec.effective.system.units.get(own.input, "")
+    bound = None if key is None else own.bounds[key]
+    return (
+        Cell(text=f"{own.input} ({unit})" if unit else own.input),
+        Cell(text=f"[{end(own.limits[0])}, {end(own.limits[1])}]", kind="number"),
+        Cell(text=own.verdict, kind="verdict"),
+        Cell(text=sections.span_of(own.plan.least.below, own.plan.greatest.above), kind="number"),
+        *(
+            (
+                Cell(text=NAMES[key]),
+                Cell(text=sections.span_of(bound.least, bound.greatest), kind="number"),
+                Cell(text=sections.used(own, key), kind="number"),
+                Cell(text=up(bound.feedback), kind="number"),
+                Cell(text=up(bound.adaptation), kind="number"),
+            )
+            if bound is not None and key is not None
+            else (Cell(text=UNKNOWN),) * 5
+        ),
+    )
 
 
 def _rests_on(result: Result) -> Iterator[Block]:

@@ -33,6 +33,9 @@ def proven(result: Result) -> Iterator[str]:
     if result.formulas == "as-printed":
         yield "Nothing about the gains: the formulas are those that the paper prints, and several of them are wrong."
         return
+    for own in result.inputs:
+        if own.verdict is Verdict.CERTIFIED:
+            yield f"The input {own.input} stays within its limits, on the plan and in the loop."
     for key, words in _CLAIMS.items():
         section = result.sections.get(key)
         if section is not None and section.verdict is Verdict.CERTIFIED:

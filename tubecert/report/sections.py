@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.bounds.constants import EVERY
-from tubecert.certificate.result import Bound, MetricData, Plans, Result, TubeData
+from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, SAMPLED
@@ -46,6 +46,8 @@ def of(result: Result, *, verbose: bool) -> Iterator[Section]:
         yield "What limits them", [_reason(result, item) for item in holding]
     if result.tube is not None:
         yield "Tube", _tube(result, result.tube)
+    if result.inputs:
+        yield "Inputs", [Text(line) for own in result.inputs for line in input_lines(result, own)]
     if result.metric is not None:
         yield "Metric", _metric(result, result.metric)
     if verbose and result.constants:
@@ -215,6 +217,39 @@ def clearances(result: Result) -> Iterator[str]:
         else:
             told = "the tube meets it" if own.verdict is Verdict.REFUTED else "the tube may meet it"
             yield f"{where}: {told}; {when}" + ("" if own.decides else " (does not decide)")
+
+
+def input_lines(result: Result, own: InputData) -> Iterator[str]:
+    """How far an input with limits goes, and what takes it there, in the loop of every kind that decides."""
+    unit = result.spec.effective.system.units.get(own.input, "")
+    limits = f"limits [{end(own.limits[0])}, {end(own.limits[1])}]".rstrip()
+    plan = span_of(own.plan.least.below, own.plan.greatest.above)
+    told = [key for key in result.decided_by if key in own.bounds]
+    for key in told:
+        bound = own.bounds[key]
+        reaches = f"{span_of(bound.least, bound.greatest)} {unit}".rstrip()
+        stays = "stays within" if own.verdict is Verdict.CERTIFIED else "is proven to stay within"
+        where = f" with {NAMES[key]}" if len(told) > 1 else ""
+        adapts = f", adaptation adds {up(bound.adaptation)}" if bound.adaptation else ""
+        yield (
+            f"{own.input} {stays} {reaches}{where}; {limits}: {used(own, key)} used (the plan is in {plan}, feedback "
+            f"adds {up(bound.feedback)}{adapts})"
+        )
+    if not told:
+        yield f"{own.input} is in {plan} on the plan; {limits}; nothing is proven of it in the loop"
+    if own.verdict is Verdict.REFUTED:
+        yield f"{own.input} of the plan itself leaves its limits"
+
+
+def span_of(low: float, high: float) -> str:
+    """A range that contains this one."""
+    return f"[{down(low)}, {up(high)}]"
+
+
+def used(own: InputData, key: str) -> str:
+    """How much of its limits an input uses: 0 % in the middle of them, 100 % at one of them."""
+    share = own.use([key])
+    return UNKNOWN if share is None else f"{up(100 * share, 3)} %"
 
 
 def radii(tube: TubeData) -> str:

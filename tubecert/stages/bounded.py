@@ -19,6 +19,7 @@ from tubecert.claims import (
     ShrinkTube,
     UncertaintyBound,
 )
+from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem, Wind
@@ -38,6 +39,8 @@ from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.stages.tube import TubeFound
 from tubecert.tube import Tube
 from tubecert.verdict import Verdict
+
+_SHARP = 1e-4  # of the width of its limits: how closely u* is enclosed at least
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +93,7 @@ class Bounded:
     geodesics: GeodesicTest
     clearances: tuple[Cleared, ...] = ()
     machine: Machine | None = None
+    inputs: tuple[LimitedInput, ...] = ()
 
     def __post_init__(self) -> None:
         if _endless(self.enclosed) is not None:
@@ -148,6 +152,21 @@ def _bounded(enclosed: Enclosed) -> Bounded:
         geodesics=geodesics,
         machine=machine_of(spec, problem, suprema, geodesics),
         clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
+        inputs=tuple(_limited(enclosed, name, limits) for name, limits in enclosed.question.spec.limits),
+    )
+
+
+def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -> LimitedInput:
+    """What u* does on the plan, in an input with limits."""
+    low, high = limits
+    sharp = _SHARP * float(high - low)
+    least, greatest = enclosed.suprema.input_range(enclosed.question.spec.inputs.index(name), sharp)
+    return LimitedInput(
+        name=name,
+        limits=limits,
+        least=least.printable(),
+        greatest=greatest.printable(),
+        any_plan=enclosed.tube.plan.allowance is not None,
     )
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from tubecert.bounds.constants import DERIVED, Meaning
+from tubecert.conditions.inputs import JudgedInput, LimitedInput
 from tubecert.conditions.problem import Formulas
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
@@ -48,7 +50,21 @@ class Judged:
         if self.as_printed:
             return Verdict.UNDECIDED
         obstacles = [each.verdict for each in self.bounded.clearances if each.obstacle.decides]
-        return overall([*(self.sections[key].verdict for key in self.deciding), *obstacles])
+        inputs = [each.verdict for each in self.inputs]
+        return overall([*(self.sections[key].verdict for key in self.deciding), *obstacles, *inputs])
+
+    @cached_property
+    def inputs(self) -> tuple[JudgedInput, ...]:
+        """What is proven of the inputs that have limits."""
+        return tuple(map(self._judged, self.bounded.inputs))
+
+    def _judged(self, own: LimitedInput) -> JudgedInput:
+        found = {key: own.bound(section.input_shares) for key, section in self.sections.items()}
+        return JudgedInput(
+            input=own,
+            bounds={key: bound for key, bound in found.items() if bound is not None},
+            verdict=own.verdict([found[key] for key in self.deciding]),
+        )
 
     def derived(self) -> dict[str, tuple[Constant, Meaning]]:
         """Constants at the gains found, that the certificate lists beside those of the tube."""

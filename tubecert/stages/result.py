@@ -14,9 +14,12 @@ from tubecert.certificate.result import (
     Bound,
     ClearanceData,
     Geodesics,
+    InputBoundData,
+    InputData,
     MetricData,
     Overrides,
     PlanData,
+    PlanInputData,
     Recipes,
     Result,
     ShapeData,
@@ -33,6 +36,7 @@ from tubecert.certificate.sections import (
     plan_data,
 )
 from tubecert.claims import Reason
+from tubecert.conditions.inputs import JudgedInput
 from tubecert.expression import number_text
 from tubecert.metric.verify import MetricProof
 from tubecert.printable import visible
@@ -100,6 +104,7 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         metric=_metric(reached),
         tube=_tube(reached),
         clearance=() if bounded is None else tuple(map(clearance_data, bounded.clearances)),
+        inputs=() if judged is None else tuple(map(_input_data, judged.inputs)),
         constants=_constants(reached),
         sections={} if judged is None else {key: each.data() for key, each in judged.sections.items()},
         elasticities=None if judged is None else why.elasticities,
@@ -216,6 +221,26 @@ def clearance_data(found: Cleared) -> ClearanceData:
         t=found.found.t,
         shape=ShapeData(diagonal=(shape.first, shape.second), beside=(shape.low, shape.high)),
         inside=found.found.inside,
+    )
+
+
+def _input_data(found: JudgedInput) -> InputData:
+    """An input with limits, as it is written."""
+    own = found.input
+    return InputData(
+        input=own.name,
+        limits=own.limits,
+        verdict=found.verdict,
+        plan=PlanInputData(least=own.least, greatest=own.greatest),
+        bounds={
+            key: InputBoundData(
+                least=bound.least,
+                greatest=bound.greatest,
+                feedback=bound.shares.feedback,
+                adaptation=bound.shares.adaptation,
+            )
+            for key, bound in found.bounds.items()
+        },
     )
 
 

@@ -15,6 +15,7 @@ from tubecert.claims import (
     ConstantBounded,
     Failure,
     GainsSuffice,
+    InputWithinLimits,
     MetricBound,
     MetricContraction,
     MetricDefinite,
@@ -62,8 +63,15 @@ def title(claim: Claim) -> str:
             return f"declared bound of {claim.constant}"
         case ObstacleCleared():
             return f"clearance from obstacle {claim.obstacle}"
+        case InputWithinLimits():
+            return input_title(claim.input)
         case _:
             return _NAMES[type(claim)]
+
+
+def input_title(name: str) -> str:
+    """What the claim is called that an input stays within its limits."""
+    return f"limits of {name}"
 
 
 _NAMES: Mapping[type[Claim], str] = {
@@ -193,6 +201,19 @@ def _cleared(claim: ObstacleCleared, reason: Reason) -> str:
         return "the tube contains a point of the obstacle"
     told = f"the tube keeps away from it by {low:.4g} at least" if low > 0 else "the tube may meet it"
     return f"{told}; at its nearest by {high:.4g}"
+
+
+def _within(claim: InputWithinLimits, reason: Reason) -> str:
+    beyond = f"{'below' if claim.side == 'lower' else 'above'} {float(claim.limit):.6g}"
+    if reason.verdict is Verdict.REFUTED:
+        return f"the plan itself has {claim.input}* = {_reached(claim.plan)}, {beyond}"
+    if claim.reaches is None or claim.feedback is None or claim.adaptation is None:
+        return "no bound of it could be proven"
+    added = f"feedback may add {claim.feedback:.4g}"
+    if claim.adaptation:
+        added += f" and adaptation {claim.adaptation:.4g}"
+    planned = f"{claim.input}* reaches {_reached(claim.plan)}"
+    return f"it may reach {claim.reaches:.6g}, {beyond}: {planned}, to which {added}"
 
 
 # -- gains
@@ -343,5 +364,6 @@ _MESSAGES: Mapping[type[Claim], Callable[[Any, Reason], str]] = {
     UncertaintyBound: _uncertainty_bound,
     GainsSuffice: _suffice,
     ObstacleCleared: _cleared,
+    InputWithinLimits: _within,
     ConditionHolds: _condition,
 }

@@ -15,7 +15,7 @@ from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least
-from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section
+from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
 from tubecert.recheck.metric import stated
 
 
@@ -66,6 +66,11 @@ class Alone(Kind[AloneSection, NoGains]):
     def said(self, section: AloneSection) -> dict[str, object]:
         """The margin."""
         return {} if section.margin is None else {"margins": {self.key: section.margin.below}}
+
+    def shares(self, recipe: NoGains, setting: Setting) -> Shares:
+        """The feedback acts within sup D; nothing adapts."""
+        del recipe
+        return Shares(supremum(setting, setting.n.h), Fraction(0))
 
     def claims(self, section: AloneSection, recipe: NoGains | None, ground: Ground) -> Iterator[Claim]:
         """The margin if it is certified; the bound of the distance and the largest uncertainty in any case."""

@@ -24,7 +24,7 @@ from tubecert.recheck.kinds.bounds import (
     ultimate,
     words,
 )
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import stated
 from tubecert.recheck.predictor import Gains
@@ -114,6 +114,11 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         """The margin."""
         pair = next(iter(section.pairs.values()), None)
         return {} if pair is None else {"margins": {self.key: pair.margin.below}}
+
+    def shares(self, recipe: DistanceRecipe, setting: Setting) -> Shares | None:
+        """Sup D of theorem B."""
+        bound = distance_bound(setting, recipe.gains, recipe.proof)
+        return None if bound is None else Shares(bound.supremum(), recipe.gains.projection_radius)
 
     def claims(
         self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar, Generic, TypeVar
 
+from tubecert.recheck.balls import Ball
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.digital import MachineNumbers
@@ -86,6 +87,14 @@ class Ground:
         return self.specification.hardware
 
 
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """What inputs are bounded by: d(x*, x) <= `distance`, and `radius` bounds what adapts (0: nothing does)."""
+
+    distance: Ball
+    radius: Fraction
+
+
 S = TypeVar("S", bound=Section)
 R = TypeVar("R")
 
@@ -132,6 +141,11 @@ class Kind(ABC, Generic[S, R]):
         """Constants that stand beside those of the tube because of this section, which is not read yet."""
         del node
         return ()
+
+    def shares(self, recipe: R, setting: Setting) -> Shares | None:
+        """What bounds the inputs where the recipe is a proof; None if the theorem does not say."""
+        del recipe, setting
+        return None
 
     def projection_radii(self, section: S) -> Iterator[Fraction]:
         """R_H of every pair of gains that shares its controller with A and B."""

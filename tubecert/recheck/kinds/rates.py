@@ -22,7 +22,7 @@ from tubecert.recheck.kinds.bounds import (
     ultimate,
     words,
 )
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.predictor import Gains
@@ -118,6 +118,10 @@ class Rates(Kind[RateSection, Gains]):
         below = {claim: margin.below for claim, margin in section.pair.margins.items()}
         own: dict[str, object] = {"margins": below, "below_twice_rate": section.below_twice_rate}
         return own if section.binds is None else {**own, "binds": section.binds}
+
+    def shares(self, recipe: Gains, setting: Setting) -> Shares:
+        """Of the distance theorem A says that it stays below dbar."""
+        return Shares(setting.reach, recipe.projection_radius)
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
         """Predictor, constants, margins, radius, curve."""

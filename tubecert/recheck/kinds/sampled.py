@@ -15,7 +15,7 @@ from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Statements
+from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.sampling import SampledGains, sampled_margin
 
@@ -68,6 +68,11 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
             return {}
         margins = {self.key: section.margin.below}
         return {"margins": margins, "predictor_gain": section.pair.predictor_gain}
+
+    def shares(self, recipe: SampledRecipe, setting: Setting) -> Shares:
+        """max(d0, d1, sup D) of theorem C."""
+        margin, _ = sampled_margin(setting, recipe.gains, exact(recipe.speed))
+        return Shares((1 - margin) * setting.reach, recipe.gains.projection_radius)
 
     def claims(
         self, section: SampledSection, recipe: SampledRecipe | None, ground: Ground

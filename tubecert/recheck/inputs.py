@@ -1,0 +1,130 @@
+"""Inputs with limits: u* on the plan, and what the loop of each kind adds to it at most. Implements: theory 4d.
+
+In: what a certificate states of every input that has limits. Out: claims. u_i stays in [inf u*_i - du D - R, sup u*_i +
+du D + R], where d(x*, x) <= D by the theorem of the kind and R is the radius of its projection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.recheck.balls import Ball
+from tubecert.recheck.conditions import Setting
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.document import Node
+from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.kinds.bounds import all_of, at_most
+from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
+from tubecert.recheck.kinds.table import KEYS
+from tubecert.recheck.metric import stated, together
+from tubecert.recheck.place import Place
+from tubecert.recheck.specification import Range
+from tubecert.recheck.statements import NotNegative
+from tubecert.recheck.terms import number
+
+
+@dataclass(frozen=True, slots=True)
+class InputBound:
+    """What is stated of an input in the loop of one kind."""
+
+    least: Fraction
+    greatest: Fraction
+    feedback: Fraction
+    adaptation: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Limited:
+    """What is stated of an input that has limits; `bounds` by the key of the kind."""
+
+    name: str
+    limits: Range
+    verdict: str
+    least: Enclosure
+    greatest: Enclosure
+    bounds: Mapping[str, InputBound]
+
+
+def read_limited(node: Node) -> Limited:
+    """One of `result.inputs`."""
+    own = node.closed("input", "limits", "verdict", "plan", "bounds")
+    low, high = own["limits"].pair()
+    plan = own["plan"].closed("least", "greatest")
+    bounds = own["bounds"].closed(optional=KEYS)
+    return Limited(
+        name=own["input"].text(),
+        limits=(low.decimal(), high.decimal()),
+        verdict=own["verdict"].word(*VERDICTS),
+        least=enclosure(plan["least"]),
+        greatest=enclosure(plan["greatest"]),
+        bounds={key: found for key in KEYS if (found := bounds.get(key, _bound)) is not None},
+    )
+
+
+def _bound(node: Node) -> InputBound:
+    own = node.closed("least", "greatest", "feedback", "adaptation")
+    least, greatest, feedback, adaptation = (
+        own[key].number() for key in ("least", "greatest", "feedback", "adaptation")
+    )
+    return InputBound(least, greatest, feedback, adaptation)
+
+
+def agrees(
+    limits: Mapping[str, Range],
+    found: Sequence[Limited],
+    sections: Mapping[str, Section],
+    deciding: Collection[str],
+) -> Statements:
+    """Every input with limits has its entry, and stays within them in the loop of every kind that decides."""
+    yield tuple(limits) == tuple(own.name for own in found), "inputs are not those that have limits"
+    for own in found:
+        yield (
+            own.limits == limits.get(own.name),
+            f"inputs: the limits of {own.name} are not the specification's",
+        )
+        yield own.verdict == "certified", f"{own.name} is not certified to stay within its limits"
+        yield own.least.is_interval and own.greatest.is_interval, "what u* does is not an interval"
+        yield set(deciding) <= own.bounds.keys(), f"{own.name} has no bound by a kind that decides"
+        low, high = own.limits
+        for key, bound in own.bounds.items():
+            yield (
+                sections[key].verdict == "certified",
+                f"{own.name} is bounded by {key}, which is not certified",
+            )
+            inside = key not in deciding or (low <= bound.least and bound.greatest <= high)
+            yield inside, f"{own.name} is not within its limits by {key}"
+            yield _is_sum(own, bound), f"the bound of {own.name} by {key} is not what it consists of"
+
+
+def _is_sum(own: Limited, bound: InputBound) -> bool:
+    """Whether a bound leaves room for u* on the plan and for all that is added."""
+    least, greatest, added = own.least.below, own.greatest.above, bound.feedback + bound.adaptation
+    if least is None or greatest is None or min(bound.feedback, bound.adaptation) < 0:
+        return False
+    return bound.least <= least - added and greatest + added <= bound.greatest
+
+
+def on_plan(place: Place, own: Limited) -> Outcome:
+    """u* of the input stays in the range that is stated, at all times of the plan."""
+    low, high = own.least.below, own.greatest.above
+    if low is None or high is None:
+        return stated(False, "no range is stated")
+    u = place.curve.u[place.system.inputs.index(own.name)]
+    sides = (u - number(low), number(high) - u)
+    return together([place.along(lambda room=room: NotNegative(room, place.numbers)) for room in sides])  # type: ignore[misc]
+
+
+def added(setting: Setting, shares: Shares | None, bounds: Sequence[InputBound]) -> Outcome:
+    """What feedback and adaptation add is at most what is stated with every input."""
+    if shares is None:
+        return Outcome(verdict="undecided", why="this kind says nothing of inputs")
+    feedback = setting.n.feedback_gain * shares.distance
+    return all_of(_outcomes(bounds, feedback, shares.radius))
+
+
+def _outcomes(bounds: Sequence[InputBound], feedback: Ball, radius: Fraction) -> Iterator[Outcome]:
+    for bound in bounds:
+        yield at_most(feedback, bound.feedback, "what feedback adds")
+        yield stated(radius <= bound.adaptation, "adaptation may add more: R_H")
