@@ -30,7 +30,8 @@ def shares(n: Numbers[Interval], distance: Interval, radius: Fraction | None) ->
 
     The radius is None for a loop that does not adapt.
     """
-    feedback = float((n.du * distance).hi)
+    nothing = bool(n.du.hi <= 0)  # a product of 0 is rounded up from it
+    feedback = 0.0 if nothing else float((n.du * distance).hi)
     if not isfinite(feedback):
         return None
     adaptation = 0.0 if radius is None else printable_above(radius)
