@@ -48,6 +48,11 @@ def rounded_higher(old, new):
     return new is None or (number(old) and higher(old * (1 - 1e-8), new))
 
 
+def rounded_lower(old, new):
+    """A bound from below that is rounded down by more than this."""
+    return new is None or (number(old) and lower(old + 1e-8 * abs(old), new))
+
+
 def verified(old, new):
     """Numbers of a point or pair or plan that are examined anew as they stand."""
     return number(new) or isinstance(new, str) or new is None
@@ -97,6 +102,12 @@ HARMLESS = [
     (r"(conditions_26|no_adaptation)\.shortfalls.*", anything),
     (r"clearance\[\]\.(t|inside|clearance\[1\])", anything),
     (r"clearance\[\]\.clearance\[0\]", verified),  # it is found to a thousandth of the width of the tube
+    (r"inputs\[\]\.plan\.(least\[1\]|greatest\[0\])", anything),
+    (r"inputs\[\]\.plan\.least\[0\]", lower),
+    (r"inputs\[\]\.plan\.greatest\[1\]", higher),
+    (r"inputs\[\]\.bounds\.\w+\.least", rounded_lower),
+    (r"inputs\[\]\.bounds\.\w+\.(greatest|feedback|adaptation)", rounded_higher),
+    (r"inputs\[\]\.bounds\.\w+", anything),  # of a kind that does not decide
     (r"clearance\[\]\.shape\.\w+\[\]", verified),
 ]
 # geodesics of a constant metric are straight lines whatever is said of a test: the words of the assumption are the same

@@ -3,6 +3,7 @@
 import copy
 
 import pytest
+import tampers
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
 
 from tubecert.errors import TubecertError
@@ -235,3 +236,16 @@ def test_the_orbit_is_confirmed_and_less_is_not():
         forged = copy.deepcopy(made)
         FAULTS[fault](forged["result"])
         assert refused(forged), fault
+
+
+@pytest.mark.slow
+def test_no_random_change_of_what_is_stated_of_inputs_is_confirmed(monkeypatch):
+    made, fields = certified(ONE + LIMITS, conditions="distance"), tampers.fields
+    monkeypatch.setattr(
+        tampers,
+        "fields",
+        lambda r: {name: paths for name, paths in fields(r).items() if name.startswith("inputs")},
+    )
+    refusals, _, wrong = tampers.campaign(made, 300, seed=7)
+    assert wrong == []
+    assert refusals > 200
