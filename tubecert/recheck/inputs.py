@@ -20,7 +20,7 @@ from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
-from tubecert.recheck.specification import Range
+from tubecert.recheck.specified.numbers import Range
 from tubecert.recheck.statements import NotNegative
 from tubecert.recheck.terms import number
 
