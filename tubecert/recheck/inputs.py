@@ -89,10 +89,9 @@ def agrees(
         yield set(deciding) <= own.bounds.keys(), f"{own.name} has no bound by a kind that decides"
         low, high = own.limits
         for key, bound in own.bounds.items():
-            yield (
-                sections[key].verdict == "certified",
-                f"{own.name} is bounded by {key}, which is not certified",
-            )
+            by = sections.get(key)
+            proven = by is not None and by.verdict == "certified"
+            yield proven, f"{own.name} is bounded by {key}, which is not certified"
             inside = key not in deciding or (low <= bound.least and bound.greatest <= high)
             yield inside, f"{own.name} is not within its limits by {key}"
             yield _is_sum(own, bound), f"the bound of {own.name} by {key} is not what it consists of"
