@@ -10,13 +10,14 @@ from __future__ import annotations
 import multiprocessing
 import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+Ready = Callable[[], None] | None
 
 
 class WorkerError(RuntimeError):
@@ -26,8 +27,8 @@ class WorkerError(RuntimeError):
 class Executor(Protocol):
     """Something that applies a function to items."""
 
-    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """The results, in the order of the items."""
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
+        """The results, in the order of the items; `ready` is called here, once for each piece that is done."""
         ...
 
 
@@ -35,9 +36,14 @@ class Executor(Protocol):
 class Serial:
     """One after the other, in this process."""
 
-    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
         """The results, in the order of the items."""
-        return [function(item) for item in items]
+        found = []
+        for item in items:
+            found.append(function(item))
+            if ready is not None:
+                ready()
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +52,18 @@ class Processes:
 
     workers: int
 
-    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
         """The results, in the order of the items."""
         before = set(multiprocessing.active_children())
         context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
         pool = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts)
         try:
-            return [task.result() for task in [pool.submit(function, item) for item in items]]
+            tasks = [pool.submit(function, item) for item in items]
+            if ready is not None:
+                for task in as_completed(tasks):
+                    task.result()
+                    ready()
+            return [task.result() for task in tasks]
         except BrokenProcessPool:
             message = (
                 "a worker ended in the middle of its work: killed, or out of memory; fewer --jobs need less"

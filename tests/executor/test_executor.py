@@ -54,6 +54,9 @@ def nobody_is_left() -> bool:
 def test_results_are_in_the_order_of_the_items(executor):
     assert executor.map(slow_first, range(5)) == [0, 1, 4, 9, 16]
     assert executor.map(slow_first, []) == []
+    done: list[int] = []
+    assert executor.map(slow_first, range(3), lambda: done.append(len(done))) == [0, 1, 4]
+    assert done == [0, 1, 2]
     assert nobody_is_left()
 
 
@@ -61,6 +64,8 @@ def test_results_are_in_the_order_of_the_items(executor):
 def test_an_exception_of_a_piece_is_raised(executor):
     with pytest.raises(ZeroDivisionError, match="of a worker"):
         executor.map(failing, range(50))
+    with pytest.raises(ZeroDivisionError, match="of a worker"):
+        executor.map(failing, range(50), lambda: None)
     assert nobody_is_left()
 
 

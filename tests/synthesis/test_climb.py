@@ -297,6 +297,6 @@ def test_advice_costs_no_more_than_the_search():
         return spent[0]
 
     run.ladder.cheap = cheap
-    found = run.run(sweep=False)
+    found = run.run(table=False)
     assert found.reason.relax
     assert spent[0].rounds <= max(run.ladder.rounds, 30)

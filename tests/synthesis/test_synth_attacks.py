@@ -241,7 +241,7 @@ def test_the_greatest_margin_falls_back_on_the_metric_at_the_rate(monkeypatch):
     """A metric of a larger rate whose second proof fails is not the end."""
     run = synthesis.SynthesisRun(load_text(small()), WISHES["margin"], Options(), pipeline.certify, None)
     monkeypatch.setattr(synthesis.SynthesisRun, "_at_rate", lambda self, metric, rate: None)
-    found = run.run(sweep=False)
+    found = run.run(table=False)
     assert found.verdict == "certified"
     assert found.file.rate == Fraction(1, 2)
 

@@ -398,7 +398,7 @@ def test_the_shipped_metric_is_proven_where_the_tube_is():
 
 
 def test_a_plot_that_is_no_svg_is_refused(tmp_path):
-    done = synth(ROOT / "configs" / "two_state.yaml", "--rate", "1", "--plot", tmp_path / "sweep.pdf")
+    done = synth(ROOT / "configs" / "two_state.yaml", "--rate", "1", "--plot", tmp_path / "rates.pdf")
     assert done.exit_code == 2
     assert "drawn as SVG" in done.output
     assert not list(tmp_path.iterdir())
@@ -406,7 +406,7 @@ def test_a_plot_that_is_no_svg_is_refused(tmp_path):
 
 @pytest.mark.slow
 def test_the_end_to_end_objective_compares_certificates(tmp_path):
-    plot = tmp_path / "sweep.svg"
+    plot = tmp_path / "rates.svg"
     spec = ROOT / "configs" / "two_state_orbit.yaml"
     done = synth(
         spec,

@@ -92,6 +92,10 @@ _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
         ("--rate", "--lambda"), "the rate belongs to the metric: metric.rate, or tubecert synth --rate"
     ),
+    **dict.fromkeys(
+        ("--sweep",),
+        "a table of metrics over rates is --table; tubecert sweep goes through ranges of any key of the specification",
+    ),
     **dict.fromkeys(("--x0",), "the start is initial_state in the specification"),
 }
 """Names that options have in the literature or elsewhere."""

@@ -49,14 +49,14 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
             wanted,
             options_of(system, numbers),
             report,
-            sweep=bool(given["sweep"] or given["plot"]),
+            table=bool(given["table"] or given["plot"]),
             deadline=deadline_after(numbers.deadline),
             told=lambda so_far: _tell(so_far, system, terminal, output),
         )
     if found.file is not None and target != certificate.STDOUT:
         certificate.write(target, found.file.to_json())
     if given["plot"] and found.rows:
-        from tubecert.report.sweep import draw
+        from tubecert.report.figures_rates import draw
 
         certificate.write_text(given["plot"], draw(found.data().table))
     _report(found, system, target, output)

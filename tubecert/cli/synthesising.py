@@ -14,7 +14,7 @@ _AFTER = """\b
 Examples:
   tubecert synth plant.yaml
   tubecert synth plant.yaml --rate 0.8 -o metric.json
-  tubecert synth plant.yaml --objective adaptation --plot sweep.svg
+  tubecert synth plant.yaml --objective adaptation --plot rates.svg
   tubecert synth plant.yaml --rate 0.8 --solver cvxpy:MOSEK
   tubecert certify plant.yaml --metric metric.json
 
@@ -89,9 +89,9 @@ def synth(
             help="Which solver proposes; NAME: one that cvxpy knows.  [clarabel]",
         ),
     ] = None,
-    sweep: Annotated[bool, typer.Option("--sweep", help="Compare metrics over a range of rates.")] = False,
+    table: Annotated[bool, typer.Option("--table", help="Compare metrics over a range of rates.")] = False,
     plot: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --sweep.")
+        str | None, typer.Option(metavar="FILE", help="Draw the comparison (SVG); implies --table.")
     ] = None,
     set_: Settings = None,
     rho_a: Annotated[str | None, number_option("--rho-a", "Overrides tube.rho_a.")] = None,

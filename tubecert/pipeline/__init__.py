@@ -94,11 +94,11 @@ def synthesise(
     options: Options,
     progress: Progress | None = None,
     *,
-    sweep: bool = False,
+    table: bool = False,
     deadline: Deadline | None = None,
     told: Callable[[Synthesised], None] | None = None,
 ) -> Synthesised:
-    """A proven metric for a specification, or why there is none; with `sweep` others over a range of rates beside it.
+    """A proven metric for a specification, or why there is none; with `table` others over a range of rates beside it.
 
     `told` hears why there is none before advice is looked for. At the `deadline`, and at an interruption, the best that
     was proven by then is what comes out (`Synthesised.cut`).
@@ -111,4 +111,4 @@ def synthesise(
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
     run = SynthesisRun(spec, wanted, options, question_of, progress, deadline=deadline, told=told)
-    return run.run(sweep=sweep)
+    return run.run(table=table)

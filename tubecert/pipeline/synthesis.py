@@ -1,4 +1,4 @@
-"""Synthesis of a metric for a specification: objectives, the sweep over rates, the metric file, and why there is none.
+"""Synthesis of a metric for a specification: objectives, the table over rates, the metric file, and why there is none.
 
 The ladder of `tubecert.synthesis` finds metrics at given rates; here they are compared by what the user wants in the
 end, which for `adaptation` and `tube` is a certification with each of them. What is returned was read back from the
@@ -67,7 +67,7 @@ from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
-_RATES = 5  # of a sweep
+_RATES = 5  # of a table
 _GAP = Fraction(1, 5)  # to which constants are known where metrics are compared
 _BOXES = 100_000  # and what each claim may cost there
 
@@ -123,7 +123,7 @@ class SynthesisRun:
         self.cut: Literal["deadline", "interrupted"] | None = None
         self.said = 0
 
-    def run(self, *, sweep: bool) -> Synthesised:
+    def run(self, *, table: bool) -> Synthesised:
         """The metric that was asked for, or why there is none."""
         rank = rank_decision(self.model, self.spec.safe_set, self.effort)
         if rank.verdict is not Verdict.CERTIFIED:
@@ -144,8 +144,8 @@ class SynthesisRun:
             best = self._so_far(end)
         if best is None:
             return self._explained()
-        if sweep and not self.rows and not self.cut:
-            self._sweep(best.rate)
+        if table and not self.rows and not self.cut:
+            self._over_rates(best.rate)
         return self._written(best)
 
     def _so_far(self, end: BaseException) -> VerifiedMetric | None:
@@ -216,7 +216,7 @@ class SynthesisRun:
         if missing:
             raise SpecError(missing)
 
-    def _sweep(self, last: Fraction) -> None:
+    def _over_rates(self, last: Fraction) -> None:
         for k in range(_RATES):
             for floor in FLOORS:
                 self._compare(digits_below(last / 2**k, 3), floor, full=True)

@@ -9,7 +9,8 @@ no; numbers are not computed here, they are only shown.
 | `findings` | findings as text and as data |
 | `numbers`, `gains` | how numbers, and the gains of the three certificates, are shown |
 | `console`, `sections` | the report of a certification |
-| `synthesis`, `simulation`, `sweep` | the reports of synth and simulate; metrics compared, drawn |
+| `synthesis`, `simulation` | the reports of synth and simulate |
+| `figures_rates` | the metrics that a synthesis compared, drawn over the rate |
 | `layout` | parts, titles and tables on a terminal |
 | `page`, `page_*`, `figures_*` | a certificate as a page with figures; `html` and `markdown` show it |
 | `github`, `junit`, `sarif` | findings for other programs |
