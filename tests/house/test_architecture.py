@@ -48,6 +48,7 @@ ROOMS = [
     "simulate",
     "pipeline",
     "checking",
+    "sweep",
     "report",
     "library",
     "cli",

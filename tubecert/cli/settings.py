@@ -44,8 +44,6 @@ def _texts(value: object) -> list[str]:
 
 
 def _twice(setting: Setting, option: str, key: str) -> Finding:
-    place = NamedPlace(
-        file=f"--set {setting.path}", line=1, column=1, source=str(setting), width=len(setting.path)
-    )
+    place = NamedPlace(file=setting.place, line=1, column=1, source=str(setting), width=len(setting.path))
     message = f"{option} is given, too, and says what {key} is"
     return Finding(code="TC104", message=message, location=place, help="keep one of them")

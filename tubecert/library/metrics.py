@@ -223,7 +223,7 @@ def synthesise(
     coordinates: str | None = None,
     route: str | None = None,
     solver: str | None = None,
-    sweep: bool = False,
+    table: bool = False,
     rho_a: Number | None = None,
     epsilon: Number | None = None,
     budget: int | None = None,
@@ -261,7 +261,7 @@ def synthesise(
         wanted_of(system, wishes, str),
         options_of(system, numbers),
         progress,
-        sweep=sweep,
+        table=table,
         deadline=None if seconds is None else pipeline.Deadline.after(float(seconds)),
     )
     if found.cut == "interrupted" and found.file is None:

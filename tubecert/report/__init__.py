@@ -10,6 +10,9 @@ no; numbers are not computed here, they are only shown.
 | `numbers`, `gains` | how numbers, and the gains of the three certificates, are shown |
 | `console`, `sections` | the report of a certification |
 | `synthesis`, `simulation` | the reports of synth and simulate |
+| `quantities` | the numbers of a certificate as a flat list |
+| `sweep`, `sweep_page`, `figures_sweep` | sweeps: table, page, curves and heat maps |
+| `figures_file` | figures as files of their own |
 | `figures_rates` | the metrics that a synthesis compared, drawn over the rate |
 | `layout` | parts, titles and tables on a terminal |
 | `page`, `page_*`, `figures_*` | a certificate as a page with figures; `html` and `markdown` show it |

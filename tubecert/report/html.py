@@ -10,7 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.result import Certificate
-from tubecert.report.page import typeset
+from tubecert.report.page import Page, typeset
 from tubecert.report.page_sections import page_of
 
 if TYPE_CHECKING:
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
 def render(certificate: Certificate) -> str:
     """The page of a certificate."""
-    return environment().get_template("page.html").render(page=page_of(certificate)) + "\n"
+    return render_page(page_of(certificate))
+
+
+def render_page(page: Page) -> str:
+    """The text of a page."""
+    return environment().get_template("page.html").render(page=page) + "\n"
 
 
 @cache

@@ -30,11 +30,16 @@ _AT_START = re.compile(
 
 def render(certificate: Certificate) -> str:
     """The page of a certificate."""
-    return "\n".join(_lines(page_of(certificate))).rstrip() + "\n"
+    return render_page(page_of(certificate))
+
+
+def render_page(page: Page) -> str:
+    """The text of a page."""
+    return "\n".join(_lines(page)).rstrip() + "\n"
 
 
 def _lines(page: Page) -> Iterator[str]:
-    yield f"# {escape(page.name)}: {escape(page.verdict)}"
+    yield f"# {escape(page.name)}: {escape(page.verdict or page.about)}"
     yield ""
     yield f"**{escape(page.summary)}**"
     yield ""

@@ -128,11 +128,12 @@ class Page:
     """The whole page: the verdict, what it means, the numbers it is about, and everything one may ask next."""
 
     name: str
-    verdict: str
+    verdict: str  # empty where the page is about several
     summary: str
     meaning: str
     tiles: tuple[Tile, ...]
     sections: tuple[Section, ...]
+    about: str = "certificate"
 
 
 def typeset(text: str) -> str:

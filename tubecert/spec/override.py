@@ -33,10 +33,11 @@ _OWN_NAMES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """A key, by its dotted path, and the text that stands in the place of its value."""
+    """A key, by its dotted path, and the text that stands in the place of its value; `option` is who says so."""
 
     path: str
     text: str
+    option: str = field(default=OPTION, compare=False)
 
     @classmethod
     def of(cls, words: str, option: str = OPTION) -> Setting:
@@ -51,7 +52,12 @@ class Setting:
         if not _PATH.fullmatch(path):
             help = "join keys by dots, and number the entries of lists from 0: initial_state.at[0]"
             _refuse(source, codes.UNKNOWN_KEY, f"{path[:60]!r} is no path of a key", help)
-        return cls(path=path, text=text)
+        return cls(path=path, text=text, option=option)
+
+    @property
+    def place(self) -> str:
+        """What findings name in place of a file."""
+        return f"{self.option} {self.path}"
 
     def meets(self, path: str) -> bool:
         """Whether this sets the key at a path, a part of it, or what it is a part of."""
@@ -81,7 +87,7 @@ class _Put:
     source: Source = field(init=False)
 
     def __post_init__(self) -> None:
-        self.source = _OptionText.of(f"{OPTION} {self.setting.path}", str(self.setting))
+        self.source = _OptionText.of(self.setting.place, str(self.setting))
 
     def within(self, node: Node) -> Node:
         """The tree with the value in its place; as it was, with a finding, where there is no such place."""
@@ -170,7 +176,7 @@ def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, li
     for index, setting in enumerate(settings):
         other = next((each for each in settings[:index] if setting.meets(each.path)), None)
         if other is not None:
-            source = _OptionText.of(f"{OPTION} {setting.path}", str(setting))
+            source = _OptionText.of(setting.place, str(setting))
             message = (
                 f"{setting.path} is set twice" if other.path == setting.path else f"{other.path} is set, too"
             )

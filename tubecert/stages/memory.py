@@ -16,10 +16,14 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Memory:
-    """Values by what was computed and from what; `computed` counts what was not found, by name."""
+    """Values by what was computed and from what; `computed` counts what was not found, by name.
+
+    With `most`, so many are kept: those that were computed last.
+    """
 
     kept: dict[tuple[str, str], Any] = field(default_factory=dict)
     computed: dict[str, int] = field(default_factory=dict)
+    most: int | None = None
 
     def recall(self, name: str, depends_on: Mapping[str, Any], compute: Callable[[], T]) -> T:
         """The value that `compute` gives, which depends on `depends_on` (JSON data) and nothing else."""
@@ -27,5 +31,7 @@ class Memory:
         if key not in self.kept:
             self.kept[key] = compute()
             self.computed[name] = self.computed.get(name, 0) + 1
+            if self.most is not None and len(self.kept) > self.most:
+                del self.kept[next(key for key in self.kept)]
         value: T = self.kept[key]
         return value

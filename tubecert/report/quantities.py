@@ -1,0 +1,140 @@
+"""The numbers of a certificate as a flat list, so that certificates can be put beside each other.
+
+In: a `Result`. Out: `Quantity`s: `rho`, `half_width.px`, `distance.least_adaptation.bandwidth`. Those of a kind begin
+with the name of its section; its gains and margins are what the section tells (`SectionData.pairs`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from math import isfinite
+
+from tubecert.certificate.result import Result
+from tubecert.claims import Claim
+from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.table import KINDS
+from tubecert.verdict import Verdict
+from tubecert.words.conditions import ROLES, SECTIONS, condition_name
+
+Value = Fraction | float | str | None
+_SYMBOLS = {
+    "bandwidth": "ω (rad/s)",
+    "adaptation_rate": "Γ",
+    "sample_time": "Ts (s)",
+    "ultimate_radius": "in the long run",
+    "rate": "λ (1/s)",
+}
+_DETAILS = ("section", "condition", "constant", "state", "obstacle")  # of a claim, that tell which one it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A number (or a word) of a certificate: `section` is the kind it belongs to, `role` the set of gains.
+
+    `share`: it is a margin, a share of what is allowed.
+    """
+
+    name: str
+    value: Value
+    section: str = ""
+    role: str = ""
+    share: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its name among all, by dotted path."""
+        return ".".join(part for part in (self.section, self.role, self.name) if part)
+
+    @property
+    def number(self) -> float | None:
+        """The value, to be drawn."""
+        if self.value is None or isinstance(self.value, str) or not isfinite(self.value):
+            return None
+        return float(self.value)
+
+    @property
+    def words(self) -> str:
+        """What it is called in tables and figures."""
+        what = self.name.rpartition(".")[2] if self.share else self.name
+        what = (
+            f"margin {condition_name(what)}"
+            if self.share
+            else _SYMBOLS.get(what, what.replace("_", " ").replace(".", " of "))
+        )
+        role = next(
+            (words for role, words in ROLES.items() if role == self.role), self.role.replace("_", " ")
+        )
+        parts = [SECTIONS.get(self.section, self.section), "" if self.role == "feedback" else role, what]
+        return ", ".join(part for part in parts if part)
+
+
+def quantities(result: Result) -> Iterator[Quantity]:
+    """Every quantity, the tube's first, then kind after kind."""
+    yield from _of_tube(result)
+    for kind in KINDS:
+        section = result.sections.get(kind.key)
+        if section is not None:
+            yield from _of_section(kind.key, section, asked=result.asked)
+
+
+def failed(result: Result) -> str:
+    """What is not proven, by ids: claims of the verdict, each with what tells which one it is."""
+    found = [_id(reason.claim) for reason in result.reasons if reason.verdict is not Verdict.CERTIFIED]
+    return " ".join(dict.fromkeys(found))
+
+
+def _of_tube(result: Result) -> Iterator[Quantity]:
+    tube = result.tube
+    if result.metric is not None:
+        yield Quantity(name="rate", value=result.metric.rate)
+    if tube is not None:
+        for name in ("epsilon", "rho_a", "rho", "rho_r"):
+            yield Quantity(name=name, value=getattr(tube, name))
+        for state in result.spec.effective.system.states if tube.half_widths is not None else ():
+            yield Quantity(name=f"half_width.{state}", value=(tube.half_widths or {})[state])
+    for index, found in enumerate(result.clearance):
+        yield Quantity(name=f"clearance.{index}", value=found.clearance.below)
+
+
+def _of_section(key: str, section: SectionData, *, asked: bool) -> Iterator[Quantity]:
+    yield Quantity(section=key, name="verdict", value=str(section.verdict))
+    conditions = dict.fromkeys(item.condition for item in section.shortfalls)
+    yield Quantity(section=key, name="failed", value=" ".join(conditions) or None)
+    for pair in section.pairs(asked=asked):
+        yield from _of_pair(key, pair)
+    for item in fields(section):
+        value = getattr(section, item.name)
+        if isinstance(value, float):
+            yield Quantity(section=key, name=item.name, value=value)
+
+
+def _of_pair(key: str, pair: Pair) -> Iterator[Quantity]:
+    for item in fields(pair):
+        value = getattr(pair, item.name)
+        if isinstance(value, (Fraction, float)):
+            yield Quantity(section=key, role=pair.role, name=item.name, value=value)
+    for condition, margin in pair.margins.items():
+        yield Quantity(
+            section=key, role=pair.role, name=f"margin.{condition}", value=margin.below, share=True
+        )
+
+
+def _id(claim: Claim) -> str:
+    details = [str(getattr(claim, name)) for name in _DETAILS if getattr(claim, name, None) is not None]
+    return ":".join(dict.fromkeys([claim.tag, *details]))
+
+
+def merged(rows: Iterable[Iterable[Quantity]]) -> list[Quantity]:
+    """Every quantity that a row has, once (without a value), in the order in which rows have them."""
+    order: list[str] = []
+    first: dict[str, Quantity] = {}
+    for row in rows:
+        before = 0
+        for each in row:
+            if each.key not in first:
+                first[each.key] = each
+                order.insert(before, each.key)
+            before = order.index(each.key) + 1
+    return [first[key] for key in order]

@@ -1,0 +1,172 @@
+"""The table of a sweep: a row for every point, from what is kept of it; nothing is computed again."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO, StringIO
+from typing import TYPE_CHECKING, Final
+
+from rich.text import Text
+
+from tubecert.certificate.result import Certificate
+from tubecert.report.console import STYLES
+from tubecert.report.gains import deciding
+from tubecert.report.layout import plain_table
+from tubecert.report.numbers import exact, up
+from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
+from tubecert.sweep.grid import Axis
+from tubecert.sweep.point import Failed, Point
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+ERROR: Final = "error"
+_SHOWN: Final = 40  # rows on a terminal
+_OWN: Final = ("verdict", "failed", "certificate")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A point: the values of its keys, the verdict (or `error`), the ids of what is not proven, and its quantities."""
+
+    point: Point
+    verdict: str
+    failed: str
+    why: str
+    found: Mapping[str, Quantity]
+    gains: str = ""
+    broken: bool = False  # by a defect of tubecert
+
+    @classmethod
+    def of(cls, point: Point, outcome: Certificate | Failed) -> Row:
+        """The row of what is kept."""
+        if isinstance(outcome, Failed):
+            codes = " ".join(dict.fromkeys(item.code or "internal" for item in outcome.problems))
+            why = "; ".join(item.message for item in outcome.problems)
+            return cls(point=point, verdict=ERROR, failed=codes, why=why, found={}, broken=outcome.broken)
+        result = outcome.result
+        return cls(
+            point=point,
+            verdict=str(result.verdict),
+            failed=failed(result),
+            why="",
+            found={each.key: each for each in quantities(result)},
+            gains="; ".join(row.text() for row in deciding(result)),
+        )
+
+    @property
+    def file(self) -> str:
+        """The file that is kept, in the folder of the sweep."""
+        return f"points/{self.point.name}.{'error' if self.verdict == ERROR else 'certificate'}.json"
+
+    def value(self, key: str) -> Value:
+        """A quantity; None where this point has none."""
+        found = self.found.get(key)
+        return None if found is None else found.value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepTable:
+    """All rows, in the order of the points, and the quantities that any of them has."""
+
+    name: str
+    axes: tuple[Axis, ...]
+    rows: tuple[Row, ...]
+    columns: tuple[Quantity, ...]
+
+    @classmethod
+    def of(
+        cls, name: str, axes: Sequence[Axis], outcomes: Iterable[tuple[Point, Certificate | Failed]]
+    ) -> SweepTable:
+        """The table of what is kept."""
+        rows = tuple(Row.of(point, outcome) for point, outcome in outcomes)
+        columns = tuple(merged(row.found.values() for row in rows))
+        return cls(name=name, axes=tuple(axes), rows=rows, columns=columns)
+
+    @property
+    def header(self) -> list[str]:
+        """The names of the columns."""
+        keys = [axis.path for axis in self.axes]
+        return [*keys, "verdict", "failed", *(each.key for each in self.columns), "certificate"]
+
+    def cells(self) -> Iterable[list[Value]]:
+        """The values of every row, in the order of the columns."""
+        for row in self.rows:
+            keys = [each.text for each in row.point.settings]
+            yield [*keys, row.verdict, row.failed, *(row.value(each.key) for each in self.columns), row.file]
+
+    def count(self, verdict: str) -> int:
+        """How many points have a verdict."""
+        return sum(row.verdict == verdict for row in self.rows)
+
+    def csv(self) -> str:
+        """As comma-separated values; what a point has not is empty."""
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.header)
+        for cells in self.cells():
+            writer.writerow(
+                "" if cell is None else cell if isinstance(cell, str) else exact(cell) for cell in cells
+            )
+        return text.getvalue()
+
+    def parquet(self) -> bytes:
+        """As Parquet, with numbers as floats; needs pyarrow."""
+        import pyarrow  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        import pyarrow.parquet  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+        columns = list(zip(*self.cells(), strict=True))
+        data = {
+            name: pyarrow.array(_told(values, axis))
+            for name, values, axis in zip(
+                self.header, columns, [*self.axes, *[None] * (len(columns) - len(self.axes))], strict=True
+            )
+        }
+        target = BytesIO()
+        pyarrow.parquet.write_table(pyarrow.table(data), target, compression="snappy")
+        return target.getvalue()
+
+
+def can_write_parquet() -> bool:
+    """Whether pyarrow is installed, which is no part of tubecert."""
+    return importlib.util.find_spec("pyarrow") is not None
+
+
+def _told(values: Sequence[Value], axis: Axis | None) -> list[float | str | None]:
+    """A column: words as they are, numbers as floats; swept keys are numbers where all are."""
+    if axis is not None and axis.numbers is not None:
+        numbers = dict(zip(axis.texts, axis.numbers, strict=True))
+        return [numbers[str(value)] for value in values]
+    return [value if value is None or isinstance(value, str) else float(value) for value in values]
+
+
+def summary(table: SweepTable) -> Text:
+    """How many points came to what, on one line."""
+    line = Text()
+    line.append(f"{table.name}: {len(table.rows)} points", style="bold")
+    counts = [(verdict, table.count(str(verdict))) for verdict in STYLES]
+    for verdict, count in counts:
+        if count:
+            line.append(f", {count} ").append(str(verdict), style=STYLES[verdict])
+    errors = table.count(ERROR)
+    if errors:
+        line.append(f", {errors} ").append("invalid or broken", style="bold red")
+    return line
+
+
+def report(table: SweepTable, files: Sequence[str]) -> list[RenderableType]:
+    """The summary, the first rows, and what was written."""
+    keys = [f">{axis.path}" for axis in table.axes]
+    rows = plain_table(*keys, "verdict", ">rho", "gains", wrapped=len(keys) + 2)
+    for row in table.rows[:_SHOWN]:
+        own = [each.text for each in row.point.settings]
+        rho = row.value("rho")
+        said = row.gains if not row.failed else row.why or row.failed
+        rows.add_row(*own, row.verdict, "" if rho is None or isinstance(rho, str) else up(rho), Text(said))
+    parts: list[RenderableType] = [summary(table), Text(), rows]
+    if len(table.rows) > _SHOWN:
+        parts.append(Text(f"... and {len(table.rows) - _SHOWN} more, in the table", style="dim"))
+    return [*parts, Text(), *(Text(file, no_wrap=True, overflow="ignore") for file in files)]
