@@ -62,9 +62,12 @@ def test_a_linear_system_with_a_constant_metric(linear):
     tight(linear.drift_slope_metric(), np.linalg.norm(theta @ A @ back, 2))
     tight(linear.drift_difference(), 0.5 * np.linalg.norm(A, 2))
     largest = linear.metric_bounds()[1]
-    tight(linear.drift_difference_metric(largest), 0.5 * np.linalg.norm(theta @ A, 2))
+    tight(
+        linear.drift_difference_metric(largest, linear.drift_slope_metric()),
+        0.5 * np.linalg.norm(theta @ A, 2),
+    )
     tight(linear.feedback_curvature(), 0.0)
-    tight(linear.plan_tilt(), 0.0)
+    tight(linear.plan_tilt(linear.metric_input_gain()), 0.0)
 
 
 def test_noise_per_state_is_that_of_the_worst_corner(linear):

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 
+import numpy as np
+
 from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
 from tubecert.bounds.hardware import HardwareSuprema, entry
 from tubecert.bounds.suprema import Suprema, substituted
@@ -15,8 +17,6 @@ from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.covariant import Geometry
-
-_NEGLIGIBLE = 2e-3  # of 1, what the curvature times the square of the distance is compared with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,8 +55,8 @@ def covariant_constants(suprema: Suprema, known: BoundConstants) -> CovariantCon
         return None
     return CovariantConstants(
         drift_slope=search.drift_slope(),
-        form_slope=search.form_slope(),
-        input_slope=search.input_slope(),
+        form_slope=search.form_slope(known.lower),
+        input_slope=search.input_slope(known.lower, known.metric_input_gain),
         input_gain=search.input_gain(),
         drift_metric=search.drift_metric(),
         curvature=search.curvature(known.lower),
@@ -68,18 +68,20 @@ class CovariantSuprema(HardwareSuprema):
 
     def drift_slope(self) -> Constant:
         """D_nX = sup |Theta (X_x + Gamma(., X)) Theta^-1| of X = f + B u*."""
-        return self._tensor("drift_slope", Geometry(self.model).slope_of_field(self._drift))
+        objective = Geometry(self.model).slope_of_field(self._drift)
+        return self._tensor("drift_slope", objective, float(self.model.rate))
 
-    def form_slope(self) -> Constant:
+    def form_slope(self, least: Constant) -> Constant:
         """D_nF = sup over |v| = 1 of |D_v F|."""
-        return self._tensor("form_slope", Geometry(self.model).slope_of_form())
+        objective = Geometry(self.model).slope_of_form()
+        return self._tensor("form_slope", objective, float(self.model.rate) / self._distance(least))
 
-    def input_slope(self) -> Constant:
+    def input_slope(self, least: Constant, beta: Constant) -> Constant:
         """D_nb = sup on the plan over |v| = |z| = 1 of |(<D_v b_j, z>)_j|; 0 where the plan does not move."""
         if not self._plan_moves:
             return Constant.exactly(0.0)
         objective = Geometry(self.model).slope_of_inputs(self._on_the_plan, self.plan.fixed)
-        return self._tensor_on_plan("input_slope", objective)
+        return self._tensor_on_plan("input_slope", objective, beta.above / self._distance(least))
 
     def input_gain(self) -> Constant:
         """beta_O = sup smax(Theta B): the root of the largest eigenvalue of (B B', W)."""
@@ -92,14 +94,14 @@ class CovariantSuprema(HardwareSuprema):
         )
 
     def curvature(self, least: Constant) -> Constant:
-        """K_R = sup |sectional curvature|: what matters is K_R dbar^2/8 against 1, dbar^2 = a rho^2."""
-        objective = Geometry(self.model).curvature()
-        absolute = _NEGLIGIBLE / (least.above * self.rho**2)
-        found = self._over_tube("curvature", objective, replace(self._few, absolute=absolute))
-        bound = self._constant(found)
+        """K_R = sup |sectional curvature|: what matters is K_R dbar^2/8 against 1."""
+        bound = self._tensor("curvature", Geometry(self.model).curvature(), 1 / self._distance(least) ** 2)
         # of more than three states not every bivector is a plane
-        below = objective.attained(found.at) if len(self.model.states) <= 3 else 0.0
-        return replace(bound, below=min(below, bound.above))
+        return bound if len(self.model.states) <= 3 else replace(bound, below=0.0)
+
+    def _distance(self, least: Constant) -> float:
+        """About dbar = sqrt(a) rho: a scale."""
+        return float(np.sqrt(least.above)) * self.rho
 
     @property
     def _drift(self) -> Matrix:

@@ -20,7 +20,7 @@ from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_o
 from tubecert.bounds.suprema import Suprema, substituted
 from tubecert.bounds.wind import joined
 from tubecert.coordinates import Coordinates
-from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, sqrt
@@ -44,6 +44,7 @@ from tubecert.model import TIME
 from tubecert.spec import Hardware, Knots
 
 _FEW = 4_000  # boxes
+_NEGLIGIBLE = 1e-3  # of what a constant is added to
 Box = tuple[tuple[Fraction, Fraction], ...]
 
 
@@ -108,14 +109,15 @@ def hardware_constants(
     """The constants of certificate H over the tube of `suprema`, whose other constants are `known`."""
     search = HardwareSuprema(**{item.name: getattr(suprema, item.name) for item in fields(Suprema)})
     noise = machine.noise if isinstance(machine.noise, tuple) else None
+    slope = search.drift_slope_metric()
     return HardwareConstants(
         feedback_slope=search.feedback_slope(),
         feedback_curvature=search.feedback_curvature(),
-        plan_tilt=search.plan_tilt(),
+        plan_tilt=search.plan_tilt(known.metric_input_gain),
         plan_speed=search.plan_speed(known.plan_defect),
         drift_difference=search.drift_difference(),
-        drift_difference_metric=search.drift_difference_metric(known.upper),
-        drift_slope_metric=search.drift_slope_metric(),
+        drift_difference_metric=search.drift_difference_metric(known.upper, slope),
+        drift_slope_metric=slope,
         drift_explained=search.drift_explained(known),
         noise_size=search.noise_size(noise),
         noise_metric=search.noise_metric(noise),
@@ -165,21 +167,20 @@ class HardwareSuprema(Suprema):
         """
         objective = Geometry(self.model).slope_by_coordinates(self.fields)
         if self._white is None:
-            return self._tensor("feedback_curvature", objective)
+            return self._tensor("feedback_curvature", objective, float(self.model.rate) / self.rho)
         slopes = [self._white.form(slope) for slope in self.fields.slopes(self.model.F)]
         above = SumOfNorms([tuple(row for slope in slopes for row in slope)])
         if above.is_zero:
             return Constant.exactly(0.0)
         found = self._over_tube("feedback_curvature", above)
-        bound = self._white.of_form(self._constant(found))
-        return replace(bound, below=min(objective.attained(found.at), bound.above))
+        return _reached(objective, found, self._white.of_form(self._constant(found)))
 
-    def plan_tilt(self) -> Constant:
-        """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|."""
+    def plan_tilt(self, beta: Constant) -> Constant:
+        """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|; `beta` is that of the tube."""
         if self.flat or not self._plan_moves:
             return Constant.exactly(0.0)
         objective = Geometry(self.model).tilt_by_coordinates(self.fields, self._on_the_plan, self.plan.fixed)
-        return self._tensor_on_plan("plan_tilt", objective)
+        return self._tensor_on_plan("plan_tilt", objective, beta.above / self.rho)
 
     def _on_the_plan(self, rows: Matrix) -> Matrix:
         return self.plan.on(self.model, rows)
@@ -188,13 +189,17 @@ class HardwareSuprema(Suprema):
     def _plan_moves(self) -> bool:
         return not self.plan.is_constant or self.plan.allowance is not None
 
-    def _tensor(self, name: str, objective: MetricTensorNorm) -> Constant:
-        found = self._over_tube(name, objective, self._few)
-        return replace(self._constant(found), below=min(objective.attained(found.at), found.above))
+    def _tensor(self, name: str, objective: MetricTensorNorm, scale: float) -> Constant:
+        """The supremum over the tube; what is negligible against `scale` is not refined further."""
+        found = self._over_tube(name, objective, self._up_to(scale))
+        return _reached(objective, found, self._constant(found))
 
-    def _tensor_on_plan(self, name: str, objective: MetricTensorNorm) -> Constant:
-        found = self._search_plan(name, objective, self._few)
-        return replace(self._constant(found), below=min(objective.attained(found.at), found.above))
+    def _tensor_on_plan(self, name: str, objective: MetricTensorNorm, scale: float) -> Constant:
+        found = self._search_plan(name, objective, self._up_to(scale))
+        return _reached(objective, found, self._constant(found))
+
+    def _up_to(self, scale: float) -> Effort:
+        return replace(self._few, absolute=_NEGLIGIBLE * scale)
 
     @property
     def _few(self) -> Effort:
@@ -249,9 +254,8 @@ class HardwareSuprema(Suprema):
         slope = self.norms("drift_difference", [by_state])
         return Constant(below=0.0, above=float((Interval(slope.below, slope.above) * self._reach).hi))
 
-    def drift_difference_metric(self, largest: Constant) -> Constant | None:
-        """phi_relM = sup |Theta (f(x* + z) - f(x*))|, for constant M and B."""
-        slope = self.drift_slope_metric()
+    def drift_difference_metric(self, largest: Constant, slope: Constant | None) -> Constant | None:
+        """phi_relM = sup |Theta (f(x* + z) - f(x*))|, for constant M and B; `slope` is D_A."""
         if self._white is None or slope is None:
             return None
         # |Theta z| <= sqrt(A) rho
@@ -348,6 +352,11 @@ def _decimal(bound: float, more: float) -> Fraction:
     """The least decimal >= bound + more and 0."""
     whole = Fraction(bound) + Fraction(more)
     return decimal_above(whole) if whole > 0 else Fraction(0)
+
+
+def _reached(objective: MetricTensorNorm, found: Supremum, bound: Constant) -> Constant:
+    """A bound by the norm of a matrix, and from below what the multilinear map itself reaches where it was found."""
+    return replace(bound, below=min(objective.attained(found.at), bound.above))
 
 
 def _largest(found: Sequence[Constant]) -> Constant:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from tubecert.bounds.hardware import Box, clip_box, hardware_constants
 from tubecert.bounds.suprema import Suprema
-from tubecert.bounds.wind import Beside
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.constant import printable_above, printable_below
@@ -38,9 +37,7 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
 
 
 def _clip(spec: Spec, suprema: Suprema) -> Box:
-    """The box of h where that is an expression and nothing else; else empty, which stands for the ball of its size."""
+    """The box of h where that is given as expressions; else empty, which stands for the ball of its size."""
     bounds = spec.uncertainty.bounds
     declared = suprema.model.h is None or (bounds is not None and bounds.h is not None)
-    if declared or Beside(suprema).joins_uncertainty:
-        return ()
-    return clip_box(suprema)
+    return () if declared or suprema.model.parameters else clip_box(suprema)
