@@ -82,11 +82,12 @@ def norms_below(matrices: Sequence[Rows], limit: Fraction) -> Test:
     )
 
 
-def slopes_below(h: Rows, name: str, limit: Fraction) -> Test:
-    """|dh/d(name)| <= limit almost everywhere, branch by branch where there are absolute values."""
+def slopes_below(h: Rows, name: str, limit: Fraction, beside: Sequence[Rows] = ()) -> Test:
+    """|dh/d(name)| + |beside| <= limit almost everywhere, branch by branch where h has absolute values."""
     signs = Signs(_entries([h]))
     slopes = matrix_slopes(_like([h], signs.entries)[0], name)
-    return BranchesBelow([slopes], signs, limit) if signs.names else NormsBelow([slopes], limit)
+    every = [slopes, *beside]
+    return BranchesBelow(every, signs, limit) if signs.names else NormsBelow(every, limit)
 
 
 class BranchesBelow:

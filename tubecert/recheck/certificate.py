@@ -71,6 +71,14 @@ class Plans:
 
 
 @dataclass(frozen=True, slots=True)
+class Wind:
+    """Every disturbance that is claimed about: |w| (None: what a section states) and, where it is known, |w'|."""
+
+    bound: Fraction | None
+    rate: Fraction | None
+
+
+@dataclass(frozen=True, slots=True)
 class Claim:
     """What the certificate says that it claims, in its own words."""
 
@@ -82,6 +90,7 @@ class Claim:
     start: Start
     uncertainty: str
     plans: Plans | None
+    wind: Wind | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +290,7 @@ def _complete(node: Node, result: Result) -> Result:
 
 def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Claim:
     keys = ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
-    own = node.closed(*keys, optional=("plans",))
+    own = node.closed(*keys, optional=("plans", "wind"))
     return Claim(
         id=own["id"].text(),
         horizon=own.known("horizon", Node.exact),
@@ -291,7 +300,13 @@ def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Clai
         start=read_start(own["start"], states),
         uncertainty=own["uncertainty"].text(),
         plans=own.get("plans", lambda item: _plans(item, states, inputs)),
+        wind=own.get("wind", _wind),
     )
+
+
+def _wind(node: Node) -> Wind:
+    own = node.closed(optional=("bound", "rate"))
+    return Wind(bound=own.get("bound", Node.exact), rate=own.get("rate", Node.exact))
 
 
 def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:

@@ -6,7 +6,7 @@ horizon), on which set the metric is one, from which start, against which uncert
 
 from __future__ import annotations
 
-from tubecert.recheck.certificate import Claim, Plans, Result
+from tubecert.recheck.certificate import Claim, Plans, Result, Wind
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated
 from tubecert.recheck.specification import Specification
@@ -34,6 +34,7 @@ def own_claim(spec: Specification) -> Claim:
         start=spec.start,
         uncertainty=spec.uncertainty.words,
         plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
+        wind=None if spec.disturbance is None else Wind(spec.disturbance.bound, spec.disturbance.rate),
     )
 
 
@@ -44,7 +45,7 @@ def _plans(family: AnyPlan) -> Plans:
 def agrees(result: Result) -> Outcome:
     """Whether `claim` is what follows from the specification."""
     own = own_claim(result.specification)
-    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty", "plans"):
+    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty", "plans", "wind"):
         if getattr(own, key) != getattr(result.claim, key):
             return stated(False, f"claim.{key} is not that of the specification")
     return stated(True, "")

@@ -15,6 +15,7 @@ from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
 from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.specified.metric import Metric, Wanted
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 from tubecert.recheck.system import System
@@ -205,7 +206,13 @@ def _assumed(s: System, geodesics: Geodesics | None) -> list[Assumption]:
         Assumption("uncertainty_as_declared", {})
         if s.h is None
         else Assumption("uncertainty_as_given", {"any_within_bounds": "h" in s.declared}),
+        *([] if s.wind is None else [_blowing(s.wind)]),
     ]
+
+
+def _blowing(wind: Disturbance) -> Assumption:
+    known = {"bound": wind.bound, "rate": wind.rate}
+    return Assumption("wind_within", {name: value for name, value in known.items() if value is not None})
 
 
 def _geodesics(s: System, test: Geodesics | None) -> Assumption:

@@ -44,7 +44,7 @@ from tubecert.recheck.terms import (
     turned,
     unit_matrix,
 )
-from tubecert.recheck.wind import adapted, adds
+from tubecert.recheck.wind import added_to, least_sum
 
 _FIRST = 500  # boxes before another way is tried
 
@@ -199,17 +199,19 @@ def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
 
 
 def _adapted(place: Place, limit: Fraction, name: str) -> Outcome:
-    """Of h + B^+ E w: what the second part adds at most is found here, and the first has the rest."""
-    if name == "h" and place.system.h is not None and name not in place.system.declared:
-        more = adapted(place)
-        assert more is not None
-        found = _norms(place, [place.system.h, more], limit)
-        if found.holds:
-            return found
-    added = adds(place, name, limit)
-    if added is None or added > limit:
+    """Of h + B^+ E w: together with what the second part adds; where that fails, the first has what that leaves."""
+    s, added = place.system, added_to(place, name)
+    if not added:
+        return _own_uncertainty(place, limit, name)
+    if s.h is not None and name not in s.declared and name != "h_x":
+        if name == "h":
+            return _norms(place, [s.h, *added], limit)
+        return prove(slopes_below(s.h, TIME, limit, added), place.tube(), place.budget)
+    most = least_sum(added, place, limit)
+    if most is None:
         return Outcome(verdict="undecided", why="what a disturbance adds is not below it")
-    return _own_uncertainty(place, limit - added, name)
+    found = _own_uncertainty(place, limit - most, name)
+    return found if found.holds else Outcome(verdict="undecided", why=found.why, boxes=found.boxes)
 
 
 def _own_uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:

@@ -21,7 +21,7 @@ from tubecert.recheck.terms import Matrix, all_zero, names, plus, scaled, times,
 
 CONSTANTS = ("wind_push", "wind_size", "wind_explained")
 
-_HALVINGS, _FINE = 12, 50  # of a limit; of one that is no supremum
+_HALVINGS, _FINE = 20, 60  # of a limit; of one that is no supremum
 _FIRST = 4_000  # boxes for each share of a limit
 
 
@@ -120,23 +120,21 @@ def adapted(place: Place) -> Matrix | None:
     return scaled(wind.bound, blown(place).explained)
 
 
-def adds(place: Place, name: str, limit: Fraction) -> Fraction | None:
-    """What B^+ E w adds to |h|, its slope in x or its rate: a bound that is proven over the tube, None if none is."""
+def added_to(place: Place, name: str) -> list[Matrix]:
+    """Matrices the sum of whose norms is what B^+ E w adds to |h|, to its slope in x, or to its rate."""
     wind, more = place.system.wind, adapted(place)
     assert wind is not None
     assert wind.rate is not None
     assert more is not None
-    parts = {
-        "h": lambda: [more],
-        "h_x": lambda: [slope for slope in place.fields.slopes(more) if not all_zero(slope)],
-        "h_t": lambda: [scaled(wind.rate, blown(place).explained)],
-    }
-    own = [a for a in parts[name]() if not all_zero(a)]
-    return _least(own, place, limit) if own else Fraction(0)
+    if name == "h_x":
+        found = place.fields.slopes(more)
+    else:
+        found = [more] if name == "h" else [scaled(wind.rate, blown(place).explained)]
+    return [a for a in found if not all_zero(a)]
 
 
-def _least(matrices: list[Matrix], place: Place, most: Fraction) -> Fraction | None:
-    """About the least bound of a sum of norms that can be proven, `most` at most."""
+def least_sum(matrices: list[Matrix], place: Place, most: Fraction) -> Fraction | None:
+    """About the least bound of a sum of norms that can be proven over the tube, `most` at most; None if none can."""
     low, high = Fraction(0), most
 
     def serves(limit: Fraction) -> bool:
