@@ -128,14 +128,13 @@ def _section(node: Node) -> HardwareSection:
         "bandwidth",
         "deadbeat",
         "predict",
-        "largest",
         "clip",
         "radius",
         "half_widths",
         "inputs",
     )
     rest = ("margin", "level_margin", "ultimate_radius", "budget", "curve", "shortfalls")
-    own = node.closed(*_MACHINE, *others, *rest)
+    own = node.closed(*_MACHINE, *others, *rest, optional=("largest",))
     verdict = own["verdict"].word(*VERDICTS)
     present = [own[key].value is not None for key in (*_MACHINE, "margin", "level_margin")]
     if any(present) != all(present) or (verdict == "certified" and not all(present)):
@@ -146,7 +145,7 @@ def _section(node: Node) -> HardwareSection:
         bandwidth=own.known("bandwidth", Node.decimal),
         deadbeat=own["deadbeat"].flag(),
         predict=own["predict"].flag(),
-        largest=own.known("largest", Node.text),
+        largest=own.get("largest", Node.text),
         clip=tuple(_range(item) for item in own["clip"].entries()),
         radius=own.known("radius", Node.number),
         half_widths={name: item.number() for name, item in own["half_widths"].items()},
