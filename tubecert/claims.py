@@ -659,6 +659,13 @@ class WindWithin(Assumption):
     rate: Fraction | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParametersWithin(Assumption):
+    """The parameters of the claim are constant, anywhere in their ranges; the controller knows f at the middles."""
+
+    tag: ClassVar[str] = "parameters_within"
+
+
 # -- as JSON
 
 

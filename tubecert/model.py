@@ -200,6 +200,8 @@ def build(spec: Spec) -> ControlAffineModel:
         E=() if wind is None else tuple(tuple(term.expression for term in row) for row in wind.E),
         wind_bound=None if wind is None else wind.bound,
         wind_rate=None if wind is None else wind.rate,
+        drift=tuple(term.expression for term in spec.drift),
+        parameters=spec.ranges,
     )
 
 
@@ -270,12 +272,15 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
     """What is undefined, not differentiable or rank-deficient on the safe set (and for h and the plan: over `time`)."""
     box: dict[str, Range] = dict(zip(spec.states, spec.safe_set, strict=True))
     over_time: dict[str, Range] = box if time is None else {**box, TIME: time}
-    terms = [*spec.f, *(t for row in spec.B for t in row)]
+    terms = [*(() if spec.drift else spec.f), *(t for row in spec.B for t in row)]
     if spec.metric:
         terms += [t for row in spec.metric.dual_metric for t in row]
     if spec.disturbance:
         terms += [t for row in spec.disturbance.E for t in row]
     findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
+    everywhere: dict[str, Range] = {**box, **dict(spec.ranges)}
+    for term in spec.drift:
+        findings += _undefined(term, everywhere, "the safe set and the ranges of the parameters", effort)
     for term in spec.uncertainty.h or ():
         findings += _undefined(term, over_time, "the safe set and the horizon", effort)
     for term in (*spec.trajectory.x, *spec.trajectory.u):

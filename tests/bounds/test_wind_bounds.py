@@ -14,7 +14,7 @@ from systems import SMALL, TWO, W_TWO, matrix_of, three_state, two_state
 from tubecert.bounds.constants import Constant
 from tubecert.bounds.start import KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
-from tubecert.bounds.wind import Beside, uncertainty_constants, wind_constants
+from tubecert.bounds.wind import Beside, residual_constants, uncertainty_constants, wind_constants
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.trajectory import constant_plan
@@ -191,6 +191,87 @@ def test_what_vanishes_is_seen_to_vanish():
     assert wind_constants(s, Constant.exactly(1.0)).size == Constant.exactly(0.0)
 
 
+# -- unknown parameters
+
+
+def unknown(drift, ranges, h=None, coordinates=None, rho=RHO):
+    """The two-state system, of which the plant has another drift."""
+    base = two_state()
+    names = (*TWO, *dict(ranges))
+    model = replace(base, drift=matrix_of([drift], names)[0], parameters=ranges, h=h or base.h)
+    return replace(suprema([["0"], ["0"]], coordinates=coordinates, model=model), rho=rho)
+
+
+MASS = (("m", (Fraction(9, 10), Fraction(11, 10))),)
+
+
+def test_what_inputs_reach_of_a_parameter_joins_h_and_the_rest_pushes():
+    """f_2 gains (m - 1) 3 x1: in closed form at the corners of m."""
+    s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*m*x1 + 4*x2"), MASS)
+    D = np.array([0.0, 0.3 * RHO])  # at x1 = RHO, m at an end
+    left = D - B * (B @ D) / (B @ B)
+    rest = residual_constants(s)
+    assert encloses(rest.push, math.sqrt(left @ M @ left))
+    assert encloses(rest.size, np.linalg.norm(left))
+    found = uncertainty_constants(s, KnownStart((Fraction(1, 10), Fraction(0))), {})
+    slope = 0.3 * 2 / 4.25
+    assert encloses(found["h_initial"], 0.01 + slope * 0.1)
+    assert found["h_t"].above == pytest.approx(s.uncertainty()[2].above)
+    x1, x2, t, m = np.meshgrid(
+        np.linspace(-RHO, RHO, 61), np.linspace(-RHO, RHO, 61), np.linspace(0, 1, 41), [0.9, 1.1]
+    )
+    inside = x1**2 + x2**2 <= RHO**2
+    h = -2 * np.sin(2 * t) - 0.1 * np.hypot(x1, x2) - 2 / 4.25 * (-3 * (m - 1) * x1)
+    most = np.abs(h[inside]).max()
+    assert most <= found["h"].above <= most * 1.01
+    assert own_slope(s) < found["h_x"].above <= own_slope(s) + slope + 1e-6
+
+
+def own_slope(s):
+    return s.uncertainty()[1].above
+
+
+def test_a_parameter_along_the_input_leaves_nothing():
+    s = unknown(("-x1 + 2*x2 + 0.5*m*x1 - 0.5*x1", "-0.25*x2**3 - 3*x1 + 4*x2 - 2*m*x1 + 2*x1"), MASS)
+    assert residual_constants(s) is None
+    assert Beside(s).joins_uncertainty
+
+
+def test_a_parameter_that_the_middle_knows_exactly_adds_nothing():
+    s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2"), MASS)
+    assert residual_constants(s) is None
+    assert not Beside(s).joins_uncertainty
+
+
+def test_wider_ranges_never_need_less():
+    previous = 0.0
+    for half in ("1/100", "1/20", "1/5"):
+        ends = (1 - Fraction(half), 1 + Fraction(half))
+        s = unknown(("-m*x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2"), (("m", ends),))
+        push = residual_constants(s).push
+        assert push.above > previous
+        previous = push.above
+
+
+def test_in_coordinates_the_residual_is_what_is_sampled():
+    S = Coordinates(((Fraction(2), Fraction(1)), (Fraction(0), Fraction(3))))
+    s = unknown(("-m*x1 + 2*x2", "-0.25*x2**3 - 3*x1*m + 4*x2"), MASS, coordinates=S)
+    rest = residual_constants(s)
+    Sf = np.array([[2.0, 1.0], [0.0, 3.0]])
+    SB = Sf @ B
+    rng = np.random.default_rng(3)
+    z = rng.normal(size=(20000, 2))
+    z = RHO * z / np.linalg.norm(z, axis=1)[:, None]
+    x = z @ np.linalg.inv(Sf).T
+    D = np.stack([-0.1 * x[:, 0], -0.3 * x[:, 0]], axis=1) @ Sf.T
+    left = D - np.outer(D @ SB / (SB @ SB), SB)
+    Mz = np.linalg.inv(Sf @ W @ Sf.T)
+    pushes = np.sqrt(np.einsum("ni,ij,nj->n", left, Mz, left)).max()
+    sizes = np.linalg.norm(left, axis=1).max()
+    assert pushes <= rest.push.above <= pushes * 1.01
+    assert sizes <= rest.size.above <= sizes * 1.01
+
+
 # -- certificates
 
 
@@ -238,3 +319,22 @@ def test_a_steady_wind_along_the_input_costs_nothing_in_the_long_run():
     alone = [r["no_adaptation"]["ultimate_radius"] for r in (calm, windy)]
     assert asked[1] <= asked[0] * 1.01
     assert alone[1] > alone[0] * 1.1
+
+
+@pytest.mark.slow
+def test_a_range_claims_more_than_its_middle():
+    text = SMALL.replace("0.3*sin(x)", "m*sin(x)").replace(
+        "  inputs: [u]", "  inputs: [u]\n  parameters: {m: [LOW, HIGH]}"
+    )
+    exact = certified("")
+    results = [
+        proven(text.replace("LOW", low).replace("HIGH", high), conditions="all")["result"]
+        for low, high in (("0.3", "0.300000001"), ("0.2", "0.4"))
+    ]
+    assert results[1]["claim"]["parameters"] == {"m": ["0.2", "0.4"]}
+    assert results[1]["assumptions"][-1] == {"id": "parameters_within"}
+    radii = [r["no_adaptation"]["ultimate_radius"] for r in (exact, *results)]
+    assert radii[1] == pytest.approx(radii[0], rel=1e-3)
+    assert radii[2] > 1.1 * radii[0]
+    assert results[1]["constants"]["h_x"]["above"] == pytest.approx(0.15, rel=1e-3)  # 0.05 + 0.1 cos
+    assert results[1]["verdict"] == "certified"  # sin(x) acts where u does: nothing is left

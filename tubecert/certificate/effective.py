@@ -13,13 +13,33 @@ Tree = Any  # texts, lists and mappings of them, as canonical data holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """A number as a text, or the two ends of a range."""
+
+    ends: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return self.ends[0] if len(self.ends) == 1 else f"[{', '.join(self.ends)}]"
+
+
+def _read_parameter(data: Json, path: str) -> Parameter:
+    ends = data if isinstance(data, list) and len(data) == 2 else [data]
+    if not all(isinstance(end, str) for end in ends):
+        raise FormError(path, "is neither a text nor a pair of texts")
+    return Parameter(ends=tuple(ends))
+
+
+foreign(Parameter, lambda value: value.ends[0] if len(value.ends) == 1 else list(value.ends), _read_parameter)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SystemView:
     """States, inputs, units and equations, as texts."""
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
-    parameters: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     f: tuple[str, ...] = ()
     B: tuple[tuple[str, ...], ...] = ()
 

@@ -76,6 +76,7 @@ class Claimed:
     uncertainty: Literal["bounds", "expression", "expression_or_bounds"]
     plans: Plans | None = None
     wind: Blowing | None = None
+    parameters: Mapping[str, tuple[str, str]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,6 +29,7 @@ from tubecert.claims import (
     ForAllTime,
     HardProjection,
     LeastFeedback,
+    ParametersWithin,
     PerfectState,
     SmoothProjection,
     StartAtRest,
@@ -103,6 +104,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
         if bounds is None or bounds.h is None
         else "expression_or_bounds",
         wind=None if spec.disturbance is None else _wind(spec.disturbance),
+        parameters={name: (number_text(low), number_text(high)) for name, (low, high) in spec.ranges} or None,
     )
 
 
@@ -224,6 +226,7 @@ def assumptions(
         if spec.uncertainty.h is None
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
         *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
+        *(() if not spec.ranges else (ParametersWithin(),)),
     )
 
 

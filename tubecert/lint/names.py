@@ -34,7 +34,7 @@ def _unused(spec: Spec) -> Iterator[Finding]:
     """Parameters and definitions are substituted when they are read, so their names are looked for in the text."""
     text = "\n".join(re.sub(r"(^|\s)#.*", "", line) for line in spec.source.splitlines())
     words = re.findall(r"\b[A-Za-z]\w*", text)
-    named = [("parameter", name) for name, _ in spec.parameters]
+    named = [("parameter", name) for name, _ in (*spec.parameters, *spec.ranges)]
     for what, name in [*named, *(("definition", name) for name in spec.definitions)]:
         if words.count(name) < 2:
             yield Finding(
@@ -47,7 +47,12 @@ def _unused(spec: Spec) -> Iterator[Finding]:
 
 
 def _confusable(spec: Spec) -> Iterator[Finding]:
-    names = [*spec.states, *spec.inputs, *(name for name, _ in spec.parameters), *spec.definitions]
+    names = [
+        *spec.states,
+        *spec.inputs,
+        *(name for name, _ in (*spec.parameters, *spec.ranges)),
+        *spec.definitions,
+    ]
     for name in names:
         word = next((word for word in _WORDS if word == name.lower()), None)
         if word is not None:
@@ -59,7 +64,8 @@ def _confusable(spec: Spec) -> Iterator[Finding]:
 
 
 def _negative(spec: Spec) -> Iterator[Finding]:
-    for name, value in spec.parameters:
+    lowest = [*spec.parameters, *((name, low) for name, (low, _) in spec.ranges)]
+    for name, value in lowest:
         if value <= 0 and _BODY.fullmatch(name):
             yield Finding(
                 code=codes.NOT_POSITIVE,

@@ -76,8 +76,9 @@ def _system(spec: Spec) -> dict[str, Any]:
         "states": list(spec.states),
         "inputs": list(spec.inputs),
         "units": dict(spec.units),
-        "parameters": {name: number_text(value) for name, value in spec.parameters},
-        "f": _texts(spec.f),
+        "parameters": {name: number_text(value) for name, value in spec.parameters}
+        | {name: _numbers(ends) for name, ends in spec.ranges},
+        "f": _texts(spec.drift or spec.f),
         "B": [_texts(row) for row in spec.B],
     }
 

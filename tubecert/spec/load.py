@@ -28,8 +28,8 @@ from tubecert.spec.settings import (
 )
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
-from tubecert.spec.system import read_dynamics, read_metric, read_uncertainty, wanted_metric
-from tubecert.spec.types import Metric, Places, Spec, Synthesis
+from tubecert.spec.system import nominal, read_dynamics, read_metric, read_uncertainty, wanted_metric
+from tubecert.spec.types import Metric, Places, Spec, Synthesis, Term, TermMatrix
 
 VERSION: Final = 1
 
@@ -152,10 +152,28 @@ def _is_another_file(root: Field) -> bool:
     return False
 
 
+def _in_the_middle(
+    system: dict[str, Field], dynamics: tuple[tuple[Term, ...], TermMatrix] | None, names: Names
+) -> tuple[Term, ...] | None:
+    """The f that the controller knows."""
+    if dynamics is None:
+        return None
+    try:
+        return nominal(dynamics[0], names)
+    except ZeroDivisionError:
+        system["f"].fail(
+            codes.EXPRESSION,
+            "f is undefined where every parameter is in the middle of its range",
+            "a divisor vanishes there; give ranges that keep away from it",
+        )
+        return None
+
+
 def _read_named(
     reader: Reader, entries: dict[str, Field], system: dict[str, Field], name: str | None, names: Names
 ) -> Spec | None:
     dynamics = read_dynamics(system.get("f"), system.get("B"), names)
+    known = _in_the_middle(system, dynamics, names)
     units = read_units(system.get("units"), names)
     box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
     uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
@@ -182,7 +200,7 @@ def _read_named(
         return None
     if plan is None or x0 is None or tube is None or adaptation is None:
         return None
-    if obstacles is None or limits is None:
+    if obstacles is None or limits is None or known is None:
         return None
     return Spec(
         name=name,
@@ -193,7 +211,9 @@ def _read_named(
         units=units,
         parameters=names.parameters,
         definitions=tuple(name for name, _ in names.definitions),
-        f=dynamics[0],
+        f=known,
+        drift=dynamics[0] if names.ranges else (),
+        ranges=names.ranges,
         B=dynamics[1],
         safe_set=box,
         uncertainty=uncertainty,

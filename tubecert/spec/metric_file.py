@@ -61,7 +61,10 @@ def _read(root: Field, spec: Spec) -> Metric | None:
     entries = root.mapping(required=("format", "rate", "dual_metric"), optional=_REPORTED)
     if entries is None or "format" not in entries or entries["format"].word((FORMAT,)) is None:
         return None
-    return metric_of(entries, Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters))
+    return metric_of(
+        entries,
+        Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters, ranges=spec.ranges),
+    )
 
 
 def _is_another_file(root: Field) -> bool:

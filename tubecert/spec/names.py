@@ -38,13 +38,17 @@ _RESERVED: Final = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """The names of a system, the values of its parameters, and what its definitions stand for."""
+    """The names of a system, the values of its parameters, and what its definitions stand for.
+
+    Of the parameters in `ranges` only an interval is known: they are symbols, and f alone may use them.
+    """
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     parameters: tuple[tuple[str, Fraction], ...]
     irrational: tuple[tuple[str, Expression], ...] = ()  # parameters that contain pi
     definitions: tuple[tuple[str, Parsed], ...] = ()
+    ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
 
     @property
     def values(self) -> dict[str, Expression]:
@@ -57,17 +61,29 @@ class Names:
             TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
             **self._inputs_refused(),
         }
-        return self._scope(self.states, refused)
+        return self._scope(self.states, refused | self._ranges_refused())
+
+    def of_drift(self) -> Scope:
+        """For f: the same, and parameters of which a range is known."""
+        names = (*self.states, *dict(self.ranges))
+        refused = {name: why for name, why in self.of_state().refused.items() if name not in names}
+        return self._scope(names, refused)
 
     def of_uncertainty(self) -> Scope:
         """For h: states, time and parameters; abs and norm are allowed."""
-        return self._scope((*self.states, TIME), self._inputs_refused(), kinks=True)
+        refused = self._inputs_refused() | self._ranges_refused()
+        return self._scope((*self.states, TIME), refused, kinks=True)
+
+    def of_definition(self) -> Scope:
+        """For a definition: whatever any expression may use."""
+        names = (*self.states, TIME, *dict(self.ranges))
+        return self._scope(names, self._inputs_refused(), kinks=True)
 
     def of_plan(self) -> Scope:
         """For a trajectory: time and parameters."""
         refused = {name: f"{name} is a state; a plan is a function of t alone" for name in self.states}
         refused |= {name: f"{name} is an input; a plan is a function of t alone" for name in self.inputs}
-        return self._scope((TIME,), refused)
+        return self._scope((TIME,), refused | self._ranges_refused())
 
     def _scope(self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False) -> Scope:
         """Parameters, variables, and the definitions that stand for expressions of these."""
@@ -80,6 +96,12 @@ class Names:
             else:
                 refused = {**refused, name: why}
         return Scope(symbols=symbols, refused=refused, kinks=kinks, owed=owed)
+
+    def _ranges_refused(self) -> dict[str, str]:
+        return {
+            name: f"{name} is known by a range only; such a parameter may be used in f alone"
+            for name, _ in self.ranges
+        }
 
     def _inputs_refused(self) -> dict[str, str]:
         return {
@@ -109,7 +131,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
     taken: dict[str, str] = {}
     states = _name_list(system.get("states"), "state", taken)
     inputs = _name_list(system.get("inputs"), "input", taken)
-    values = _read_parameters(system.get("parameters"), taken)
+    values, ranges = _read_parameters(system.get("parameters"), taken)
     if states is None or inputs is None:
         return None
     if len(inputs) > len(states):
@@ -124,6 +146,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
         inputs=inputs,
         parameters=tuple((name, value.fraction) for name, value in values.items() if value.is_constant),
         irrational=tuple((name, value) for name, value in values.items() if not value.is_constant),
+        ranges=tuple(ranges.items()),
     )
     return _with_definitions(names, system.get("definitions"), taken)
 
@@ -181,20 +204,49 @@ def _with_article(what: str) -> str:
     return f"an {what}" if what[0] in "aeiou" else f"a {what}"
 
 
-def _read_parameters(field: Field | None, taken: dict[str, str]) -> dict[str, Expression]:
-    """Parameters in the order of the file; each may use those before it. An unreadable value stands as 1."""
+Interval = tuple[Fraction, Fraction]
+
+
+def _read_parameters(
+    field: Field | None, taken: dict[str, str]
+) -> tuple[dict[str, Expression], dict[str, Interval]]:
+    """Parameters in the order of the file: numbers, which may use those before them, and ranges.
+
+    An unreadable value stands as 1.
+    """
     values: dict[str, Expression] = {}
+    ranges: dict[str, Interval] = {}
     if field is None:
-        return values
+        return values, ranges
     for key, node in field.pairs("of names to numbers") or []:
         entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "parameter", taken)
+        if isinstance(entry.node, ListNode):
+            ends = _read_range(entry, values)
+            if name is not None:
+                ranges[name] = ends
+            continue
         value = None if _is_range(entry) else entry.constant(values)
         if name is not None:
             values[name] = (
                 ONE if value is None else value
             )  # the finding stands; users of it are not wrong too
-    return values
+    return values, ranges
+
+
+def _read_range(field: Field, values: Mapping[str, Expression]) -> Interval:
+    """[lower, upper], rounded outward; [0, 1] if it cannot be read."""
+    ends = field.items(2, "numbers", "write one number, or [lower, upper]")
+    if ends is None:
+        return Fraction(0), Fraction(1)
+    lower, upper = ends[0].number(values, side="below"), ends[1].number(values, side="above")
+    if lower is not None and upper is not None and lower >= upper:
+        field.fail(
+            codes.RANGE,
+            f"{field.path}: the lower end must be below the upper end",
+            "write [lower, upper], or one number if it is known",
+        )
+    return (Fraction(0), Fraction(1)) if lower is None or upper is None else (lower, upper)
 
 
 _RANGE = re.compile(r"([0-9.eE]+) *(?:-|\.\.+|\u2013|to) *([0-9.eE]+)|.*(?:\+-|\+/-|\u00b1).*")
@@ -206,8 +258,8 @@ def _is_range(field: Field) -> bool:
     found = _RANGE.fullmatch(text)
     if found is None or (found[1] and not _rises(found[1], found[2])):
         return False
-    message = f"{text[:40]} reads as a range; a parameter is one exact number"
-    help = "write the nominal value, and what may differ from it in uncertainty (h or bounds)"
+    message = f"{text[:40]} reads as a range; a parameter is one exact number, or [lower, upper]"
+    help = "write the nominal value, or [lower, upper] for a parameter of f that lies anywhere between"
     field.fail(codes.NUMBER, message, f"{help}; a difference may stand in parentheses" if found[1] else help)
     return True
 
@@ -229,7 +281,7 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
         later.remove(key.text)
         entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "definition", taken)
-        scope = names.of_uncertainty()
+        scope = names.of_definition()
         refused = {
             word: f"{word} is defined further down; a definition may use those above it" for word in later
         }

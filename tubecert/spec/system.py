@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import root_above, to_text
+from tubecert.expression import constant, root_above, substitute, to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
 from tubecert.spec.document import MappingNode
@@ -21,13 +22,31 @@ _SYMMETRY_BUDGET = 20_000
 def read_dynamics(
     f: Field | None, B: Field | None, names: Names
 ) -> tuple[tuple[Term, ...], TermMatrix] | None:
-    """The drift f, of n entries, and the input matrix B, n x m."""
+    """The drift f, of n entries, and the input matrix B, n x m; f may contain parameters known by a range."""
     n, m = len(names.states), len(names.inputs)
-    drift = f.terms(n, names.of_state(), "expressions, one per state") if f else None
+    drift = f.terms(n, names.of_drift(), "expressions, one per state") if f else None
     inputs = B.term_matrix(n, m, names.of_state()) if B else None
     if B is not None and inputs is not None and not _independent(B, inputs):
         inputs = None
     return (drift, inputs) if drift is not None and inputs is not None else None
+
+
+def nominal(drift: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
+    """F where every parameter that is known by a range is in its middle; raises `ZeroDivisionError`."""
+    middle = {name: constant((low + high) / 2) for name, (low, high) in names.ranges}
+    if not middle:
+        return drift
+
+    def put(term: Term) -> Term:
+        arguments = substitute([term.expression, *(owed.argument for owed in term.obligations)], middle)
+        owed = zip(term.obligations, arguments[1:], strict=True)
+        return replace(
+            term,
+            expression=arguments[0],
+            obligations=tuple(replace(duty, argument=argument) for duty, argument in owed),
+        )
+
+    return tuple(put(term) for term in drift)
 
 
 def _independent(field: Field, matrix: TermMatrix) -> bool:

@@ -296,8 +296,9 @@ class Spec:
     """A system, its safe set, uncertainty, plan, metric and options; everything exact.
 
     f (n), B (n, m), `safe_set` (n pairs) and x0 (n) are in the order of `states`. Parameters are substituted
-    in every expression. `locations` says where a key's value stands, by dotted path (`metric.rate`,
-    `system.f[0]`).
+    in every expression; of those in `ranges` the plant's is anywhere in its range, constant: `drift` is f of them, and
+    f itself is that of their middles, which the controller knows. `locations` says where a key's value stands, by
+    dotted path (`metric.rate`, `system.f[0]`).
     """
 
     name: str
@@ -307,10 +308,12 @@ class Spec:
     inputs: tuple[str, ...]
     units: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, Fraction], ...]
+    ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
     definitions: tuple[str, ...] = field(
         default=(), compare=False
     )  # their names: expressions have them written out
     f: tuple[Term, ...]
+    drift: tuple[Term, ...] = ()
     B: TermMatrix
     safe_set: tuple[tuple[Fraction, Fraction], ...]
     uncertainty: Uncertainty

@@ -9,6 +9,7 @@ from tubecert.claims import (
     ForAllTime,
     HardProjection,
     LeastFeedback,
+    ParametersWithin,
     PerfectState,
     SmoothProjection,
     StartAtRest,
@@ -31,6 +32,8 @@ _FIXED: dict[type[Assumption], str] = {
     PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
+    ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "
+    "plan are those of f at the middles of the ranges",
     UncertaintyAsDeclared: "the uncertainty obeys its declared bounds on the tube",
 }
 
