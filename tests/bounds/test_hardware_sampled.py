@@ -177,7 +177,7 @@ def found(s: CovariantSuprema) -> dict[str, Constant]:
         "form_slope": s.form_slope(least),
         "input_slope": s.input_slope(least, beta),
         "input_gain": s.input_gain(),
-        "drift_metric": s.drift_metric(),
+        "drift_metric": s.drift_metric(least),
         "curvature": s.curvature(least),
     }
 

@@ -13,7 +13,6 @@ import numpy as np
 from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
 from tubecert.bounds.hardware import HardwareSuprema, entry
 from tubecert.bounds.suprema import Suprema, substituted
-from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.covariant import Geometry
@@ -58,7 +57,7 @@ def covariant_constants(suprema: Suprema, known: BoundConstants) -> CovariantCon
         form_slope=search.form_slope(known.lower),
         input_slope=search.input_slope(known.lower, known.metric_input_gain),
         input_gain=search.input_gain(),
-        drift_metric=search.drift_metric(),
+        drift_metric=search.drift_metric(known.lower),
         curvature=search.curvature(known.lower),
     ).printable()
 
@@ -87,11 +86,10 @@ class CovariantSuprema(HardwareSuprema):
         """beta_O = sup smax(Theta B): the root of the largest eigenvalue of (B B', W)."""
         return self._root(self._over_tube("input_gain", Pencil(self.model.BBt, self.model.W)))
 
-    def drift_metric(self) -> Constant:
+    def drift_metric(self, least: Constant) -> Constant:
         """phi_M = sup |Theta (f + B u*)|."""
-        return self._constant(
-            self._over_tube("drift_metric", MetricNorm(self._drift, self.model.W), self._few)
-        )
+        objective = Geometry(self.model).size_of_field(self._drift)
+        return self._tensor("drift_metric", objective, float(self.model.rate) * self._distance(least))
 
     def curvature(self, least: Constant) -> Constant:
         """K_R = sup |sectional curvature|: what matters is K_R dbar^2/8 against 1."""

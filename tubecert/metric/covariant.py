@@ -195,6 +195,16 @@ class Geometry:
         matrices = [X, _jacobian(X, self.model.states), *self._slopes]
         return MetricTensorNorm(self.model.W, matrices, tensor, rank=2, rows=((0,),))
 
+    def size_of_field(self, X: Matrix) -> MetricTensorNorm:
+        """|Theta X| of a vector field (n, 1)."""
+        return MetricTensorNorm(
+            self.model.W,
+            [X],
+            lambda frame, forms: contract("ij,jz->zi", frame.T, forms[0]),
+            rank=1,
+            rows=((0,),),
+        )
+
     def _derivative(self, frame: Frame, X: Form, X_x: Form, slopes: Sequence[Form]) -> Form:
         """(D^b X)_k, (k, b)."""
         straight = contract("kj,bj->kb", contract("ij,jk->ik", frame.T, X_x), frame.raised)
