@@ -20,17 +20,19 @@ from tubecert.conditions import machine as machines
 from tubecert.conditions.arithmetic import (
     Array,
     T,
+    choose,
     decay_mean,
     exp,
     expm1,
     maximum,
     minimum,
+    nothing,
     number,
     quiet,
     sqrt,
 )
 from tubecert.conditions.kernels import DistanceBound
-from tubecert.conditions.machine import Machine, MachineNumbers
+from tubecert.conditions.machine import Bent, Machine, MachineNumbers
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.sampled import ages
@@ -268,12 +270,38 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
     # j1 n_M: a box of noise is measured by n_M as it is, and by sqrt(A) nbar where geodesics bend
     first = e.n_fb + bent / (2 * chi) * (sqrt(n.A) * e.e_fb)
     j0 = 1 + bent / (8 * chi)
-    return Loss(
-        ell0=slope * first + turn * j0 * e.e_fb,
-        ell1=slope * V_M + turn * V_J + n.du * m.D_cx * m.Ystar * loop.dhat,
-        V_d=V_d,
-        chi=chi,
+    ell0 = slope * first + turn * j0 * e.e_fb
+    ell1 = slope * V_M + turn * V_J + n.du * m.D_cx * m.Ystar * loop.dhat
+    if m.bent is not None:
+        other = covariant_loss(p, m.bent, loop, e)
+        ell0, ell1 = minimum(ell0, other[0]), minimum(ell1, other[1])
+    return Loss(ell0=ell0, ell1=ell1, V_d=V_d, chi=chi)
+
+
+@quiet
+def covariant_loss(p: Plant[T], m: Bent[T], loop: Loop[T], e: Estimate[T]) -> tuple[T, T]:
+    """ell0 and ell' of (H.8c), (H.9c): every length is measured by the metric; infinite where chi' <= 0."""
+    n = p.n
+    K = m.K_R * reach(n) ** 2
+    chi = 1 - K / 8
+    added = m.beta_O * (e.kb + e.ups + e.X) + metric_gust(p, m) * loop.wbar + n.delta
+    fastest = m.phi_M + added
+    Q = K * fastest / chi
+    slope, turn = p.m.D_F + n.beta * n.du, m.D_nF * (loop.dhat + e.n_fb) / 2
+    ell0 = (slope * (1 + K / (2 * chi)) + turn * (1 + K / (8 * chi))) * e.n_fb
+    ell1 = (
+        slope * (m.D_nX * loop.dhat + added + Q / 2)
+        + turn * (fastest + Q / 8)
+        + n.du * m.D_nb * fastest * loop.dhat
     )
+    endless = -nothing(chi)
+    return choose(chi, ell0, endless), choose(chi, ell1, endless)
+
+
+def metric_gust(p: Plant[T], m: Bent[T]) -> T:
+    """A bound of |Theta E| at any state: beta_w may rest on beta, which is |Theta B| on the plan alone, (7.2)."""
+    n = p.n
+    return minimum(sqrt(n.A) * p.D_E, p.beta_w * maximum(number(1, n.beta), m.beta_O / n.beta))
 
 
 # -- the distance: (H.12)
@@ -388,7 +416,7 @@ def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
     n = problem.proven(R)
     return Plant(
         n=n,
-        m=machines.proven(machine.constants),
+        m=machines.proven(machine),
         beta_w=zero if wind is None else Interval.exact(wind.constants.push.above),
         D_E=zero if wind is None else Interval.exact(wind.constants.size.above),
         eps_w=zero if wind is None else Interval.exact(wind.constants.explained.above),

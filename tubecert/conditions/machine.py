@@ -13,6 +13,7 @@ from typing import Generic
 
 import numpy as np
 
+from tubecert.bounds.covariant import CovariantConstants
 from tubecert.bounds.hardware import HardwareConstants
 from tubecert.conditions.arithmetic import Array, T
 from tubecert.conditions.decimals import next_up, round_up
@@ -31,13 +32,14 @@ class Machine:
     """What the specification says of the hardware, with the constants that theorem H needs beside those of B.
 
     `clip`: per input a range that contains 0 and h over the tube; empty where only |h| <= Dh is known, and the estimate
-    is clipped to a ball. `widths`: sup sqrt(W_ii) by state: |x_i - x_i*| <= widths[i] d; `inputs`: the range of u* on
-    the plan, by input. Both are empty where nobody asked.
+    is clipped to a ball. `covariant`: where the metric is not constant, if they are known. `widths`: sup sqrt(W_ii) by
+    state: |x_i - x_i*| <= widths[i] d; `inputs`: the range of u* on the plan, by input; both may be empty.
     """
 
     constants: HardwareConstants
     clip: tuple[Range, ...]
     asked: Hardware
+    covariant: CovariantConstants | None = None
     widths: Mapping[str, float] = field(default_factory=dict)
     inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -91,7 +93,10 @@ _MAY_BE_INFINITE = ("input_rate",)  # where u* jumps; 2 sup |u*| takes its place
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MachineNumbers(Generic[T]):
-    """The constants of `HardwareConstants` as numbers of one arithmetic, by symbol; None where one does not apply."""
+    """The constants of `HardwareConstants` as numbers of one arithmetic, by symbol; None where one does not apply.
+
+    Of `bent` there are all or none.
+    """
 
     D_F: T
     D_Fx: T
@@ -107,10 +112,24 @@ class MachineNumbers(Generic[T]):
     Lus: T | None
     G: T
     L_G: T
+    bent: Bent[T] | None = None
 
 
-def proven(c: HardwareConstants) -> MachineNumbers[Interval]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bent(Generic[T]):
+    """The constants of `CovariantConstants`, by symbol."""
+
+    D_nX: T
+    D_nF: T
+    D_nb: T
+    beta_O: T
+    phi_M: T
+    K_R: T
+
+
+def proven(machine: Machine) -> MachineNumbers[Interval]:
     """The safe side: the theorem holds with these numbers, because each bounds its constant."""
+    c = machine.constants
     return MachineNumbers(
         D_F=_most(c.feedback_slope),
         D_Fx=_most(c.feedback_curvature),
@@ -126,6 +145,21 @@ def proven(c: HardwareConstants) -> MachineNumbers[Interval]:
         Lus=None if c.input_rate is None else _most(c.input_rate),
         G=_most(c.symbols),
         L_G=_most(c.symbols_slope),
+        bent=None if machine.covariant is None else _bent(machine.covariant),
+    )
+
+
+def _bent(c: CovariantConstants) -> Bent[Interval] | None:
+    """None where one has no bound: then nothing is gained by the others."""
+    if not all(np.isfinite(value.above) for _, value, _ in c.items()):
+        return None
+    return Bent(
+        D_nX=_most(c.drift_slope),
+        D_nF=_most(c.form_slope),
+        D_nb=_most(c.input_slope),
+        beta_O=_most(c.input_gain),
+        phi_M=_most(c.drift_metric),
+        K_R=_most(c.curvature),
     )
 
 
@@ -135,10 +169,15 @@ def _most(constant: Constant) -> Interval:
 
 def floats(numbers: MachineNumbers[Interval]) -> MachineNumbers[Array]:
     """The same in floats, for the search."""
-    values = {name: getattr(numbers, name) for name in MachineNumbers.__slots__}
-    return MachineNumbers(**{name: None if x is None else x.hi for name, x in values.items()})
+    values = {name: getattr(numbers, name) for name in MachineNumbers.__slots__ if name != "bent"}
+    own = numbers.bent
+    return MachineNumbers(
+        **{name: None if x is None else x.hi for name, x in values.items()},
+        bent=None if own is None else Bent(**{name: getattr(own, name).hi for name in Bent.__slots__}),
+    )
 
 
 def ones() -> MachineNumbers[Array]:
     """Every number 1: to record what the formulas ask for beside them."""
-    return MachineNumbers(**{name: np.asarray(1.0) for name in MachineNumbers.__slots__})
+    values = {name: np.asarray(1.0) for name in MachineNumbers.__slots__ if name != "bent"}
+    return MachineNumbers(**values, bent=None)
