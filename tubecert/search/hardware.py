@@ -15,7 +15,7 @@ import numpy as np
 
 from tubecert.conditions import hardware as theorem_h
 from tubecert.conditions import machine as machines
-from tubecert.conditions.arithmetic import Array, quiet
+from tubecert.conditions.arithmetic import Array, least_solution, quiet
 from tubecert.conditions.decimals import round_down, round_up
 from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant
 from tubecert.conditions.machine import Machine
@@ -28,7 +28,8 @@ from tubecert.search.scan import boundary_log, largest, serves
 DIGITS = 4
 _ROOM = 9  # digits of what only the proof needs
 _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
-_STEPS = 9  # of the fixed point of Y, S, N, np; a search needs no more, and what is printed is verified
+_PREDICTIONS = 4  # steps of the fixed point of np; what is printed is verified
+_LEVELS = 24
 _ZOOMS = 12
 _TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
@@ -92,10 +93,9 @@ class Search:
 
     @quiet
     def settled(self, at: Lanes, chosen: Choice) -> Loop[Array]:
-        """The loop with Y, S, N and np from above: each step keeps what the theorem asks for, but for rounding."""
+        """The loop with the least Y, S, N and np; but for rounding, what the theorem asks for."""
         zero = np.zeros(np.broadcast_shapes(at.Ts.shape, chosen.dhat.shape))
         ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
-        predicts = self.machine.asked.predict
         loop = Loop(
             Ts=at.Ts + zero,
             tau=at.tau + zero,
@@ -106,23 +106,36 @@ class Search:
             dhat=chosen.dhat + zero,
             f0=chosen.f0 + zero,
             Y=zero,
-            S=zero + np.inf,
+            S=zero,
             N=zero,
-            np=zero if predicts else None,
+            np=zero if self.machine.asked.predict else None,
             late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
             off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
         )
-        for step in range(_STEPS):
+        for _ in range(1 if loop.np is None else _PREDICTIONS):
+            Y = self._least_speed(loop)
+            e = theorem_h.estimate(self.plant, replace(loop, Y=Y))
+            loop = replace(loop, Y=Y, S=e.bias, N=e.ripple)
             e = theorem_h.estimate(self.plant, loop)
-            loop = replace(
-                loop,
-                Y=e.speed,
-                np=e.prediction,
-                S=loop.S if step == 0 else e.bias,
-                N=loop.N if step == 0 else e.ripple,
-            )
+            loop = replace(loop, Y=np.maximum(Y, e.speed), np=e.prediction)
         e = theorem_h.estimate(self.plant, loop)
-        return replace(loop, S=e.bias, N=e.ripple, np=e.prediction)
+        return replace(loop, S=e.bias, N=e.ripple)
+
+    def _least_speed(self, loop: Loop[Array]) -> Array:
+        """The least Y: every term of the minimum and maximum in X is affine in Y."""
+        n = self.plant.n
+        still, moving = (theorem_h.estimate(self.plant, replace(loop, Y=loop.Y * 0 + y)) for y in (0.0, 1.0))
+        wait = loop.Ts + loop.tau
+        drift = n.phi + n.DB * (still.kb + still.ups) + self.plant.D_E * loop.wbar
+
+        def least(*parts: tuple[Array, Array]) -> Array:
+            first = sum((x for x, _ in parts), still.s1 * wait)
+            second = sum((y for _, y in parts), moving.s1 * wait)
+            return least_solution(drift + n.DB * first, n.DB * (second - first))
+
+        ripple = still.ripple, moving.ripple
+        settled = least((still.bias, moving.bias), ripple)
+        return np.minimum(drift + n.DB * (n.Dh + n.R), np.maximum(settled, least((n.H0, n.H0), ripple)))
 
     @quiet
     def needed(self, at: Lanes, chosen: Choice) -> Array:
@@ -179,30 +192,31 @@ class Search:
         found = chosen(place[:, :, None])
         return best, Choice(dhat=found.dhat[:, 0], omega=found.omega[:, 0], f0=found.f0[:, 0])
 
-    def level(self, at: Lanes) -> Choice | None:
-        """The least level of one machine, with its choice; None if none was found."""
+    def levels(self, at: Lanes, rounds: int = 4) -> Choice:
+        """The least levels that are found, with their choices; NaN where there is none."""
+        best, best_choice = self.least(at)
         low = max(float(self.plant.n.d0), 1e-6 * self.dbar)
-        grid = np.geomspace(low, self.dbar, 48)
-        holds = self._holds(at, grid)
-        if not holds.any():
-            best, choice = self.least(at)
-            return choice if best[0] < 1 else None
-        first = int(np.argmax(holds))
-        dhat = grid[[first]]
-        if first > 0:
-            dhat = boundary_log(
-                lambda x: self._holds(at, x.ravel()).reshape(x.shape),
-                grid[[first]],
-                grid[[first - 1]],
-                rounds=4,
-            )
-        _, choice = self.least(at, dhat)
-        return choice
+        grid = np.geomspace(np.full(len(at.Ts), low), np.full(len(at.Ts), self.dbar), _LEVELS)
+        grid = np.sort(np.vstack([grid, best_choice.dhat]), axis=0)
+        holds = self._holds(at, grid) | ((grid == best_choice.dhat) & (best < 1))
+        lanes, first = np.arange(len(at.Ts)), np.argmax(holds, axis=0)
+        good, bad = grid[first, lanes], grid[np.maximum(first - 1, 0), lanes]
+        dhat = boundary_log(lambda x: self._holds(at, x), good, bad, rounds=rounds)
+        value, choice = self.least(at, dhat)
+        # what was found by a search over all levels serves where the one at a single level has missed it
+        kept = np.where(value < 1, True, False)
+        dhat = np.where(kept, dhat, np.where(best < 1, best_choice.dhat, np.nan))
+        return Choice(
+            dhat=dhat,
+            omega=np.where(kept, choice.omega, best_choice.omega),
+            f0=np.where(kept, choice.f0, best_choice.f0),
+        )
 
     def _holds(self, at: Lanes, dhat: Array) -> Mask:
-        """Whether the theorem holds at levels, for one machine."""
-        best, _ = self.least(at[np.zeros(len(dhat), dtype=int)], dhat)
-        return np.asarray(best < 1)
+        """Whether the theorem holds at levels, shape `(points, lanes)`."""
+        repeated = at[np.tile(np.arange(dhat.shape[1]), dhat.shape[0])]
+        best, _ = self.least(repeated, dhat.ravel())
+        return np.asarray(best < 1).reshape(dhat.shape)
 
 
 def _around(free: tuple[bool, ...]) -> Array:
@@ -259,8 +273,8 @@ def setting_at(problem: TubeProblem, machine: Machine, value: Fraction) -> Setti
 
 def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     """The least level that is found for a machine, as a recipe that is checked; None if none was found."""
-    choice = search.level(setting.lanes())
-    if choice is None:
+    choice = search.levels(setting.lanes())
+    if not np.isfinite(choice.dhat[0]):
         return None
     omega = float(choice.omega[0])
     bandwidth = setting.bandwidth
