@@ -7,7 +7,7 @@ is not monotone in Ts. Implements: theory section 8.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -272,21 +272,22 @@ def setting_at(problem: TubeProblem, machine: Machine, value: Fraction) -> Setti
 
 
 def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
-    """The least level that is found for a machine, as a recipe that is checked; None if none was found."""
-    choice = search.levels(setting.lanes())
-    if not np.isfinite(choice.dhat[0]):
-        return None
-    omega = float(choice.omega[0])
-    bandwidth = setting.bandwidth
-    if bandwidth is None and omega * float(setting.sample_time) < 0.9 * _DEADBEAT:
-        bandwidth = round_up(omega, DIGITS)
-    floor = round_up(float(choice.f0[0]), _ROOM)
+    """The least level that is found for a machine; where none serves, what comes nearest, if anything is finite."""
+    at = setting.lanes()
+    choice = search.levels(at)
+    if np.isfinite(choice.dhat[0]):
+        return served(search, setting, choice)
+    best, nearest = search.least(at)
+    return proof_at(search, setting, printed(setting, nearest, 0.0), 1e-6) if np.isfinite(best[0]) else None
+
+
+def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
+    """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried."""
     recipe: HardwareRecipe | None = None
     for room in (1e-7, 1e-5, 1e-4, 1e-3, 1e-2):
-        level = round_up(float(choice.dhat[0]) * (1 + room), DIGITS + 1)
-        printed = Printed(bandwidth=bandwidth, level=level, floor=floor)
+        own = printed(setting, choice, room)
         for inflation in (1e-9, 1e-6):
-            recipe = proof_at(search, setting, printed, inflation)
+            recipe = proof_at(search, setting, own, inflation)
             if recipe is not None and serves(search.problem, recipe):
                 return recipe
     return recipe
@@ -299,6 +300,18 @@ class Printed:
     bandwidth: Fraction | None
     level: Fraction
     floor: Fraction
+
+
+def printed(setting: Setting, choice: Choice, room: float) -> Printed:
+    """A choice of one lane as decimals; the level with `room` of its own."""
+    omega, bandwidth = float(choice.omega[0]), setting.bandwidth
+    if bandwidth is None and omega * float(setting.sample_time) < 0.9 * _DEADBEAT:
+        bandwidth = round_up(omega, DIGITS)
+    return Printed(
+        bandwidth=bandwidth,
+        level=round_up(float(choice.dhat[0]) * (1 + room), DIGITS + 1),
+        floor=round_up(float(choice.f0[0]), _ROOM),
+    )
 
 
 def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -> HardwareRecipe | None:
@@ -331,8 +344,8 @@ def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -
 
 def largest_value(search: Search) -> float:
     """The largest number of what is searched for that serves, in floats; 0 if none does."""
-    asked, problem, machine = search.machine.asked, search.problem, search.machine
-    one = setting_at(problem, machine, Fraction(1)).lanes()
+    asked = search.machine.asked
+    one = setting_at(search.problem, search.machine, Fraction(1)).lanes()
 
     def at(x: Array) -> Lanes:
         base = one[np.zeros(len(x), dtype=int)]
@@ -342,15 +355,25 @@ def largest_value(search: Search) -> float:
             return replace(base, wbar=x)
         if asked.largest == "delay":
             return replace(base, tau=x)
-        Tf = x if asked.feedback_time is None else base.Tf
-        return replace(base, Ts=x, Tf=Tf, tau=x if asked.one_sample else base.tau)
+        return sampled_at(search.machine, base, x)
 
+    return _largest(search, at, _ends(search), points=60)
+
+
+def sampled_at(machine: Machine, base: Lanes, Ts: Array) -> Lanes:
+    """The same machines with other sample times, and what follows from them."""
+    follows = machine.asked.feedback_time is None
+    return replace(
+        base, Ts=Ts, Tf=Ts if follows else base.Tf, tau=Ts if machine.asked.one_sample else base.tau
+    )
+
+
+def _largest(search: Search, at: Callable[[Array], Lanes], ends: tuple[float, float], points: int) -> float:
     def test(x: Array) -> Mask:
         best, _ = search.least(at(x.ravel()))
         return np.asarray(best < 1).reshape(x.shape)
 
-    low, high = _ends(search)
-    return float(largest(test, np.array([low]), np.array([high]), points=60)[0])
+    return float(largest(test, np.array([ends[0]]), np.array([ends[1]]), points=points)[0])
 
 
 def _ends(search: Search) -> tuple[float, float]:
@@ -370,17 +393,52 @@ def _ends(search: Search) -> tuple[float, float]:
 def _largest_values(search: Search) -> Iterator[Fraction]:
     """Decimals to try for what is searched for, the largest first."""
     asked = search.machine.asked
-    found = largest_value(search)
-    if (
-        asked.largest == "delay"
-        and asked.sample_time is not None
-        and found > 0.999 * float(asked.sample_time)
-    ):
-        yield asked.sample_time
+    found, most = largest_value(search), asked.sample_time
+    if asked.largest == "delay" and most is not None and found > 0.999 * float(most):
+        yield most
     for attempt in range(4 if found > 0 else 0):
         yield round_down(found * (1 - 1e-9) * (1 - attempt * 2e-4), DIGITS)
     if asked.largest != "sample_time":
         yield Fraction(0)
+
+
+def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
+    """Levels against the sample time, at machines that are else the same; at most up to where none serves any more."""
+    given, machine = float(setting.sample_time), search.machine
+    base = setting.lanes()
+    if machine.asked.largest == "sample_time":
+        most = given
+    else:
+        ends = (0.5 * given, 1e2 / search.rate)
+        most = max(
+            _largest(search, lambda x: sampled_at(machine, base[np.zeros(len(x), dtype=int)], x), ends, 40),
+            given,
+        )
+    least = given / 16 if machine.asked.one_sample else max(given / 16, float(setting.delay), 1e-9 * most)
+    times = np.geomspace(least, most, _CURVE_POINTS) if least < most else np.array([given])
+    exact = sorted({round_down(value * (1 - 1e-9), 3) for value in times} | {setting.sample_time})
+    settings = [
+        replace(
+            setting,
+            sample_time=Ts,
+            delay=Ts if machine.asked.one_sample else setting.delay,
+            feedback_time=Ts if machine.asked.feedback_time is None else setting.feedback_time,
+            bandwidth=machine.asked.bandwidth,
+        )
+        for Ts in exact
+        if machine.asked.one_sample or setting.delay <= Ts
+    ]
+    lanes = sampled_at(
+        machine, base[np.zeros(len(settings), dtype=int)], np.array([float(x.sample_time) for x in settings])
+    )
+    choices = search.levels(lanes, rounds=3)
+    found = []
+    for i, each in enumerate(settings):
+        own = Choice(dhat=choices.dhat[[i]], omega=choices.omega[[i]], f0=choices.f0[[i]])
+        recipe = served(search, each, own) if np.isfinite(own.dhat[0]) else None
+        if recipe is not None:
+            found.append(recipe)
+    return tuple(found)
 
 
 def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:
@@ -390,11 +448,14 @@ def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRec
     if machine is None or obstacles(problem, theorem_h.THEOREM):
         return Proposal()
     search = Search(problem, machine)
-    if machine.asked.largest is None:
-        recipe = recipe_at(search, setting_at(problem, machine, Fraction(1)))
-        return Proposal() if recipe is None else Proposal(decisive=recipe, role="machine")
-    for value in _largest_values(search):
-        recipe = recipe_at(search, setting_at(problem, machine, value))
+    searched = machine.asked.largest is not None
+    recipe: HardwareRecipe | None = None
+    for value in _largest_values(search) if searched else [Fraction(1)]:
+        setting = setting_at(problem, machine, value)
+        recipe = recipe_at(search, setting)
         if recipe is not None and serves(problem, recipe):
-            return Proposal(decisive=recipe, role="largest")
-    return Proposal()
+            break
+    if recipe is None:
+        return Proposal()
+    curve = _curve(search, setting) if serves(problem, recipe) else ()
+    return Proposal(decisive=recipe, role="largest" if searched else "machine", curve=curve)
