@@ -305,8 +305,8 @@ def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Clai
 
 
 def _wind(node: Node) -> Wind:
-    own = node.closed(optional=("bound", "rate"))
-    return Wind(bound=own.get("bound", Node.exact), rate=own.get("rate", Node.exact))
+    own = node.closed("bound", optional=("rate",))
+    return Wind(bound=own.known("bound", Node.exact), rate=own.get("rate", Node.exact))
 
 
 def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:

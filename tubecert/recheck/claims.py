@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 from flint import arb, ctx
 
@@ -40,7 +39,7 @@ from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
-from tubecert.recheck.kinds.kind import Ground, Kind
+from tubecert.recheck.kinds.kind import Ground, Section
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
@@ -414,21 +413,19 @@ def _gains(case: Case) -> Iterator[Claim]:
         machine=case.machine,
     )
     for kind in present:
-        yield from kind.claims(sections.by_key[kind.key], recipes.get(kind.key), ground)
-        yield from _inputs(case, kind, ground)
+        section = sections.by_key[kind.key]
+        missing, own = kind.uncovered(case.setting), ground
+        if missing is not None:
+            yield ground.claim(
+                f"{kind.key}: it says that it covers no such disturbance",
+                (section,),
+                lambda section=section, missing=missing: _silent(section, missing),  # type: ignore[misc]
+            )
+            own = replace(ground, setting=replace(case.setting, wind=None), silent=True)
+        yield from kind.claims(section, recipes.get(kind.key), own)
 
 
-def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]:
-    """What a kind adds to inputs that have limits."""
-    bounds = tuple(own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds)
-    recipe = case.result.recipes.get(kind.key)
-    if bounds:
-        yield ground.claim(
-            f"{kind.key}: what is added to u*",
-            (bounds, recipe),
-            lambda: (
-                metric.stated(False, "it has no recipe")
-                if recipe is None
-                else inputs.added(ground.setting, kind.shares(recipe, ground.setting), bounds)
-            ),
-        )
+def _silent(section: Section, missing: str) -> Outcome:
+    """A section that is not certified, and names why."""
+    named = any(item.condition == missing for item in section.shortfalls)
+    return metric.stated(named and section.verdict != "certified", f"{missing} is not named")

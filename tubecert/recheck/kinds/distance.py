@@ -127,7 +127,7 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         certified = section.verdict == "certified"
         for k, (name, pair) in enumerate(section.pairs.items()):
             decides = k == 0
-            if name == "asked" and not certified:
+            if name == "asked" and not certified and not ground.silent:
                 yield ground.claim(
                     "B: what is told of it",
                     (pair,),

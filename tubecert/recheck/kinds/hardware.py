@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.balls import exact, root
+from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.digital import Digital, Loop, Promise, loop, proposed
 from tubecert.recheck.document import Node
@@ -84,6 +85,11 @@ class OfMachines(Kind[HardwareSection, Digital]):
             bandwidth=own.known("bandwidth", Node.decimal),
             prediction=own.known("prediction", Node.decimal),
         )
+
+    def uncovered(self, setting: Setting) -> str | None:
+        """Nothing: its recipe has the bound of a disturbance."""
+        del setting
+        return None
 
     def said(self, section: HardwareSection) -> dict[str, object]:
         """Both margins."""

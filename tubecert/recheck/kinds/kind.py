@@ -60,6 +60,7 @@ class Ground:
 
     `depends` is everything that the setting was made of, `around` everything that the tube, the `place`, was made of;
     `projection_radius` is that of the pairs of A and B; `machine` are the constants of a machine, if there is one.
+    `silent`: the section is printed as if there were no disturbance, of which it says that it covers none.
     """
 
     setting: Setting
@@ -70,6 +71,7 @@ class Ground:
     around: tuple[object, ...]
     specification: Specification
     machine: MachineNumbers | None
+    silent: bool = False
 
     def claim(self, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
         """A claim about formulas at decimals, which depends on `parts` beside the setting."""
@@ -131,6 +133,11 @@ class Kind(ABC, Generic[S, R]):
         """Whether a certificate of a specification has this section."""
         del specification
         return True
+
+    def uncovered(self, setting: Setting) -> str | None:
+        """The condition that a section names, uncertified, where it does not cover the disturbance; None if it does."""
+        searched = setting.wind is not None and setting.wind.bound is None
+        return "wind_bound" if searched else None
 
     def asked(self, section: S, given: Asked) -> Statements:
         """That what was asked for is what is judged."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
@@ -30,7 +30,6 @@ from tubecert.recheck.specified.numbers import Rows
 from tubecert.recheck.system import System
 
 CONDITIONS = ("26a", "26b", "26c")
-UNCOVERED = "wind_not_covered"  # a condition that is no number
 DERIVED = (
     "speed",
     "uncertainty_rate",
@@ -105,6 +104,10 @@ class Rates(Kind[RateSection, Gains]):
             if pair is not None:
                 yield pair.gains.projection_radius
 
+    def uncovered(self, setting: Setting) -> str | None:
+        """A disturbance of any kind."""
+        return None if setting.still else "wind_not_covered"
+
     def asked(self, section: RateSection, given: Asked) -> Statements:
         """The pair is the one asked for."""
         for name in ("bandwidth", "adaptation_rate"):
@@ -125,13 +128,10 @@ class Rates(Kind[RateSection, Gains]):
         return Shares(setting.reach, recipe.projection_radius)
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
-        """Predictor, constants, margins, radius, curve; beside a disturbance these are formulas that know of none."""
-        setting, R_H, least = ground.setting, ground.projection_radius, section.least_adaptation
-        if not setting.still:
-            yield ground.claim("A: it says nothing of a disturbance", (section,), lambda: _silent(section))
-            setting = replace(setting, wind=None)
+        """Predictor, constants, margins, radius, curve."""
         if section.pair is not None:
-            yield from _of_pair(section, section.pair, recipe, ground, setting)
+            yield from _of_pair(section, section.pair, recipe, ground)
+        setting, R_H, least = ground.setting, ground.projection_radius, section.least_adaptation
         if least is not None:
             name = f"A: (26a)-(26c) at {words(least.gains)}"
             yield ground.claim(name, (least,), lambda: _margins_hold(least, setting))
@@ -222,17 +222,9 @@ def _margins(node: Node) -> Margins:
 # -- claims
 
 
-def _silent(section: RateSection) -> Outcome:
-    """Theorem A is not stated with a disturbance."""
-    named = any(item.condition == UNCOVERED for item in section.shortfalls)
-    return stated(named and section.verdict != "certified", "theorem A is not stated with a disturbance")
-
-
-def _of_pair(
-    section: RateSection, pair: RatePair, recipe: Gains | None, ground: Ground, setting: Setting
-) -> Iterator[Claim]:
+def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
     """What is claimed of the gains that the verdict is about."""
-    at = pair.gains
+    setting, at = ground.setting, pair.gains
     predictor, radius = section.predictor, section.ultimate_radius
     if predictor is not None:
         yield ground.claim("A: the predictor", (predictor,), lambda: _loop_holds(predictor, setting.system))
@@ -243,14 +235,14 @@ def _of_pair(
         yield ground.claim(
             "A: its recipe", (pair, recipe), lambda: stated(recipe == at, "it is for other gains")
         )
-    elif ground.setting.still:
+    elif not ground.silent:
         yield ground.claim("A: what is told of it", (pair,), lambda: not_shown_to_hold(pair.margins.values()))
     if radius is not None:
         yield ground.claim(
             "A: ultimate radius",
             (at, radius),
             lambda: ultimate(
-                radius, ground.setting, at, own_distance_proof(ground.setting, at)
+                radius, setting, at, own_distance_proof(setting, at)
             ),  # theorem B at the same gains
         )
     below = at.bandwidth < 2 * setting.system.rate or not section.below_twice_rate

@@ -87,7 +87,7 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
                 lambda: _holds(section, pair, recipe, setting),
             )
         if section.verdict != "certified":
-            yield ground.claim("C: what is told of it", (section,), lambda: _told(section))
+            yield ground.claim("C: what is told of it", (section,), lambda: _told(section, ground))
         yield ground.claim(
             "C: the curve is feasible", (curve, pair), lambda: _curve_holds(curve, pair, setting)
         )
@@ -141,11 +141,13 @@ def _holds(
     return at_most(ultimate, radius, "the ultimate radius") if found.holds and radius is not None else found
 
 
-def _told(section: SampledSection) -> Outcome:
+def _told(section: SampledSection, ground: Ground) -> Outcome:
     """Gains that are not certified: no radius in the long run, and no margin that says that they serve."""
     if section.ultimate_radius is not None:
         return stated(False, "a radius is stated of a tube that is not certified")
-    return not_shown_to_hold([section.margin]) if section.margin is not None else CONFIRMED
+    if section.margin is None or ground.silent:
+        return CONFIRMED
+    return not_shown_to_hold([section.margin])
 
 
 def _curve_holds(
