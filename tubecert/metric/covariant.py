@@ -33,13 +33,17 @@ _ENTRIES = 1_000_000  # of the largest tensor of a batch
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Over every box: T with T W T' between `least` and `most` times I, and an enclosure of (T W T')^-1."""
+    """Over every box: T with T W T' between `least` and `most` times I, and an enclosure of (T W T')^-1.
+
+    `varies` (N, d) is how much W varies with each variable, against its middle; it only steers a search.
+    """
 
     T: Form
     raised: Form  # T W
     M: Form
     least: Array
     most: Array
+    varies: Array
 
     def both(self, a: Form) -> Form:
         """T A T' of one matrix."""
@@ -69,7 +73,9 @@ def frame_of(W: Form) -> Frame:
     wide = off / (1 - off) * (1 + _SLACK)
     M = Form(eye.parts, np.broadcast_to(wide[:, None, None], eye.radius.shape))
     raised = contract("ij,jk->ik", T, W)
-    return Frame(T=T, raised=raised, M=M, least=np.nextafter(1 - off, 0), most=np.nextafter(1 + off, 2))
+    varies = np.array([norm_bound(np.abs(part)) for part in near.parts[1:]]).reshape(count, -1).T
+    least, most = np.nextafter(1 - off, 0), np.nextafter(1 + off, 2)
+    return Frame(T=T, raised=raised, M=M, least=least, most=most, varies=varies)
 
 
 Tensor = Callable[[Frame, list[Form]], Form]
@@ -118,7 +124,10 @@ class MetricTensorNorm:
         value = np.min([value for value, _ in norms], axis=0)
         # x has length 1 in the metric where T' ^-1 x is at most 1/sqrt(least) long
         value = value / frame.least ** (self._rank / 2) * (1 + _SLACK)
-        return np.where(np.isnan(value), np.inf, value), norms[0][1]
+        # where W is not even known to be positive definite, only what varies it helps
+        endless = ~np.isfinite(value)
+        grown = np.where(endless[:, None], frame.varies, norms[0][1])
+        return np.where(endless, np.inf, value), grown
 
     def lower(self, lo: Array, hi: Array) -> Array:
         """The same at points, from below."""
