@@ -12,6 +12,7 @@ no; numbers are not computed here, they are only shown.
 | `synthesis`, `simulation` | the reports of synth and simulate |
 | `quantities` | the numbers of a certificate as a flat list |
 | `sweep`, `sweep_page`, `figures_sweep` | sweeps: table, page, curves and heat maps |
+| `comparison`, `figures_comparison` | certificates side by side |
 | `figures_file` | figures as files of their own |
 | `figures_rates` | the metrics that a synthesis compared, drawn over the rate |
 | `layout` | parts, titles and tables on a terminal |

@@ -24,7 +24,9 @@ _SYMBOLS = {
     "adaptation_rate": "Γ",
     "sample_time": "Ts (s)",
     "ultimate_radius": "in the long run",
-    "rate": "λ (1/s)",
+    "rate": "rate λ (1/s)",
+    "rho_a": "rho_a",
+    "rho_r": "rho_r",
 }
 _DETAILS = ("section", "condition", "constant", "state", "obstacle")  # of a claim, that tell which one it is
 

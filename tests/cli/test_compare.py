@@ -1,0 +1,180 @@
+"""`compare`: what certificates state, side by side; what is missing and what differs is said."""
+
+from __future__ import annotations
+
+import copy
+import csv
+import io
+import json
+import xml.etree.ElementTree as ET
+
+import certificates
+import pytest
+from typer.testing import CliRunner
+
+from tubecert.certificate import dump, seal
+from tubecert.certificate.result import Certificate
+from tubecert.cli.app import app
+from tubecert.kinds import NAMES
+from tubecert.report.comparison import Comparison, page_of_comparison
+from tubecert.report.quantities import quantities
+
+pytestmark = pytest.mark.timeout(60)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+
+
+def changed(change):
+    result = copy.deepcopy(certificates.certified())
+    change(result)
+    return result
+
+
+def other(result):
+    """Half the rate, another horizon, and no certificate C."""
+    result["spec"]["effective"]["trajectory"] |= {"at": ["0", "1"], "horizon": "10"}
+    result["distance"]["least_adaptation"]["adaptation_rate"] *= 0.5
+    del result["sampled"]
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = []
+    for name, result in (("before", certificates.certified()), ("after", changed(other))):
+        paths.append(tmp_path / f"{name}.certificate.json")
+        paths[-1].write_text(dump(seal(result, {})), encoding="utf-8")
+    return paths
+
+
+def told(*results):
+    return Comparison.of(
+        [(f"{i}.json", Certificate.from_json(seal(each, {}))) for i, each in enumerate(results)]
+    )
+
+
+def test_a_table_names_gains_changes_what_is_missing_and_what_differs(files):
+    done = run("compare", *files)
+    assert done.exit_code == 0, done.output
+    lines = [" ".join(line.split()) for line in done.output.splitlines()]
+    assert lines[0] == "pendulum: 2 certificates, 2 keys of their specifications differ"
+    rate = certificates.certified()["distance"]["least_adaptation"]["adaptation_rate"]
+    assert any(line.startswith("least Gamma, Γ ") and line.endswith("-50 %") for line in lines), rate
+    assert "verdict certified not there" in lines  # of C
+    assert "trajectory.at[1] 0 1" in lines
+    assert "trajectory.horizon not there 10" in lines
+    same = run("compare", files[0], files[0])
+    assert "2 certificates of the same specification" in same.output
+    assert "nothing" in same.output
+    assert "%" not in same.output
+
+
+def test_formats_have_every_number_as_the_certificate_states_it(files):
+    rows = {
+        row["quantity"]: row
+        for row in csv.DictReader(io.StringIO(run("compare", *files, "--format", "csv").output))
+    }
+    data = json.loads(run("compare", *files, "--json").output)
+    assert [each["name"] for each in data["certificates"]] == ["before", "after"]
+    for path, name in zip(files, ("before", "after"), strict=True):
+        result = json.loads(path.read_text(encoding="utf-8"))["result"]
+        index = ["before", "after"].index(name)
+        for key, number in (
+            ("rho", result["tube"]["rho"]),
+            (
+                "distance.least_adaptation.adaptation_rate",
+                result["distance"]["least_adaptation"]["adaptation_rate"],
+            ),
+            (
+                "distance.least_adaptation.margin.distance",
+                result["distance"]["least_adaptation"]["margin"][0],
+            ),
+        ):
+            assert float(rows[key][name]) == data["quantities"][key][index] == number
+    assert rows["sampled.verdict"] == {"quantity": "sampled.verdict", "before": "certified", "after": ""}
+    assert rows["specification.trajectory.horizon"]["after"] == "10"
+    assert data["differences"]["trajectory.horizon"] == [None, "10"]
+
+
+def test_markdown_is_a_comment_for_a_pull_request(files):
+    done = run("compare", *files, "--format", "markdown")
+    assert done.output.startswith("# pendulum: comparison\n")
+    assert "## Figures" not in done.output
+    tables = [line for line in done.output.splitlines() if line.startswith("|")]
+    assert {line.count("|") for line in tables} <= {4, 5}
+    assert "| trajectory.horizon | not there | 10 |" in tables
+
+
+def test_every_kind_is_there_without_being_named():
+    comparison = told(certificates.certified(), changed(other))
+    titles = [section.title for section in page_of_comparison(comparison).sections]
+    own = certificates.certified()
+    assert [title for title in titles if title in map(str, NAMES)] == [str(n) for n in NAMES if n.key in own]
+    found = {each.key for each in quantities(comparison.sides[0].result)}
+    assert {f"{name.key}.verdict" for name in NAMES if name.key in own} <= found
+
+
+def test_a_page_has_a_dot_for_every_value_hollow_where_it_is_not_certified(files, tmp_path):
+    def worse(result):
+        result["distance"]["verdict"] = "refuted"
+        del result["tube"]["rho_r"]
+
+    comparison = told(certificates.certified(), changed(worse))
+    (figures,) = page_of_comparison(comparison).sections[0].blocks
+    for figure in figures.figures:
+        dots = [mark.get("class") or "" for mark in ET.fromstring(figure.svg).iter("circle")]
+        hollow = [name for name in dots if name.endswith("hollow")]
+        assert dots
+        assert all(name.startswith("dot n2") for name in hollow)
+        if figure.title in ("Tube", "Γ"):
+            assert hollow
+    done = run(
+        "compare",
+        *files,
+        "-o",
+        tmp_path / "page.html",
+        "-o",
+        tmp_path / "page.md",
+        "-o",
+        tmp_path / "page.csv",
+    )
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<figure ") == len(figures.figures)
+
+
+def test_files_of_one_name_are_told_apart(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "c.certificate.json").write_text(
+            dump(seal(certificates.certified(), {})), encoding="utf-8"
+        )
+    done = run("compare", tmp_path / "one/c.certificate.json", tmp_path / "two/c.certificate.json", "--json")
+    names = [each["name"] for each in json.loads(done.output)["certificates"]]
+    assert names == [str(tmp_path / "one/c"), str(tmp_path / "two/c")]
+
+
+def test_lists_of_other_sizes_differ_as_a_whole():
+    def larger(result):
+        result["spec"]["effective"]["trajectory"]["at"] = ["0", "0", "0"]
+
+    differences = told(certificates.certified(), changed(larger)).differences
+    assert differences == {"trajectory.at": (["0", "0"], ["0", "0", "0"])}
+
+
+def test_what_cannot_be_compared_is_refused(files, tmp_path):
+    broken = tmp_path / "broken.json"
+    broken.write_text(
+        files[0].read_text(encoding="utf-8").replace("certified", "refuted", 1), encoding="utf-8"
+    )
+    for words, said in (
+        ((files[0],), "two certificates or more"),
+        ((files[0], broken), "TC601"),
+        ((files[0], tmp_path / "none.json"), "TC600"),
+        (("-", "-"), "given twice"),
+        ((*files, "-o", "page.pdf"), "TC120"),
+        ((*files, "-o", files[0]), "would be overwritten"),
+        ((*files, "--json", "--format", "csv"), "exclude each other"),
+    ):
+        done = run("compare", *words)
+        assert (done.exit_code, said in " ".join(done.output.split())) == (2, True), done.output
