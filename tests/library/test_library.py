@@ -555,3 +555,20 @@ omega: str = tc.read("x.json").omega
         line.removeprefix(f"{tmp_path}/").split(": ")[0] for line in said.splitlines() if "error" in line
     ]
     assert errors == ["wrong.py:3", "wrong.py:4", "wrong.py:5", "wrong.py:6"], said
+
+
+def test_keys_that_are_set_stand_in_place_of_those_of_the_specification():
+    spec = tc.load(DATA, settings={"tube.rho_a": 0.3, "initial_state": {"at": [0, Fraction(1, 20)]}})
+    assert spec == tc.load(changed(tube__rho_a=0.3, initial_state__at=[0, 0.05]))
+    again = tc.load(spec, settings={"tube.epsilon": 0.1})
+    assert again == tc.load(changed(tube__rho_a=0.3, tube__epsilon=0.1, initial_state__at=[0, 0.05]))
+    result = tc.certify(again, bandwidth=50, adaptation_rate=1e9)
+    assert result.certified
+    assert set(result.result.overrides.settings) == {"tube.rho_a", "tube.epsilon", "initial_state"}
+    assert tc.recheck(result).confirmed
+    refused("TC104", tc.certify, again, rho_a=0.2)
+    refused("TC104", tc.certify, tc.load(DATA, settings={"metric.rate": 0.3}), metric=DATA["metric"])
+    refused("TC104", tc.synthesise, again, epsilon=0.2)
+    refused("TC104", tc.load, again, settings={"tube.epsilon": 0.2})
+    refused("TC103", tc.load, DATA, settings={"tube.width": 0.2})
+    refused("TC106", tc.load, DATA, settings={"tube.rho_a": object()})

@@ -5,7 +5,7 @@ In: texts, and what findings call each (`--rho-a` in a command, `rho_a` in code)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Final, Literal, Never, TypeAlias, TypeVar
@@ -14,10 +14,15 @@ from tubecert.errors import SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, NamedPlace
 from tubecert.library.numbers import Numbers
-from tubecert.spec import Spec, Synthesis
+from tubecert.spec import Setting, Spec, Synthesis
 from tubecert.spec.synthesis import MAX_DEGREE, solver_name
 
 T = TypeVar("T", bound=str)
+_SETS: Final = {
+    "rho_a": "tube.rho_a",
+    "epsilon": "tube.epsilon",
+    "metric": "metric",
+}  # options by the keys they set
 Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification
 _GAP: Final = Fraction(1, 1000)
@@ -57,6 +62,29 @@ def verification_numbers(given: Mapping[str, str | None], named: Named) -> Verif
     budget = numbers.count(named("budget"), given["budget"])
     numbers.check()
     return VerificationNumbers(rate=rate, gap=gap or _GAP, budget=budget or _BUDGET)
+
+
+def set_twice(settings: Iterable[Setting], given: Mapping[str, object], named: Named) -> list[Finding]:
+    """What is set by its key and by an option, too."""
+    return [
+        _twice(setting, named(name), key)
+        for setting in settings
+        for name, key in _SETS.items()
+        if given.get(name) is not None and setting.meets(key)
+    ]
+
+
+def require_once(spec: Spec, given: Mapping[str, object]) -> None:
+    """Raises `SpecError` for an argument that says what a key says that was set in the specification."""
+    settings = [Setting(path=path, text=text) for path, text in spec.settings]
+    if twice := set_twice(settings, given, str):
+        raise SpecError(twice)
+
+
+def _twice(setting: Setting, option: str, key: str) -> Finding:
+    place = NamedPlace(file=setting.place, line=1, column=1, source=str(setting), width=len(setting.path))
+    message = f"{option} is given, too, and says what {key} is"
+    return Finding(code="TC104", message=message, location=place, help="keep one of them")
 
 
 def at_rate(spec: Spec, rate: Fraction | None) -> Spec:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from tubecert import certificate, pipeline
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
-from tubecert.library.asked import certification_numbers, one_of, refuse
+from tubecert.library.asked import certification_numbers, one_of, refuse, require_once
 from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
@@ -58,6 +58,7 @@ def certify(
     numbers = certification_numbers(texts, str)
     _check_words(conditions, formulas, numbers)
     whole, seconds = spec_of(spec), numbers.pop("deadline", None)
+    require_once(whole, {**texts, "metric": metric})
     options = Options(**numbers, conditions=conditions, formulas=formulas)
     if metric is not None:
         whole, name = with_metric(whole, metric)

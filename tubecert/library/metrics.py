@@ -23,6 +23,7 @@ from tubecert.library.asked import (
     at_rate,
     degree_of,
     one_of,
+    require_once,
     synthesis_numbers,
     verification_numbers,
     wanted_of,
@@ -245,6 +246,7 @@ def synthesise(
     )
     numbers = synthesis_numbers(texts, str)
     system = spec_of(spec)
+    require_once(system, texts)
     wishes = Wishes(
         rate=numbers.rate,
         objective=one_of("objective", objective, OBJECTIVES),

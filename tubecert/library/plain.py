@@ -62,6 +62,12 @@ def document_text(data: Data) -> str:
     return json.dumps(_plain(data, "", 0), indent=1, ensure_ascii=False) + "\n"
 
 
+def entry_text(value: object, name: str) -> str:
+    """A value on one line; raises `SpecError` for what has no place in a specification."""
+    found = _plain(value, name, 0)
+    return found if isinstance(found, str) else json.dumps(found, ensure_ascii=False)
+
+
 def _plain(value: object, path: str, depth: int) -> Plain:
     """The value in texts, lists and mappings of them."""
     if depth > _DEEPEST:

@@ -6,7 +6,7 @@ In: what a user has. Out: a `Specification`, which holds the `Spec` that command
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -14,8 +14,8 @@ from typing import Final, TypeAlias
 from tubecert.certificate.file import digest
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
-from tubecert.spec import Spec, canonical
-from tubecert.spec.load import VERSION, load_source
+from tubecert.spec import Setting, Spec, canonical
+from tubecert.spec.load import VERSION, again, load_source
 from tubecert.spec.source import Source, read_source
 
 File: TypeAlias = str | os.PathLike[str]
@@ -81,12 +81,13 @@ class Specification:
 Specifiable: TypeAlias = Specification | File | Data
 
 
-def load(source: Specifiable) -> Specification:
+def load(source: Specifiable, *, settings: Data | None = None) -> Specification:
     """The specification in a file (its path), or in a mapping (see `specification`).
 
+    `settings` are keys that are set in place of its own, by their paths: `{"tube.rho_a": 0.05}`, as `--set` does.
     Raises `TargetError` if the file cannot be read, and `SpecError` with every problem of it.
     """
-    return Specification(spec=spec_of(source))
+    return Specification(spec=spec_of(source, settings_of(settings or {})))
 
 
 def specification(data: Data | str) -> Specification:
@@ -98,13 +99,19 @@ def specification(data: Data | str) -> Specification:
     return Specification(spec=load_source(_source(data)))
 
 
-def spec_of(source: Specifiable, *, alone: bool = False) -> Spec:
+def spec_of(source: Specifiable, settings: Sequence[Setting] = (), *, alone: bool = False) -> Spec:
     """What `load` reads; `alone`: what is no part of a system with its metric may be missing, and is not read."""
     if isinstance(source, Specification):
-        return source.spec
+        kept = [Setting(path=path, text=text) for path, text in source.spec.settings]
+        return again(source.spec, [*kept, *settings]) if settings else source.spec
     if isinstance(source, Mapping):
-        return load_source(_source(source), alone=alone)
-    return load_source(read_source(os.fspath(source)), alone=alone)
+        return load_source(_source(source), settings, alone=alone)
+    return load_source(read_source(os.fspath(source)), settings, alone=alone)
+
+
+def settings_of(given: Data) -> list[Setting]:
+    """Keys that are set, with the texts of their values; raises `SpecError`."""
+    return [Setting.of(f"{key}={plain.entry_text(value, str(key))}") for key, value in given.items()]
 
 
 def _source(data: Data | str) -> Source:
