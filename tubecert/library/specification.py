@@ -111,7 +111,9 @@ def spec_of(source: Specifiable, settings: Sequence[Setting] = (), *, alone: boo
 
 def settings_of(given: Data) -> list[Setting]:
     """Keys that are set, with the texts of their values; raises `SpecError`."""
-    return [Setting.of(f"{key}={plain.entry_text(value, str(key))}") for key, value in given.items()]
+    return [
+        Setting.of(f"{key}={plain.entry_text(value, str(key))}", "settings") for key, value in given.items()
+    ]
 
 
 def _source(data: Data | str) -> Source:
