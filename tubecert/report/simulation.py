@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.table import Table
 from rich.text import Text
 
+from tubecert.records import from_json
 from tubecert.report.layout import indented, titled
-from tubecert.report.numbers import UNKNOWN, short
+from tubecert.report.numbers import UNKNOWN, down, short, up
+from tubecert.simulate.inputs import InputUse
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -118,14 +120,21 @@ def _sections(data: Data, verbose: bool) -> Iterator[tuple[str, list[RenderableT
         yield f"Attacks within the class, seed {data['seed']}", [_class(data), _attacks(data)]
     if any(_counts(part) for part in _parts(data)):
         yield "Largest share of every bound", [_bounds(data)]
+    if inputs := _inputs(data):
+        yield "Inputs with limits, in all runs", [_table_of(inputs)]
     if data["obstacles"]["plan"]:
         yield "Obstacles (least distance; negative: collision)", [_obstacles(data)]
     if verbose:
         yield "Gains", [_gains(loop) for loop in data["loops"] if "gains" in loop]
 
 
+def _where(part: Data, item: Data) -> str:
+    """Which run it was."""
+    return str(part["what"]).replace("{run}", str(item["run"]))
+
+
 def _violation(part: Data, item: Data) -> Text:
-    where = part["what"].replace("{run}", str(item["run"]))
+    where = _where(part, item)
     what = (
         f"{part['controller']}: {_WORDS.get(item['bound_of'], item['bound_of'])} is {short(item['value'], 6)}"
     )
@@ -138,12 +147,12 @@ def _violation(part: Data, item: Data) -> Text:
 
 
 def _stopped(part: Data, item: Data) -> Text:
-    where = part["what"].replace("{run}", str(item["run"]))
+    where = _where(part, item)
     return Text(f"{part['controller']}: {item['reason']} at t = {short(item['t'])} s, {where}")
 
 
 def _unresolved(part: Data, item: Data) -> Text:
-    where = part["what"].replace("{run}", str(item["run"]))
+    where = _where(part, item)
     since = UNKNOWN if item["t"] is None else f"{short(item['t'])} s"
     return Text(
         f"{part['controller']}: from t = {since} on the run depends on the steps of the integration: "
@@ -228,6 +237,24 @@ def _bounds(data: Data) -> Table:
                     shares[name] = max(shares.get(name, 0.0), use["share"])
     for controller, shares in most.items():
         table.add_row(controller, *(short(shares[name]) if name in shares else UNKNOWN for name in _WORDS))
+    return table
+
+
+def _inputs(data: Data) -> dict[tuple[str, str], InputUse]:
+    """How far every input with limits went over all runs of a loop, by controller and input."""
+    found: dict[tuple[str, str], InputUse] = {}
+    for part in _parts(data):
+        for own in from_json(tuple[InputUse, ...], part.get("inputs", []), "inputs"):
+            key = str(part["controller"]), own.input
+            found[key] = own if key not in found else found[key].joined(own)
+    return found
+
+
+def _table_of(inputs: Mapping[tuple[str, str], InputUse]) -> Table:
+    table = _table("controller", "input", "went", "is proven to stay in")
+    for (controller, name), own in inputs.items():
+        stays = UNKNOWN if own.proven is None else f"[{down(own.proven[0])}, {up(own.proven[1])}]"
+        table.add_row(controller, name, f"[{short(own.least)}, {short(own.greatest)}]", stays)
     return table
 
 

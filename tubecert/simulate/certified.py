@@ -23,6 +23,7 @@ from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.kinds.data import SectionData
 from tubecert.model import ControlAffineModel
+from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
@@ -44,12 +45,14 @@ class Values(dict[str, float]):
 class Section:
     """What one kind of certificate states: whether it is certified, by which recipe, and the radius in the long run.
 
-    `recipe` are the numbers that it proves its claim with, by their names in `proof`.
+    `recipe` are the numbers that it proves its claim with, by their names in `proof`; `ranges` what is proven of
+    inputs that have limits.
     """
 
     certified: bool
     recipe: Values
     ultimate: float | None
+    ranges: tuple[InputRange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +166,9 @@ def read_numbers(result: Result) -> Certified:
             {name: item.above for name, item in result.constants.items() if item.above is not None}
         ),
         sections={
-            name: _section(result, recipe, result.sections.get(name))
+            name: replace(
+                _section(result, recipe, result.sections.get(name)), ranges=proven_ranges(result, name)
+            )
             for name, recipe in result.proof.of.items()
         },
     )

@@ -18,6 +18,7 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression, derivatives
 from tubecert.findings import Finding
 from tubecert.model import TIME
+from tubecert.simulate.inputs import InputUse, beyond, used
 from tubecert.simulate.promise import Promise
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Setting
@@ -72,6 +73,7 @@ class Comparison:
     failures: tuple[tuple[int, float, str], ...] = field(default=())
     first_exit: tuple[int, float] | None = None
     unresolved: tuple[tuple[int, float], ...] = ()
+    inputs: tuple[InputUse, ...] = ()
 
 
 def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison:
@@ -98,6 +100,7 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
         failures=tuple((item.lane, item.t, item.reason) for item in runs.failures),
         first_exit=_first_exit(setting, runs, sorted(lanes)),
         unresolved=tuple((lane, float(runs.unresolved[lane])) for lane in unreliable),
+        inputs=used(setting.spec, runs, usable, promise.ranges if promise else ()),
     )
 
 
@@ -142,6 +145,8 @@ def _violations(
     for i, width in enumerate(promise.half_widths):
         name = f"half-width of {setting.spec.states[i]}"
         found += _over_time(name, gap[:, :, i], np.full(len(runs.t), width), runs.t, room * width)
+    for name, values, bound, size in beyond(runs, promise.ranges):
+        found += _over_time(name, values, np.full(len(runs.t), bound), runs.t, room * size)
     if promise.decay is not None:
         found += _over_time("D(t)", runs.distance, promise.decay(runs.t), runs.t, room * setting.reach)
     for item in runs.failures:

@@ -95,7 +95,7 @@ def monte_carlo(
         for batch in _batches(setting, count, seed):
             if report is not None:
                 report(name, len(cases), count)
-            parts.append(_slim(_run(setting, problem, batch)))
+            parts.append(_slim(_run(setting, problem, batch), inputs=bool(setting.spec.limits)))
             cases += batch
     except KeyboardInterrupt:
         del cases[sum(part.lanes for part in parts) :]
@@ -112,12 +112,12 @@ def _run(setting: Setting, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
     return integrate(problem, starts, disturbance_of(setting, cases), tolerance=setting.tolerance)
 
 
-def _slim(runs: Runs) -> Runs:
-    """Runs without what only drawings need: many of them fit into memory."""
+def _slim(runs: Runs, *, inputs: bool) -> Runs:
+    """Runs without what only drawings need: many of them fit into memory. With `inputs` u can be told."""
     return replace(
         runs,
-        k=runs.k[:, :0],
-        u_a=runs.u_a[:, :0],
+        k=runs.k if inputs else runs.k[:, :0],
+        u_a=runs.u_a if inputs else runs.u_a[:, :0],
         sigma_hat=runs.sigma_hat[:, :0],
         h=runs.h[:, :0],
         xtilde=runs.xtilde[:, :0],

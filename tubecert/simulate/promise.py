@@ -15,6 +15,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import ALONE, DISTANCE, RATES, SAMPLED, Name
 from tubecert.simulate.certified import Certified, Values
+from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.loops import Controller
 
 
@@ -53,6 +54,7 @@ class Promise:
     """Bounds of one loop: `rho`, `reach` = dbar, per-state `half_widths` (n,), and others by the names of peaks.
 
     `ultimate` is the radius in the long run, `decay` the bound of the distance over time; either may be missing.
+    `ranges`: those of inputs that have limits.
     """
 
     title: str
@@ -62,6 +64,7 @@ class Promise:
     bounds: Mapping[str, float]
     ultimate: float | None
     decay: Decay | None
+    ranges: tuple[InputRange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +117,7 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
         bounds=bounds,
         ultimate=section.ultimate,
         decay=kind.decay(certified, recipe),
+        ranges=section.ranges,
     )
 
 

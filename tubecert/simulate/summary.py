@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.records import to_json
 from tubecert.simulate.campaign import Attack, Campaign, Drawn
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
@@ -106,7 +107,7 @@ def _attack(item: Attack, S: Array) -> Data:
 
 
 def _comparison(found: Comparison) -> Data:
-    return {
+    data: Data = {
         "runs": found.count,
         "left_the_tube": len(found.outside),
         "first_outside": list(found.outside[:20]),
@@ -131,6 +132,7 @@ def _comparison(found: Comparison) -> Data:
         "final_deviation": None if found.final is None else _finite(found.final),
         "error_estimate": found.error,
     }
+    return data | ({"inputs": to_json(found.inputs)} if found.inputs else {})
 
 
 def _run_at(lane: int, t: float) -> Data:
