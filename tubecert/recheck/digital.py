@@ -20,7 +20,8 @@ from tubecert.recheck.filtering import Distance
 _ROUGH = 64  # bits, for proposals
 _RISES = 60
 _CLOSE, _INFLATED, _LITTLE = Fraction(1, 10**12), Fraction(1, 10**9), Fraction(1, 10**30)
-_GRID, _ZOOMS, _GOLDEN = 10, 14, 0.6180339887498949
+_GRID, _ZOOMS, _GOLDEN = 10, 28, 0.6180339887498949
+_ENOUGH = 1 - 1e-9  # of the level
 _FLOORS = (log(1e-5), 0.0)  # of the level
 _FASTEST = 40.0  # omega Ts
 
@@ -125,17 +126,15 @@ def proposed(
         at = _settled(setting, machine, promise, replace(like, bandwidth=omega))
         if at is None:
             return inf, None
-        scales = _least(lambda x: _top(setting, machine, promise, _floored(at, x)), _FLOORS)
-        return _top(setting, machine, promise, _floored(at, scales)), _floored(at, scales)
+        share, top = _least(lambda x: _top(setting, machine, promise, _floored(at, x)), _FLOORS)
+        return top, _floored(at, share)
 
     with ctx.workprec(_ROUGH):
-        found = [quality(like.bandwidth)] if fixed else [quality(None)]
-        if not fixed:
-            Ts = float(like.sample_time)
-            ends = log(float(setting.rate)), log(_FASTEST / Ts)
-            x = _least(lambda x: quality(Fraction(exp(x)))[0], ends)
-            found.append(quality(Fraction(exp(x))))
-    top, best = min(found, key=lambda pair: pair[0])
+        top, best = quality(like.bandwidth if fixed else None)
+        if not fixed and not top < _ENOUGH:
+            ends = log(float(setting.rate)), log(_FASTEST / float(like.sample_time))
+            x, _ = _least(lambda x: quality(Fraction(exp(x)))[0], ends)
+            top, best = min((top, best), quality(Fraction(exp(x))), key=lambda pair: pair[0])
     return best if top < inf else None
 
 
@@ -144,16 +143,39 @@ def _floored(at: Digital, x: float) -> Digital:
     return replace(at, floor=at.level * Fraction(exp(x)))
 
 
-def _least(value: Callable[[float], float], ends: tuple[float, float]) -> float:
-    """Where a function with one valley is about least."""
+def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[float, float]:
+    """Where a function with one valley is about least, and its value there; the first point where it is enough."""
     low, high = ends
+    best: list[tuple[float, float]] = []
+
+    def at(x: float) -> float:
+        y = value(x)
+        best.append((y, x))
+        return y
+
     points = [low + (high - low) * k / _GRID for k in range(_GRID + 1)]
-    k = min(range(len(points)), key=lambda k: value(points[k]))
+    values: list[float] = []
+    for x in points:
+        values.append(at(x))
+        if values[-1] < _ENOUGH:
+            return x, values[-1]
+    k = min(range(len(points)), key=lambda k: values[k])
     low, high = points[max(0, k - 1)], points[min(_GRID, k + 1)]
+    inner = [high - (high - low) * _GOLDEN, low + (high - low) * _GOLDEN]
+    found = [at(x) for x in inner]
     for _ in range(_ZOOMS):
-        first, second = high - (high - low) * _GOLDEN, low + (high - low) * _GOLDEN
-        low, high = (low, second) if value(first) <= value(second) else (first, high)
-    return (low + high) / 2
+        if min(found) < _ENOUGH:
+            break
+        if found[0] <= found[1]:
+            high, inner[1], found[1] = inner[1], inner[0], found[0]
+            inner[0] = high - (high - low) * _GOLDEN
+            found[0] = at(inner[0])
+        else:
+            low, inner[0], found[0] = inner[0], inner[1], found[1]
+            inner[1] = low + (high - low) * _GOLDEN
+            found[1] = at(inner[1])
+    y, x = min(best)
+    return x, y
 
 
 def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> Digital | None:
