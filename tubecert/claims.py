@@ -374,6 +374,27 @@ class HalveConstant(Relax):
     factor: float
 
 
+HardwarePart = Literal["sample_time", "delay", "noise", "wind"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HalveHardware(Relax):
+    """With this part of the machine halved, the tube of certificate H is about `factor` times as wide."""
+
+    tag: ClassVar[str] = "halve_hardware"
+    part: HardwarePart
+    factor: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EaseHardware(Relax):
+    """With `value` for this part of the machine, the others as they are, certificate H is proven."""
+
+    tag: ClassVar[str] = "ease_hardware"
+    part: HardwarePart
+    value: Fraction
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MendPlan(Relax):
     """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""
@@ -645,6 +666,13 @@ class UncertaintyAsGiven(Assumption):
 
     tag: ClassVar[str] = "uncertainty_as_given"
     any_within_bounds: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineAsGiven(Assumption):
+    """The computer, its sensors and its inputs are what the section `hardware` says; for certificate H."""
+
+    tag: ClassVar[str] = "machine_as_given"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,6 +29,7 @@ from tubecert.claims import (
     ForAllTime,
     HardProjection,
     LeastFeedback,
+    MachineAsGiven,
     ParametersWithin,
     PerfectState,
     SmoothProjection,
@@ -214,6 +215,7 @@ def assumptions(
     """
     flat = all(e.is_constant for row in model.W for e in row)
     smooth, horizon, wind = spec.adaptation.smooth, spec.trajectory.horizon, spec.disturbance
+    machine = () if spec.hardware is None else (MachineAsGiven(),)
     return (
         LeastFeedback(),
         StraightGeodesics() if flat else _geodesic_assumption(geodesics),
@@ -227,6 +229,7 @@ def assumptions(
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
         *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
         *(() if not spec.ranges else (ParametersWithin(),)),
+        *machine,
     )
 
 

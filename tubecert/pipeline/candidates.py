@@ -14,15 +14,15 @@ from tubecert.claims import Claim
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
-from tubecert.kinds import DISTANCE
+from tubecert.kinds import DISTANCE, HARDWARE
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
-from tubecert.search.proposers import LEAST, PROPOSERS
-from tubecert.stages.bounded import Enclosed, enclose, unmet
+from tubecert.search.proposers import LEAST, PROPOSERS, Explained
+from tubecert.stages.bounded import Enclosed, enclose, unmet, with_machine
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
@@ -90,16 +90,17 @@ def _stopped(end: Stopped) -> Ending:
 
 
 def _judged(question: Question, enclosed: Enclosed) -> Ending:
-    options, problem = question.options, enclosed.problem
+    options = question.options
     asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
     keys = deciding(question)
+    problem = with_machine(enclosed) if HARDWARE.key in keys else enclosed.problem
     sections = {
         key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
         for key in dict.fromkeys([*keys, DISTANCE.key])
     }
     verdict = overall([sections[key].verdict for key in keys])
     short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
-    claim = None if short is None else reasons(short, {})[0].claim
+    claim = None if short is None else reasons(short, Explained())[0].claim
     return Ending(enclosed=enclosed, sections=tuple(sections.values()), claim=claim, verdict=verdict)
 
 

@@ -15,12 +15,12 @@ from tubecert.claims import MendPlan, Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
-from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
-from tubecert.search.proposers import LEAST, PROPOSERS
+from tubecert.search.machines import PARTS
+from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
 from tubecert.stages.bounded import Bounded, bound, enclose
 from tubecert.stages.judged import Judged, judge_all
@@ -105,13 +105,12 @@ def explain(judged: Judged) -> Explanation:
     """What the gains depend on, and why the verdict is what it is."""
     problem, printed = judged.bounded.problem, [RATES.key] if judged.as_printed else []
     explained = {
-        kind.key: PROPOSERS[kind.theorem.recipe].explain(problem, _least(judged.sections[kind.key]))
-        for kind in kinds_of(problem)
+        kind.key: _explained(judged, kind.key, PROPOSERS[kind.theorem.recipe]) for kind in kinds_of(problem)
     }
     told = [
         reason
         for key in dict.fromkeys([*printed, *judged.deciding])
-        for reason in reasons(judged.sections[key], explained[key].halved or {})
+        for reason in reasons(judged.sections[key], explained[key])
     ]
     return Explanation(
         reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded), *input_reasons(judged)],
@@ -124,10 +123,19 @@ def _told(slopes: Mapping[str, float]) -> dict[str, float]:
     return {name: slope for name, slope in slopes.items() if isfinite(slope)}
 
 
-def _least(section: Section[Any]) -> object:
-    """The recipe of least adaptation rate, if there is one."""
-    found = section.at(LEAST)
-    return None if found is None else found.recipe
+def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:
+    """What explains the section of a kind; other machines are looked for where they are the question."""
+    if proposer.machine and key not in judged.deciding:
+        return Explained()
+    spec, section = judged.question.spec, judged.sections[key]
+    adapted = spec.disturbance is not None and spec.disturbance.rate is not None
+    parts = [part for part in PARTS if not (adapted and part == "wind")]
+
+    def at(role: str) -> object:
+        found = section.at(role)
+        return None if found is None else found.recipe
+
+    return proposer.explain(judged.bounded.problem, at, parts)
 
 
 def _asked(question: Question) -> Asked:

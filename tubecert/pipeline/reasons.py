@@ -6,7 +6,7 @@ Out: the `Reason`s of a certificate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from typing import Any
@@ -15,7 +15,9 @@ import numpy as np
 
 from tubecert.claims import (
     ConditionHolds,
+    EaseHardware,
     HalveConstant,
+    HalveHardware,
     InputWithinLimits,
     LeavePlanRoom,
     ObstacleCleared,
@@ -30,6 +32,7 @@ from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Section
+from tubecert.search.proposers import Explained
 from tubecert.stages.bounded import Bounded, Cleared
 from tubecert.stages.judged import Judged
 
@@ -39,11 +42,13 @@ _NOTABLE = 0.995  # a factor above it is not worth a word
 UNBOUNDED_RELAX: tuple[Relax, ...] = (RaiseBudget(), ShrinkTube())
 
 
-def reasons(section: Section[Any], halved: Mapping[str, float]) -> list[Reason]:
+def reasons(section: Section[Any], explained: Explained) -> list[Reason]:
     """Reasons of one kind: what its gains leave, or what is missing."""
     if section.verdict is Verdict.CERTIFIED:
-        return [_certified(section, halved)]
-    return _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
+        return [_certified(section, explained)]
+    easier = tuple(EaseHardware(part=part, value=value) for part, value in explained.eased.items())
+    short = _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
+    return [replace(short[0], relax=(*short[0].relax, *easier)), *short[1:]]
 
 
 def obstacle_reasons(bounded: Bounded) -> list[Reason]:
@@ -121,9 +126,10 @@ def _excess(own: LimitedInput, bound: InputBound) -> Fraction:
     return max(low - Fraction(bound.least), Fraction(bound.greatest) - high)
 
 
-def _certified(section: Section[Any], halved: Mapping[str, float]) -> Reason:
-    relax = tuple(
-        HalveConstant(constant=name, factor=factor) for name, factor in halved.items() if factor < _NOTABLE
+def _certified(section: Section[Any], explained: Explained) -> Reason:
+    relax: tuple[Relax, ...] = (
+        *(HalveConstant(constant=name, factor=x) for name, x in explained.halved.items() if x < _NOTABLE),
+        *(HalveHardware(part=part, factor=x) for part, x in explained.halved_parts.items() if x < _NOTABLE),
     )
     return Reason(claim=section.claim(), verdict=section.verdict, relax=relax)
 

@@ -101,6 +101,7 @@ def _texts(node: Node) -> object:
 
 
 _SIDE = _word("lower", "upper")
+_PART = _word("sample_time", "delay", "noise", "wind")
 _NONE: Form = ({}, {})
 
 _CLAIMS: Mapping[str, Form] = {
@@ -199,6 +200,8 @@ _REMEDIES: Mapping[str, Form] = {
 
 _RELAX: Mapping[str, Form] = {
     "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
+    "halve_hardware": ({"part": _PART, "factor": Node.number}, {}),
+    "ease_hardware": ({"part": _PART, "value": Node.decimal}, {}),
     "mend_plan": (
         {
             "defect": Node.number,
@@ -237,6 +240,7 @@ _ASSUMPTIONS: Mapping[str, Form] = {
     "perfect_state": _NONE,
     "first_order_filter": _NONE,
     "for_all_time": _NONE,
+    "machine_as_given": _NONE,
     "up_to_horizon": ({"horizon": Node.decimal}, {}),
     "uncertainty_as_declared": _NONE,
     "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),

@@ -52,7 +52,7 @@ def verdict_line(result: Result) -> Text:
     line.append(f" {name(result)}: ", style="bold")
     if verdict is Verdict.CERTIFIED:
         chosen = deciding(result)
-        measured = result.tube is not None and result.tube.coordinates is not None
+        measured = sections.extent(result) != up(sections.radius(result))
         numbers = [sections.extent(result) if measured else f"rho = {up(sections.radius(result))}"]
         numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))

@@ -11,8 +11,9 @@ from fractions import Fraction
 from itertools import groupby
 
 from tubecert.certificate.result import Result
-from tubecert.kinds import SAMPLED
+from tubecert.kinds import HARDWARE, SAMPLED
 from tubecert.kinds.data import Around
+from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.figures_axes import WIDTH, Axis, Chart, Point, blank, number, text
 from tubecert.report.gains import NAMES, Gains, rows
@@ -20,14 +21,20 @@ from tubecert.report.numbers import exact, short
 from tubecert.report.page import Figure
 from tubecert.words.conditions import equation
 
-STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b", "sampled": "c"}
+STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b", "sampled": "c", "hardware": "h"}
 _LOWEST = -0.5  # margins below are not drawn
 _MOST = 12  # constants shown
 
 
 def gain_figures(result: Result) -> list[Figure]:
     """Every figure that the certificate has data for."""
-    made = (_trade_off(result), _sample_time(result), *_margins(result), _elasticities(result))
+    made = (
+        _trade_off(result),
+        _sample_time(result),
+        _levels(result),
+        *_margins(result),
+        _elasticities(result),
+    )
     return [figure for figure in made if figure is not None]
 
 
@@ -35,7 +42,7 @@ def _trade_off(result: Result) -> Figure | None:
     curves = {
         key: list(section.points())
         for key, section in result.sections.items()
-        if key in NAMES and not isinstance(section, SampledData)
+        if key in NAMES and not isinstance(section, (SampledData, HardwareData))
     }
     return _curves(
         "trade-off",
@@ -55,9 +62,35 @@ def _sample_time(result: Result) -> Figure | None:
         "sample-time",
         "Sample time against bandwidth",
         {SAMPLED.key: list(section.points())},
-        [(row, at) for row in rows(result) if (at := _place(row, row.pair.sample_time)) is not None],
+        [
+            (row, at)
+            for row in rows(result)
+            if row.section == SAMPLED.key and (at := _place(row, row.pair.sample_time)) is not None
+        ],
         label="sample time (s)",
         caption="The longest sample time that is proven to serve at each bandwidth.",
+    )
+
+
+def _levels(result: Result) -> Figure | None:
+    """What slower or faster sampling makes of the tube of certificate H."""
+    section = result.sections.get(HARDWARE.key)
+    if not isinstance(section, HardwareData) or len(section.points()) < 2 or section.level is None:
+        return None
+    points = [(1e3 * Ts, level) for Ts, level in section.points()]
+    x = Axis.around([p[0] for p in points], "sample time (ms)", log=True)
+    y = Axis.around([p[1] for p in points], "proven distance", log=True)
+    chart = Chart("levels", "Tube against sample time", x, y)
+    chart.line(points, STYLES[HARDWARE.key])
+    if section.sample_time is not None:
+        here = 1e3 * float(section.sample_time), float(section.level)
+        chart.dot(here, f"{STYLES[HARDWARE.key]} decides", 6, f"{exact(1000 * section.sample_time)} ms")
+    return Figure(
+        key="levels",
+        title="Tube against sample time",
+        svg=chart.text(),
+        legend=((STYLES[HARDWARE.key], NAMES[HARDWARE.key]), ("decides", "the machine")),
+        caption="The least distance to the plan that is proven at each sample time, all else as it is.",
     )
 
 

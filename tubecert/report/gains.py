@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 
 from tubecert.certificate.result import Result
+from tubecert.conditions.hardware import LEVEL
+from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import Pair
 from tubecert.report.numbers import exact, percent
 from tubecert.verdict import Verdict
@@ -32,7 +34,8 @@ class Gains:
     def text(self, *, titled: bool = False) -> str:
         """The gains for the verdict line, with their certificate's name if there are several."""
         omega = self.pair.bandwidth
-        parts = ["feedback alone" if omega is None else f"omega = {exact(omega)} rad/s"]
+        none = "no filter" if self.section == HARDWARE.key else "feedback alone"
+        parts = [none if omega is None else f"omega = {exact(omega)} rad/s"]
         if self.pair.adaptation_rate is not None:
             parts.append(f"Gamma = {exact(self.pair.adaptation_rate)}")
         if self.pair.sample_time is not None:
@@ -41,8 +44,12 @@ class Gains:
 
     def words(self) -> str:
         """The gains in a sentence."""
+        if self.pair.bandwidth is None and self.section == HARDWARE.key:
+            return "on this machine, without a filter"
         if self.pair.bandwidth is None:
             return "its feedback and no adaptation"
+        if self.section == HARDWARE.key:
+            return f"on this machine and with a filter bandwidth of {exact(self.pair.bandwidth)} rad/s"
         loop = f"a filter bandwidth of {exact(self.pair.bandwidth)} rad/s"
         if self.pair.sample_time is not None:
             return f"{loop} and adaptation every {exact(self.pair.sample_time)} s"
@@ -52,6 +59,10 @@ class Gains:
     def slack(self) -> str:
         """The margin in per cent, with the condition that has the least where there are several."""
         margins = {condition: margin.below for condition, margin in self.pair.margins.items()}
+        if (
+            self.section == HARDWARE.key
+        ):  # the level is as low as it can be: what matters is what of dbar it leaves
+            return percent(margins.get(LEVEL))
         tightest = min(margins, key=lambda condition: margins[condition], default="")
         least = margins.get(tightest)
         known = least if least is not None and isfinite(least) else None

@@ -10,10 +10,12 @@ from collections.abc import Iterator, Mapping
 
 from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
+from tubecert.kinds import HARDWARE
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
+from tubecert.report.machine import proven as proven_machine
 from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.page import (
     Block,
@@ -29,6 +31,7 @@ from tubecert.report.page import (
     Words,
 )
 from tubecert.report.page_conditions import conditions
+from tubecert.report.page_machine import machine_blocks
 from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_trust import declared, proven
 from tubecert.verdict import Verdict
@@ -61,7 +64,9 @@ def _tiles(result: Result) -> Iterator[Tile]:
     """The numbers that a certified verdict is about; other verdicts have none to rely on."""
     if result.verdict is not Verdict.CERTIFIED:
         return
-    yield Tile(symbol="ρ", value=up(sections.radius(result)), unit="", words="radius of the tube")
+    machine = proven_machine(result) if result.decided_by == (HARDWARE.key,) else None
+    narrowed = sections.radius(result) if machine is None else machine.radius
+    yield Tile(symbol="ρ", value=up(narrowed), unit="", words="radius of the tube")
     chosen = deciding(result)
     for row in chosen:
         who = f", {NAMES[row.section]}" if len(chosen) > 1 else ""
@@ -83,6 +88,8 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
         yield Section(key="why", title="Not certified", blocks=reasons)
     if result.sections:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
+    if machine := tuple(machine_blocks(result)):
+        yield Section(key="machine", title="Machine", blocks=machine)
     if blocks := tuple(_tube(result)):
         yield Section(key="tube", title="Safe set" if result.tube is None else "Tube", blocks=blocks)
     if result.inputs:

@@ -15,11 +15,15 @@ from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness
-from tubecert.kinds import ALONE, SAMPLED
+from tubecert.kinds import ALONE, HARDWARE, SAMPLED
 from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
+from tubecert.report.machine import half_widths as hardware_widths
+from tubecert.report.machine import lines as machine_lines
+from tubecert.report.machine import proven as hardware_proven
+from tubecert.report.machine import section_of
 from tubecert.report.numbers import UNKNOWN, down, end, exact, percent, short, up
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
@@ -42,6 +46,8 @@ def of(result: Result, *, verbose: bool) -> Iterator[Section]:
         yield "Not certified", [_reason(result, item) for item in failed]
     if result.sections:
         yield "Gains", _gains(result)
+    if section_of(result) is not None:
+        yield "Machine", [Text(line) for line in machine_lines(result)]
     if holding:
         yield "What limits them", [_reason(result, item) for item in holding]
     if result.tube is not None:
@@ -192,7 +198,9 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
 
 def extent(result: Result) -> str:
     """How far the state may be from the plan: the radius, or the half-widths of a tube measured by the metric."""
-    tube = result.tube
+    tube, own = result.tube, hardware_proven(result)
+    if own is not None and result.decided_by == (HARDWARE.key,):
+        return f"the half-widths {hardware_widths(result, own)}"
     if tube is None or tube.coordinates is None or tube.half_widths is None:
         return up(radius(result))
     return f"the half-widths {half_widths(result, tube.half_widths)}"
@@ -366,6 +374,15 @@ def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
         return [table]
     test = None if result.metric is None else result.metric.unique_geodesics
     proven = test is not None and test.holds
+    if result.decided_by == (HARDWARE.key,):
+        brief = (
+            "the machine is as stated: it samples on time, its inputs follow after exactly the delay, its measurements "
+            "are as good as stated, it computes exactly; the uncertainty and the wind are as specified"
+        )
+        return [
+            Text(line)
+            for line in [f"{brief} ({len(stated)} in all, -v shows them)", *believed[: len(declared)]]
+        ]
     geodesics = "exact geodesics (their uniqueness is proven)" if proven else "exact and unique geodesics"
     brief = (
         f"exact continuous-time control, full state, no noise, delay or saturation; {geodesics}; filter "

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Final
 
+from tubecert.claims import HardwarePart
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.hardware import HardwareRecipe
@@ -17,24 +18,39 @@ from tubecert.conditions.sampled import SampledRecipe
 from tubecert.search.distance import propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.hardware import propose_hardware
+from tubecert.search.machines import PARTS, easier, halved
 from tubecert.search.rates import propose_rates
 from tubecert.search.sampled import propose_sampled
 
-LEAST = "least_adaptation"
+LEAST, MACHINE, LARGEST = "least_adaptation", "machine", "largest"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposer:
-    """`propose` gains; `slopes`: how the least adaptation rate reacts to each constant, if there is one."""
+    """`propose` gains; `slopes`: how the least adaptation rate reacts to each constant, if there is one.
+
+    `machine`: what is proposed is about a machine, of which another one may be better or easier to have.
+    """
 
     propose: Callable[[TubeProblem, Asked], Proposal[Any]]
     slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
+    machine: bool = False
 
-    def explain(self, problem: TubeProblem, least: Any) -> Explained:
-        """What the least adaptation rate, that of the recipe `least`, depends on; no claim rests on these numbers."""
+    def explain(
+        self, problem: TubeProblem, at: Callable[[str], Any], parts: Sequence[HardwarePart] = PARTS
+    ) -> Explained:
+        """What the gains depend on, `at` being the recipes by role; no claim rests on these numbers.
+
+        `parts` of a machine are those that can be changed alone.
+        """
+        if self.machine:
+            found = at(MACHINE) or at(LARGEST)
+            if found is None:
+                return Explained(eased=easier(problem, parts))
+            return Explained(halved_parts=halved(problem, found, parts))
         if self.slopes is None:
             return Explained()
-        slopes = self.slopes(problem, least)
+        slopes = self.slopes(problem, at(LEAST))
         return Explained(slopes=slopes, halved=halving(problem, slopes, self._least))
 
     def _least(self, problem: TubeProblem) -> Fraction | None:
@@ -44,10 +60,15 @@ class Proposer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explained:
-    """`slopes`: d log(Gamma)/d log(constant); `halved`: what halving a constant makes of Gamma. None: no such rate."""
+    """`slopes`: d log(Gamma)/d log(constant); `halved`: what halving a constant makes of Gamma. None: no such rate.
+
+    `halved_parts`: what halving a part of the machine makes of the tube; `eased`: parts with which it would serve.
+    """
 
     slopes: Mapping[str, float] | None = None
-    halved: Mapping[str, float] | None = None
+    halved: Mapping[str, float] = field(default_factory=dict)
+    halved_parts: Mapping[HardwarePart, float] = field(default_factory=dict)
+    eased: Mapping[HardwarePart, Fraction] = field(default_factory=dict)
 
 
 PROPOSERS: Final[Mapping[type, Proposer]] = {
@@ -55,5 +76,5 @@ PROPOSERS: Final[Mapping[type, Proposer]] = {
     RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
     DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
     SampledRecipe: Proposer(propose=propose_sampled),
-    HardwareRecipe: Proposer(propose=propose_hardware),
+    HardwareRecipe: Proposer(propose=propose_hardware, machine=True),
 }

@@ -144,13 +144,12 @@ def unmet(enclosed: Enclosed) -> Stopped | None:
 
 
 def _bounded(enclosed: Enclosed) -> Bounded:
-    spec, problem, suprema = enclosed.question.spec, enclosed.problem, enclosed.suprema
     geodesics = _geodesics(enclosed)
     return Bounded(
         enclosed=enclosed,
         half_widths=_half_widths(enclosed),
         geodesics=geodesics,
-        machine=machine_of(spec, problem, suprema, geodesics),
+        machine=_machine(enclosed, geodesics),
         clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
         inputs=tuple(_limited(enclosed, name, limits) for name, limits in enclosed.question.spec.limits),
     )
@@ -168,6 +167,15 @@ def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -
         greatest=greatest.printable(),
         any_plan=enclosed.tube.plan.allowance is not None,
     )
+
+
+def with_machine(enclosed: Enclosed) -> TubeProblem:
+    """What theorem H is asked about, where nothing else is told of the tube."""
+    return replace(enclosed.problem, machine=_machine(enclosed, _geodesics(enclosed)))
+
+
+def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
+    return machine_of(enclosed.question.spec, enclosed.problem, enclosed.suprema, geodesics)
 
 
 def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:

@@ -16,9 +16,12 @@ from tubecert.claims import (
     CorrectPlan,
     DeclareMetricBound,
     DeclareUncertaintyBound,
+    EaseHardware,
     EnlargeSafeSet,
     GiveInput,
     HalveConstant,
+    HalveHardware,
+    HardwarePart,
     HigherDegree,
     LeavePlanRoom,
     LowerDegree,
@@ -42,9 +45,13 @@ from tubecert.words.digits import ceiling_text, floor_text
 
 def advice(items: Sequence[Relax]) -> str:
     """What would help; empty if nothing is known to."""
-    halvings = ", ".join(_halving(item) for item in items if isinstance(item, HalveConstant))
+    halvings = ", ".join(
+        _halving(item) if isinstance(item, HalveConstant) else _better(item)
+        for item in items
+        if isinstance(item, (HalveConstant, HalveHardware))
+    )
     plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
-    others = [item for item in items if not isinstance(item, (HalveConstant, MendPlan))]
+    others = [item for item in items if not isinstance(item, (HalveConstant, HalveHardware, MendPlan))]
     return "; ".join(filter(None, (halvings, _alternatives(others), *plans)))
 
 
@@ -67,6 +74,24 @@ def _halving(item: HalveConstant) -> str:
     meaning = EVERY[item.constant]
     share = 100 * (1 - item.factor)
     return f"halving {meaning.symbol} ({meaning.words}) would lower the least Gamma by {share:.0f} %"
+
+
+_PARTS: Mapping[HardwarePart, str] = {
+    "sample_time": "the sample time",
+    "delay": "the delay",
+    "noise": "the noise",
+    "wind": "the wind",
+}
+
+
+def _better(item: HalveHardware) -> str:
+    return f"half of {_PARTS[item.part]} would make the tube {100 * (1 - item.factor):.0f} % narrower"
+
+
+def _easier(item: EaseHardware) -> str:
+    unit = " s" if item.part in ("sample_time", "delay") else ""
+    rate = f" ({float(1 / item.value):.4g} Hz)" if item.part == "sample_time" else ""
+    return f"bring {_PARTS[item.part]} down to {float(item.value):.4g}{unit}{rate}, which is proven to serve"
 
 
 def _plan(item: MendPlan) -> str:
@@ -116,6 +141,7 @@ def _smaller_set(item: ShrinkSafeSet) -> str:
 
 _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
     RaiseBudget: lambda item: "raise --budget" + (": a proof ran out of boxes" if item.proof else ""),
+    EaseHardware: _easier,
     ShrinkTube: lambda item: "shrink the tube",
     ReduceRadii: lambda item: "reduce epsilon, rho_a or the initial error",
     LeavePlanRoom: lambda item: "plan with more room to the limits",

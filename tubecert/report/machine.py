@@ -1,0 +1,119 @@
+"""The machine of certificate H in words: what it is, what fills its tube, and what its inputs do.
+
+In: a result. Out: lines and rows for the console and for the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+
+from tubecert.certificate.result import Result
+from tubecert.kinds import HARDWARE
+from tubecert.kinds.hardware import HardwareBudget, HardwareData
+from tubecert.report.numbers import down, exact, percent, up
+from tubecert.verdict import Verdict
+
+_CAUSES: Mapping[str, str] = {
+    "plan": "the plan's own defect",
+    "feedforward": "the input of the plan, held between samples",
+    "wind": "wind that pushes",
+    "wind_estimate": "wind that the estimate takes for uncertainty",
+    "bias": "the filter's lag behind the uncertainty",
+    "noise_estimate": "noise in the estimate",
+    "lag": "the input's lag: delay, and holding between samples",
+    "noise_feedback": "noise in the feedback",
+    "sampling": "feedback that is sampled and delayed",
+}
+_LEAST = 5e-5  # a smaller share is not told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Share:
+    """What takes a share of the tube, in words."""
+
+    cause: str
+    share: float
+
+
+def section_of(result: Result) -> HardwareData | None:
+    """The section of certificate H, if there is one."""
+    found = result.sections.get(HARDWARE.key)
+    return found if isinstance(found, HardwareData) else None
+
+
+def proven(result: Result) -> HardwareData | None:
+    """The same, if it is certified."""
+    found = section_of(result)
+    return found if found is not None and found.verdict is Verdict.CERTIFIED else None
+
+
+def described(own: HardwareData) -> str:
+    """The machine in a sentence: `500 Hz (2 ms), 0.5 ms of delay, |n| <= 0.001, |w| <= 0.05`."""
+    parts = []
+    if own.sample_time is not None:
+        parts.append(f"{down(1 / own.sample_time, 5)} Hz ({exact(1000 * own.sample_time)} ms)")
+    if own.delay:
+        parts.append(f"{exact(1000 * own.delay)} ms of delay")
+    if own.feedback_time is not None and own.feedback_time != own.sample_time:
+        parts.append(f"feedback every {exact(1000 * own.feedback_time)} ms")
+    if own.predict:
+        parts.append("feedback from the predicted state")
+    if own.noise:
+        parts.append(f"noise {exact(own.noise)}")
+    if own.wind:
+        parts.append(f"wind {exact(own.wind)}")
+    return ", ".join(parts)
+
+
+def half_widths(result: Result, own: HardwareData) -> str:
+    """What H proves of every state."""
+    units = result.spec.effective.system.units
+    return ", ".join(f"{name} {up(w)} {units.get(name, '')}".rstrip() for name, w in own.half_widths.items())
+
+
+def inputs(result: Result, own: HardwareData) -> str:
+    """What every input does in the loop, feedforward, feedback and adaptation together."""
+    units = result.spec.effective.system.units
+    return ", ".join(
+        f"{name} in [{down(low)}, {up(high)}] {units.get(name, '')}".rstrip()
+        for name, (low, high) in own.inputs.items()
+    )
+
+
+def shares(budget: HardwareBudget) -> list[Share]:
+    """What fills the tube, the largest share first; shares that are nothing are left out."""
+    found = [Share(cause=_CAUSES[item.name], share=getattr(budget, item.name)) for item in fields(budget)]
+    return sorted((each for each in found if each.share > _LEAST), key=lambda each: -each.share)
+
+
+def lines(result: Result) -> Iterator[str]:
+    """What certificate H says, for the console."""
+    own = section_of(result)
+    if own is None or own.sample_time is None:
+        return
+    yield described(own)
+    if own.verdict is not Verdict.CERTIFIED:
+        return
+    if own.level_margin is not None and own.level_margin.below is not None:
+        used = 1 - own.level_margin.below
+        yield f"proven tube: {half_widths(result, own)} ({percent(used)} of what the metric was bounded for)"
+    yield f"inputs: {inputs(result, own)}"
+    omega = (
+        "none: the newest estimate is used as it is"
+        if own.bandwidth is None
+        else f"{exact(own.bandwidth)} rad/s"
+    )
+    yield f"filter: {omega}; the estimate is clipped to {clip(result, own)}"
+    if own.budget is not None:
+        yield "what fills the tube: " + ", ".join(
+            f"{each.cause} {percent(each.share)}" for each in shares(own.budget)
+        )
+
+
+def clip(result: Result, own: HardwareData) -> str:
+    """What the filtered estimate is clipped to."""
+    if not own.clip:
+        return f"a ball of radius {up(own.clip_radius)}"
+    names = result.spec.effective.system.inputs
+    return ", ".join(f"{n} in [{down(a)}, {up(b)}]" for n, (a, b) in zip(names, own.clip, strict=True))

@@ -1,0 +1,39 @@
+"""The machine of certificate H on the page: what it is, what is proven for it, and what fills its tube."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tubecert.certificate.result import Result
+from tubecert.report.machine import clip, described, half_widths, inputs, section_of, shares
+from tubecert.report.numbers import exact, percent, up
+from tubecert.report.page import Block, Cell, Facts, Table
+from tubecert.verdict import Verdict
+
+
+def machine_blocks(result: Result) -> Iterator[Block]:
+    """Facts about the machine, and the shares of its tube by cause; empty without certificate H."""
+    own = section_of(result)
+    if own is None or own.sample_time is None:
+        return
+    facts = [("the machine", Cell(text=described(own)))]
+    if own.verdict is Verdict.CERTIFIED:
+        none = "none: the newest estimate is used as it is"
+        facts += [
+            ("proven tube", Cell(text=f"{half_widths(result, own)}; radius {up(own.radius)}")),
+            ("inputs", Cell(text=inputs(result, own))),
+            ("filter", Cell(text=none if own.bandwidth is None else f"{exact(own.bandwidth)} rad/s")),
+            ("the estimate is clipped to", Cell(text=clip(result, own))),
+        ]
+    yield Facts(facts=tuple(facts))
+    if own.budget is None:
+        return
+    yield Table(
+        columns=("what fills the tube", "share"),
+        rows=tuple(
+            (Cell(text=each.cause), Cell(text=percent(each.share), kind="number", share=min(1.0, each.share)))
+            for each in shares(own.budget)
+        ),
+        note="Shares of what the contraction can make good at the edge of the proven tube. Better hardware helps where "
+        "the share is large.",
+    )
