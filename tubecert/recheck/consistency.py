@@ -182,6 +182,8 @@ def assumptions(result: Result, s: System) -> Outcome:
     """The list of what is assumed is that of this format, each with the parameters of the specification."""
     geodesics = None if result.metric is None else result.metric.geodesics
     wanted = _assumed(s, geodesics)
+    if result.specification.hardware is not None:
+        wanted.append(Assumption("machine_as_given", {}))
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:
             return stated(
