@@ -121,9 +121,9 @@ def wind_constants(suprema: Suprema, beta: Constant) -> WindConstants | None:
 
 
 def residual_constants(suprema: Suprema) -> ResidualConstants | None:
-    """What unknown parameters do that no input can; None if there is no such thing."""
+    """What unknown parameters do that no input can; None if all are known."""
     rest = Beside(suprema).residual
-    if not rest or _vanishes(rest):
+    if not rest:
         return None
     return ResidualConstants(
         push=_push(suprema, "residual_push", rest), size=suprema.norms("residual_size", [rest])

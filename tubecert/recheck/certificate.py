@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tubecert.recheck import machine, wind
+from tubecert.recheck import machine, unknown, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -91,6 +91,7 @@ class Claim:
     uncertainty: str
     plans: Plans | None
     wind: Wind | None
+    parameters: dict[str, Range] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,7 +291,7 @@ def _complete(node: Node, result: Result) -> Result:
 
 def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Claim:
     keys = ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
-    own = node.closed(*keys, optional=("plans", "wind"))
+    own = node.closed(*keys, optional=("plans", "wind", "parameters"))
     return Claim(
         id=own["id"].text(),
         horizon=own.known("horizon", Node.exact),
@@ -301,7 +302,12 @@ def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Clai
         uncertainty=own["uncertainty"].text(),
         plans=own.get("plans", lambda item: _plans(item, states, inputs)),
         wind=own.get("wind", _wind),
+        parameters=own.get("parameters", _parameters),
     )
+
+
+def _parameters(node: Node) -> dict[str, Range]:
+    return {name: (low.exact(), high.exact()) for name, side in node.items() for low, high in [side.pair()]}
 
 
 def _wind(node: Node) -> Wind:
@@ -425,6 +431,8 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
     names = [*MEASURED, *(name for names in derived for name in names)]
     if spec.disturbance is not None:
         names += wind.CONSTANTS
+    if spec.plant.ranges:
+        names += unknown.CONSTANTS
     if spec.hardware is not None:
         names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
     optional = machine.OF_CONSTANT_METRICS if spec.hardware is not None else ()

@@ -14,6 +14,18 @@ from tubecert.recheck.specified.trajectory import AnyPlan, Resting
 from tubecert.recheck.times import period_of
 
 TUBE = "tube"
+_KEYS = (
+    "id",
+    "horizon",
+    "for_all_time",
+    "period",
+    "domain",
+    "start",
+    "uncertainty",
+    "plans",
+    "wind",
+    "parameters",
+)
 
 
 def own_claim(spec: Specification) -> Claim:
@@ -35,6 +47,7 @@ def own_claim(spec: Specification) -> Claim:
         uncertainty=spec.uncertainty.words,
         plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
         wind=None if spec.disturbance is None else Wind(spec.disturbance.bound, spec.disturbance.rate),
+        parameters=spec.plant.ranges or None,
     )
 
 
@@ -45,7 +58,7 @@ def _plans(family: AnyPlan) -> Plans:
 def agrees(result: Result) -> Outcome:
     """Whether `claim` is what follows from the specification."""
     own = own_claim(result.specification)
-    for key in ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty", "plans", "wind"):
+    for key in _KEYS:
         if getattr(own, key) != getattr(result.claim, key):
             return stated(False, f"claim.{key} is not that of the specification")
     return stated(True, "")

@@ -19,6 +19,7 @@ from tubecert.recheck import (
     metric,
     planned,
     start,
+    unknown,
 )
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.balls import Ball, exact
@@ -109,6 +110,11 @@ class Case:
             bounds = {name: self.bound_if_any(name) for name in USED}
             # what has no bound is not a number: no comparison with what rests on it can hold
             values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
+            rest = [arb(0), arb(0)]
+            if self.system.unknown is not None:  # theory 7: it pushes and drifts as if the plan did
+                rest = [self._ball(name) for name in unknown.CONSTANTS]
+                values["plan_defect_metric"] += rest[0]
+                values["drift_on_plan"] += rest[1]
             return Setting(
                 self.system,
                 Numbers(**values),
@@ -116,6 +122,7 @@ class Case:
                 self.tube.rho_a,
                 self._wind,
                 turns=not all(map(all_zero, self.place.fields.slopes(self.system.B))),
+                rest=rest[1],
             )
 
     @property
@@ -251,7 +258,7 @@ def _rate_margin(case: Case) -> Fraction:
 def _smooth(case: Case) -> Outcome:
     s, trajectory = case.system, case.result.specification.trajectory
     time = time_range(s.uncertainty, s.horizon)
-    ranges = {**s.safe_set, **({} if time is None else {TIME: time})}
+    ranges = {**s.safe_set, **s.ranges, **({} if time is None else {TIME: time})}
     found = metric.smooth((*s.duties, *s.uncertainty.duties), ranges, case.budget)
     if not isinstance(trajectory, Expressed):
         return found
@@ -376,6 +383,14 @@ def _beside(case: Case) -> Iterator[Claim]:
                 (*over, limit, matched),
                 lambda name=name, limit=limit: disturbed.bounded(place, name, limit, matched),  # type: ignore[misc]
             )
+    for name in unknown.CONSTANTS if case.system.unknown is not None else ():
+        limit = case.bound_if_any(name)
+        if limit is not None:
+            yield Claim(
+                f"{name} <= {float(limit):.6g}",
+                (*over, limit),
+                lambda name=name, limit=limit: unknown.bounded(place, name, limit),  # type: ignore[misc]
+            )
     asked = case.result.specification.hardware
     if asked is None:
         return
@@ -421,7 +436,8 @@ def _gains(case: Case) -> Iterator[Claim]:
                 (section,),
                 lambda section=section, missing=missing: _silent(section, missing),  # type: ignore[misc]
             )
-            own = replace(ground, setting=replace(case.setting, wind=None), silent=True)
+            rest = arb(0) if missing == "wind_not_covered" else case.setting.rest
+            own = replace(ground, setting=replace(case.setting, wind=None, rest=rest), silent=True)
         yield from kind.claims(section, recipes.get(kind.key), own)
 
 

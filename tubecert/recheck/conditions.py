@@ -7,7 +7,7 @@ passes serves, and one is found by raising it to what it has to exceed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 
 from flint import arb
@@ -63,7 +63,10 @@ class WindNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Constants, radii and options of one certificate; `turns`: whether B depends on the state."""
+    """Constants, radii and options of one certificate; `turns`: whether B depends on the state.
+
+    `rest`: what unknown parameters do beside the inputs, which is a part of the plan's defect and drift in `n`.
+    """
 
     system: System
     n: Numbers
@@ -71,6 +74,7 @@ class Setting:
     rho_a: Fraction
     wind: WindNumbers | None = None
     turns: bool = True
+    rest: Ball = field(default_factory=lambda: arb(0))
 
     @property
     def wind_bound(self) -> Ball:
@@ -80,8 +84,8 @@ class Setting:
 
     @property
     def still(self) -> bool:
-        """Whether no disturbance moves the state beside the inputs."""
-        return self.wind is None or bool(self.wind.size * self.wind_bound <= 0)
+        """Whether nothing moves the state beside the inputs."""
+        return bool(self.rest <= 0) and (self.wind is None or bool(self.wind.size * self.wind_bound <= 0))
 
     @property
     def pushed(self) -> Ball:
@@ -98,6 +102,11 @@ class Setting:
     def blown(self) -> Ball:
         """|E| |w|."""
         return arb(0) if self.wind is None else self.wind.size * self.wind_bound
+
+    @property
+    def beside(self) -> Ball:
+        """All that moves the state and is no input."""
+        return self.blown + self.rest
 
     @property
     def taken(self) -> Ball:
@@ -213,9 +222,9 @@ def _blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball
     xt in the range of B has an equation of its own, with B B^+ E w only.
     """
     n, p, Gamma = setting.n, predictor(setting.system, gains), exact(gains.adaptation_rate)
-    zb = setting.blown
+    zb = setting.beside
     if p.scalar and not setting.turns:
-        zb = smaller(zb, n.B * setting.taken)
+        zb = smaller(setting.blown, n.B * setting.taken)
     both = n.h + R
     drag = zb / p.q
     radius = drag + root(drag * drag + 2 * both * s1 / (p.q * Gamma))

@@ -209,6 +209,7 @@ def _assumed(s: System, geodesics: Geodesics | None) -> list[Assumption]:
         if s.h is None
         else Assumption("uncertainty_as_given", {"any_within_bounds": "h" in s.declared}),
         *([] if s.wind is None else [_blowing(s.wind)]),
+        *([Assumption("parameters_within", {})] if s.ranges else []),
     ]
 
 

@@ -44,8 +44,10 @@ from tubecert.recheck.terms import (
     turned,
     unit_matrix,
 )
+from tubecert.recheck.unknown import joins
 from tubecert.recheck.wind import added_to, least_sum
 
+_ROUND_UP = 1 + Fraction(1, 10**15)  # what a ball loses as a float
 _FIRST = 500  # boxes before another way is tried
 
 
@@ -192,10 +194,41 @@ def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
 
 
 def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
-    s = place.system
-    if s.wind is not None and s.wind.rate is not None:
-        return _adapted(place, limit, name)
-    return _own_uncertainty(place, limit, name)
+    s, known = place.system, joins(place)
+    adapts = s.wind is not None and s.wind.rate is not None
+    if known is not None:
+        return _joined(place, limit, name, known, added_to(place, name) if adapts else [])
+    return _adapted(place, limit, name) if adapts else _own_uncertainty(place, limit, name)
+
+
+def _joined(place: Place, limit: Fraction, name: str, known: Matrix, added: list[Matrix]) -> Outcome:
+    """Of h + B^+ (f(x, theta) - f(x)), and of B^+ E w with it."""
+    s, room, entries = place.system, limit, known
+    if name in s.declared:
+        room = limit - _declared(place, name)
+    elif s.h is not None:
+        entries = plus(s.h, known)
+    if room < 0:
+        return stated(False, "it is below what is declared")
+    if name == "h":
+        return prove(norms_below([entries, *added], room), place.tube(), place.budget)
+    if name == "h_t":
+        return prove(slopes_below(entries, TIME, room, added), place.tube(), place.budget)
+    most = least_sum(added, place, room) if added else Fraction(0)
+    if most is None:
+        return Outcome(verdict="undecided", why="what a disturbance adds is not below it")
+    test: Test = LipschitzBelow([row[0] for row in entries], place.fields, room - most)
+    found = prove(test, place.tube(), place.budget)
+    return found if found.holds or not added else Outcome(verdict="undecided", why=found.why)
+
+
+def _declared(place: Place, name: str) -> Fraction:
+    """A declared bound, in z where it is a Lipschitz constant; rounded up."""
+    own = place.system.declared[name]
+    if name != "h_x" or place.coordinates is None:
+        return own
+    stretch = sharp_norm([[exact(q) for q in row] for row in place.coordinates.inverse])
+    return Fraction(float((exact(own) * stretch).upper())) * _ROUND_UP
 
 
 def _adapted(place: Place, limit: Fraction, name: str) -> Outcome:

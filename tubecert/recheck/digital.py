@@ -275,7 +275,7 @@ class _Evaluation:
         whole = n.u_star + self.ups + self.kb + self.R + n.h  # |u + h|
         e = self.rate * Ts / 2 + turning * whole * apart
         e = e + m.drift_explained * (Y * Ts / 4 + self.nbar)
-        e = e + self._gust()
+        e = e + self._gust() + n.B_pinv_x * self.setting.rest * apart
         return (1 - self.th) / self.th * self.rate * Ts + e
 
     def _ripple(self) -> Ball:
@@ -292,7 +292,7 @@ class _Evaluation:
         slope = n.f_x + n.b_x * (n.u_star + self.ups + self.kb)
         growth = (slope * self.tau).expm1()
         mean = growth / slope if slope > 0 else self.tau * (growth + 1)  # at most tau e^(D_p tau)
-        return self.nbar * (growth + 1) + (n.B * self.X + self.blown) * mean
+        return self.nbar * (growth + 1) + (n.B * self.X + self.blown + self.setting.rest) * mean
 
     # -- the feedback
 
@@ -311,7 +311,7 @@ class _Evaluation:
         j1, j0 = 1 + curved / (2 * chi), 1 + curved / (8 * chi)
         # the velocities of the two ends of a geodesic, and how they differ
         fastest = larger(self.Y, m.plan_speed)
-        V = m.drift_difference + n.B * self.push + self.blown + m.plan_defect
+        V = m.drift_difference + n.B * self.push + self.blown + self.setting.rest + m.plan_defect
         Q = (m.symbols_slope * rho * rho * fastest + 2 * m.symbols * rho * V) / chi
         V_M, V_J = top_A * (V + Q / 2), fastest + Q / 8
         forced = n.metric_input_gain * self.push + self.pushed + n.plan_defect_metric

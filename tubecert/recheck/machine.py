@@ -43,6 +43,7 @@ from tubecert.recheck.terms import (
     turned,
     variable,
 )
+from tubecert.recheck.unknown import joins
 from tubecert.recheck.wind import adapted
 
 ALWAYS = (
@@ -480,9 +481,10 @@ def clips(place: Place, box: Sequence[tuple[Fraction, Fraction]], bound: Fractio
             return stated(False, "a declared |h| may point out of the box that the estimate is clipped to")
     if s.h is None:
         return stated(True, "")
-    more, outcomes = adapted(place), []
+    more, known, outcomes = adapted(place), joins(place), []
     for i, (low, high) in enumerate(box):
-        shifted = [[[s.h[i][0] - number((low + high) / 2)]]]
+        own = s.h[i][0] if known is None else s.h[i][0] + known[i][0]
+        shifted = [[[own - number((low + high) / 2)]]]
         if more is not None:
             shifted.append([more[i]])
         outcomes.append(prove(norms_below(shifted, (high - low) / 2), place.tube(), place.budget))

@@ -54,7 +54,7 @@ class Place:
         """The tube, with the times that matter for h."""
         s = self.system
         time = time_range(s.uncertainty, s.horizon)
-        free = {**self.curve.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
+        free = {**self.curve.ranges, **s.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
         return Tube(self.curve, self.around, s.states, s.inputs, free)
 
     def on_plan(self, rows: Rows) -> Matrix:

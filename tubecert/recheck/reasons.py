@@ -244,5 +244,6 @@ _ASSUMPTIONS: Mapping[str, Form] = {
     "up_to_horizon": ({"horizon": Node.decimal}, {}),
     "uncertainty_as_declared": _NONE,
     "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),
+    "parameters_within": _NONE,
     "wind_within": ({}, {"bound": Node.decimal, "rate": Node.decimal}),
 }

@@ -46,7 +46,7 @@ def _sampled(setting: Setting, gains: SampledGains, Y: Ball) -> _Sampled:
     m = smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
     H1 = smaller(n.h, n.h_initial + s1 * Ts)
     S_T = s1 * Ts / (-(-omega * Ts).expm1()) + m * (s1 + b * Y)
-    S_T = S_T + setting.taken + n.B_pinv_x * setting.blown * m * Y
+    S_T = S_T + setting.taken + n.B_pinv_x * setting.beside * m * Y
     share = -(-lam * Ts).expm1()
     d1 = n.initial_distance * (1 - share) + (n.metric_input_gain * H1 + setting.pushed) * share / lam
     return _Sampled(H1, S_T, d1)

@@ -22,8 +22,18 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import NOUGHT, Matrix, Term, matrix_replaced, matrix_slopes, number, variable
+from tubecert.recheck.terms import (
+    NOUGHT,
+    Matrix,
+    Term,
+    matrix_replaced,
+    matrix_slopes,
+    number,
+    plus,
+    variable,
+)
 from tubecert.recheck.tube import Tube
+from tubecert.recheck.unknown import joins
 from tubecert.recheck.wind import adapted
 
 _PIECES = (1, 16, 128, 1024, 4096)
@@ -217,14 +227,16 @@ class _Speed:
 
 def uncertainty(place: Place, limit: Fraction) -> Outcome:
     """|h(0, x(0))| <= limit; where a bound of |h| is declared, that bound."""
-    s, more = place.system, adapted(place)
+    s, more, known = place.system, adapted(place), joins(place)
     beside = [] if more is None else [more]
     if "h" in s.declared:
         room = limit - s.declared["h"]
+        beside += [] if known is None else [known]
         found = stated(room >= 0, "it is below the declared bound of |h|")
         return _norms(place, beside, room) if found.holds and beside else found
     assert s.h is not None
-    return _norms(place, [matrix_replaced(s.h, {TIME: NOUGHT}), *beside], limit)
+    at_start = matrix_replaced(s.h, {TIME: NOUGHT})
+    return _norms(place, [at_start if known is None else plus(at_start, known), *beside], limit)
 
 
 def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:
@@ -233,14 +245,15 @@ def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:
     if s.x0 is not None:
         point = dict(zip(s.states, map(number, s.x0), strict=True))
         fixed = [matrix_replaced(a, point) for a in at_start]
-        return prove(norms_below(fixed, limit), Boxed({}), 1)
+        return prove(norms_below(fixed, limit), Boxed(s.ranges), place.budget if s.ranges else 1)
     if s.box is not None:
         known = {name: number(low) for name, (low, high) in s.box.items() if low == high}
         free = [matrix_replaced(a, known) for a in at_start]
-        return prove(norms_below(free, limit), Boxed(s.box), place.budget)
+        return prove(norms_below(free, limit), Boxed({**s.box, **s.ranges}), place.budget)
     assert s.within is not None
     curve = place.curve
     still = curve
     if not curve.ranges:
         still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
-    return prove(norms_below(at_start, limit), Tube(still, Round(s.within), s.states, ()), place.budget)
+    around = Tube(still, Round(s.within), s.states, (), s.ranges)
+    return prove(norms_below(at_start, limit), around, place.budget)

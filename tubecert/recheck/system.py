@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -53,6 +53,8 @@ class System:
     horizon: Fraction | None
     duties: tuple[Owed, ...]  # of f, B, W and E, on the safe set
     wind: Disturbance | None = None
+    ranges: dict[str, Range] = field(default_factory=dict)  # of parameters of the plant's drift,
+    unknown: Matrix | None = None  # which is this, (n, 1), in place of f
 
     @property
     def h(self) -> Matrix | None:
@@ -133,6 +135,8 @@ def system_of(spec: Specification) -> System:
         horizon=spec.trajectory.horizon,
         duties=(*spec.plant.duties, *metric.duties, *(() if wind is None else wind.duties)),
         wind=wind,
+        ranges=spec.plant.ranges,
+        unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
     )
 
 

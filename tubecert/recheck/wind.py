@@ -71,14 +71,14 @@ def bounded(place: Place, name: str, limit: Fraction, matched: Fraction | None) 
 def push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
     """|g'M E| <= limit for a unit geodesic g: smax(Theta E), or `matched` (beta eps_w) with that of (I - B B^+) E."""
     own = blown(place)
-    found = _metric_norm(place, own.E, limit)
+    found = metric_norm(place, own.E, limit)
     if found.holds or matched is None or own.wind.rate is not None:
         return found
-    apart = _metric_norm(place, own.rest, limit - matched)
+    apart = metric_norm(place, own.rest, limit - matched)
     return apart if apart.holds else found
 
 
-def _metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
+def metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
     """limit^2 W >= E E'."""
     if all_zero(E):
         return stated(limit >= 0, "it is negative")
@@ -91,7 +91,7 @@ def _metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
 
 def size(place: Place, limit: Fraction) -> Outcome:
     """|E| <= limit."""
-    return _norm(blown(place).E, limit, place.tube(), place.budget)
+    return norm(blown(place).E, limit, place.tube(), place.budget)
 
 
 def explained(place: Place, limit: Fraction) -> Outcome:
@@ -99,10 +99,11 @@ def explained(place: Place, limit: Fraction) -> Outcome:
     own = blown(place)
     if own.wind.rate is not None:
         return stated(limit >= 0, "it is negative")
-    return _norm(own.explained, limit, place.tube(), place.budget)
+    return norm(own.explained, limit, place.tube(), place.budget)
 
 
-def _norm(a: Matrix, limit: Fraction, domain: Domain, budget: int) -> Outcome:
+def norm(a: Matrix, limit: Fraction, domain: Domain, budget: int) -> Outcome:
+    """|a| <= limit."""
     if limit < 0:
         return stated(False, "it is negative")
     if all_zero(a):

@@ -10,14 +10,18 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.reading import TIME, Column, Reader
 from tubecert.recheck.specified.numbers import Range, ends, not_negative
-from tubecert.recheck.terms import Matrix
+from tubecert.recheck.terms import Matrix, number, replaced
 
 _MOST_STATES = 32
 
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """x' = f + B u on a box; all exact, with what the expressions owe there."""
+    """x' = f + B u on a box; all exact, with what the expressions owe there.
+
+    Where `ranges` of some parameters are given the plant's drift is `unknown`, anywhere in them; f is that of the
+    middles.
+    """
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -25,6 +29,8 @@ class Plant:
     B: Matrix
     safe_set: dict[str, Range]
     duties: tuple[Owed, ...]
+    ranges: dict[str, Range]
+    unknown: Column | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +63,43 @@ def read_plant(node: Node, box: Node) -> Plant:
     own["units"].closed(optional=(*states, *inputs))
     for _, unit in own["units"].items():
         unit.text()
-    for _, value in own["parameters"].items():
-        value.exact()  # expressions are written with the values: they have no parameters
+    ranges = _ranges(own["parameters"])
     _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping()])
-    reader = Reader.of(states)
+    reader, of_drift = Reader.of(states), Reader.of((*states, *ranges))
+    drift = of_drift.column(own["f"], n)
     sides = box.closed(*states)
     return Plant(
         states=states,
         inputs=inputs,
-        f=reader.column(own["f"], n),
+        f=_in_the_middle(own["f"], drift, ranges),
         B=reader.matrix(own["B"], n, m),
         safe_set={name: ends(sides[name]) for name in states},
-        duties=tuple(reader.duties),
+        duties=(*of_drift.duties, *reader.duties),
+        ranges=ranges,
+        unknown=drift if ranges else None,
     )
+
+
+def _ranges(node: Node) -> dict[str, Range]:
+    """Parameters of which a range is known; expressions are written with the values of all others."""
+    found = {}
+    for name, value in node.items():
+        if isinstance(value.value, list):
+            found[name] = ends(value)
+        else:
+            value.exact()
+    return found
+
+
+def _in_the_middle(node: Node, drift: Column, ranges: dict[str, Range]) -> Column:
+    """What the controller knows of f."""
+    if not ranges:
+        return drift
+    middle = {name: number((low + high) / 2) for name, (low, high) in ranges.items()}
+    try:
+        return tuple(replaced(drift, middle))
+    except ZeroDivisionError:
+        raise node.refused("is undefined in the middle of the ranges of its parameters") from None
 
 
 def _names(node: Node, names: Sequence[str]) -> None:
