@@ -40,7 +40,7 @@ def shares(n: Numbers[Interval], distance: Interval, radius: Fraction | None) ->
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputBound:
-    """An input stays in [least, greatest], for the shares of feedback and adaptation."""
+    """An input stays in [least, greatest], with the shares of feedback and adaptation at most."""
 
     least: float
     greatest: float

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import LEVEL, STAYS, HardwareRecipe, Told
+from tubecert.conditions.inputs import InputBound, InputShares, LimitedInput
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
@@ -131,6 +132,19 @@ class HardwareSection(Section[HardwareRecipe]):
             name: printable_above(float((Interval.exact(width) * level).hi))
             for name, width in self.machine.widths.items()
         }
+
+    def input_bound(self, own: LimitedInput) -> InputBound | None:
+        """What an input does with this machine: the range of the section."""
+        if self.proof is None or self.told is None:
+            return None
+        recipe = self.proof.recipe
+        found = self._inputs(recipe, self.told).get(own.name)
+        if found is None:
+            return None
+        clip = self.machine.clip[list(self.machine.inputs).index(own.name)] if self.machine.clip else ()
+        adaptation = printable_above(max(map(abs, clip), default=recipe.clip_radius))
+        shares = InputShares(feedback=printable_above(self.told.feedback), adaptation=adaptation)
+        return InputBound(least=found[0], greatest=found[1], shares=shares)
 
     def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
         """What every input does: u*, the feedback, and the clip with its other sign."""

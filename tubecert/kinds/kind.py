@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import ClassVar, Generic
 
 from tubecert.claims import GainsSuffice
-from tubecert.conditions.inputs import InputShares
+from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.conditions.theorem import R, Theorem
@@ -51,10 +51,9 @@ class Section(ABC, Generic[R]):
         """What a verdict `certified` rests on."""
         return self.judgement.proof
 
-    @property
-    def input_shares(self) -> InputShares | None:
-        """What the loop adds to u* at most, by the proof; None if there is none."""
-        return None if self.proof is None else self.proof.input_shares
+    def input_bound(self, own: LimitedInput) -> InputBound | None:
+        """What an input with limits does in the loop, by the proof; None if there is none."""
+        return None if self.proof is None else own.bound(self.proof.input_shares)
 
     @property
     def shortfalls(self) -> tuple[Shortfall, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 from flint import arb, ctx
 
@@ -40,7 +41,7 @@ from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
-from tubecert.recheck.kinds.kind import Ground, Section
+from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
@@ -439,6 +440,23 @@ def _gains(case: Case) -> Iterator[Claim]:
             rest = arb(0) if missing == "wind_not_covered" else case.setting.rest
             own = replace(ground, setting=replace(case.setting, wind=None, rest=rest), silent=True)
         yield from kind.claims(section, recipes.get(kind.key), own)
+        yield from _inputs(case, kind, ground)
+
+
+def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]:
+    """What a kind adds to inputs that have limits."""
+    bounds = tuple(own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds)
+    section, recipe = case.sections.by_key[kind.key], case.result.recipes.get(kind.key)
+    if bounds:
+        yield ground.claim(
+            f"{kind.key}: what is added to u*",
+            (bounds, section, recipe),
+            lambda: (
+                metric.stated(False, "it has no recipe")
+                if recipe is None
+                else inputs.added(kind.shares(section, recipe, ground), bounds)
+            ),
+        )
 
 
 def _silent(section: Section, missing: str) -> Outcome:

@@ -10,14 +10,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.balls import Ball
-from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.kinds.bounds import all_of, at_most
 from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
-from tubecert.recheck.kinds.table import KEYS
+from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.numbers import Range
@@ -94,11 +92,20 @@ def agrees(
             yield proven, f"{own.name} is bounded by {key}, which is not certified"
             inside = key not in deciding or (low <= bound.least and bound.greatest <= high)
             yield inside, f"{own.name} is not within its limits by {key}"
-            yield _is_sum(own, bound), f"the bound of {own.name} by {key} is not what it consists of"
+            told = by is not None and _follows(own, bound, ranges(key, by))
+            yield told, f"the bound of {own.name} by {key} is not what it consists of"
 
 
-def _is_sum(own: Limited, bound: InputBound) -> bool:
-    """Whether a bound leaves room for u* on the plan and for all that is added."""
+def ranges(key: str, section: Section) -> Mapping[str, Range] | None:
+    """Where inputs stay, if the section of a kind states it itself: this is examined with the kind."""
+    return next(kind.ranges(section) for kind in KINDS if kind.key == key)
+
+
+def _follows(own: Limited, bound: InputBound, stated: Mapping[str, Range] | None) -> bool:
+    """Whether a bound contains the range that is stated, or leaves room for u* on the plan and all that is added."""
+    if stated is not None:
+        found = stated.get(own.name)
+        return found is not None and bound.least <= found[0] and found[1] <= bound.greatest
     least, greatest, added = own.least.below, own.greatest.above, bound.feedback + bound.adaptation
     if least is None or greatest is None or min(bound.feedback, bound.adaptation) < 0:
         return False
@@ -115,15 +122,14 @@ def on_plan(place: Place, own: Limited) -> Outcome:
     return together([place.along(lambda room=room: NotNegative(room, place.numbers)) for room in sides])  # type: ignore[misc]
 
 
-def added(setting: Setting, shares: Shares | None, bounds: Sequence[InputBound]) -> Outcome:
+def added(shares: Shares | None, bounds: Sequence[InputBound]) -> Outcome:
     """What feedback and adaptation add is at most what is stated with every input."""
     if shares is None:
         return Outcome(verdict="undecided", why="this kind says nothing of inputs")
-    feedback = setting.n.feedback_gain * shares.distance
-    return all_of(_outcomes(bounds, feedback, shares.radius))
+    return all_of(_outcomes(shares, bounds))
 
 
-def _outcomes(bounds: Sequence[InputBound], feedback: Ball, radius: Fraction) -> Iterator[Outcome]:
+def _outcomes(shares: Shares, bounds: Sequence[InputBound]) -> Iterator[Outcome]:
     for bound in bounds:
-        yield at_most(feedback, bound.feedback, "what feedback adds")
-        yield stated(radius <= bound.adaptation, "adaptation may add more: R_H")
+        yield at_most(shares.feedback, bound.feedback, "what feedback adds")
+        yield stated(shares.adaptation <= bound.adaptation, "adaptation may add more: R_H")

@@ -59,7 +59,7 @@ class Judged:
         return tuple(map(self._judged, self.bounded.inputs))
 
     def _judged(self, own: LimitedInput) -> JudgedInput:
-        found = {key: own.bound(section.input_shares) for key, section in self.sections.items()}
+        found = {key: section.input_bound(own) for key, section in self.sections.items()}
         return JudgedInput(
             input=own,
             bounds={key: bound for key, bound in found.items() if bound is not None},

@@ -67,10 +67,11 @@ class Alone(Kind[AloneSection, NoGains]):
         """The margin."""
         return {} if section.margin is None else {"margins": {self.key: section.margin.below}}
 
-    def shares(self, recipe: NoGains, setting: Setting) -> Shares:
+    def shares(self, section: AloneSection, recipe: NoGains, ground: Ground) -> Shares:
         """The feedback acts within sup D; nothing adapts."""
-        del recipe
-        return Shares(supremum(setting, setting.n.h), Fraction(0))
+        del section, recipe
+        n = ground.setting.n
+        return Shares(n.feedback_gain * supremum(ground.setting, n.h), Fraction(0))
 
     def claims(self, section: AloneSection, recipe: NoGains | None, ground: Ground) -> Iterator[Claim]:
         """The margin if it is certified; the bound of the distance and the largest uncertainty in any case."""

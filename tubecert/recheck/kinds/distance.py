@@ -115,10 +115,14 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         pair = next(iter(section.pairs.values()), None)
         return {} if pair is None else {"margins": {self.key: pair.margin.below}}
 
-    def shares(self, recipe: DistanceRecipe, setting: Setting) -> Shares | None:
-        """Sup D of theorem B."""
-        bound = distance_bound(setting, recipe.gains, recipe.proof)
-        return None if bound is None else Shares(bound.supremum(), recipe.gains.projection_radius)
+    def shares(self, section: DistanceSection, recipe: DistanceRecipe, ground: Ground) -> Shares | None:
+        """The feedback acts within sup D of theorem B."""
+        del section
+        bound = distance_bound(ground.setting, recipe.gains, recipe.proof)
+        if bound is None:
+            return None
+        feedback = ground.setting.n.feedback_gain * bound.supremum()
+        return Shares(feedback, recipe.gains.projection_radius)
 
     def claims(
         self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
@@ -16,7 +16,7 @@ from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
-from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section
+from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
 from tubecert.recheck.machine import clips
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.specification import Specification
@@ -96,6 +96,18 @@ class OfMachines(Kind[HardwareSection, Digital]):
         if section.margin is None or section.level_margin is None:
             return {}
         return {"margins": {STAYS: section.margin.below, LEVEL: section.level_margin.below}}
+
+    def shares(self, section: HardwareSection, recipe: Digital, ground: Ground) -> Shares | None:
+        """Feedback with what u0 differs from u*, and the largest end of the clip."""
+        found = _loop(recipe, ground)
+        if found is None:
+            return None
+        adaptation = max((abs(end) for ends in section.clip for end in ends), default=recipe.clip_radius)
+        return Shares(found.feedback + found.feedforward, adaptation)
+
+    def ranges(self, section: HardwareSection) -> Mapping[str, Range]:
+        """Those that it states: the clip need not be the same to both sides."""
+        return section.inputs
 
     def claims(self, section: HardwareSection, recipe: Digital | None, ground: Ground) -> Iterator[Claim]:
         """The machine, its clip, the level by the recipe, what follows from it, the curve."""

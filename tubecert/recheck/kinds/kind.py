@@ -18,6 +18,7 @@ from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.place import Place
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Hardware
+from tubecert.recheck.specified.numbers import Range
 
 VERDICTS = ("certified", "refuted", "undecided")
 
@@ -91,10 +92,10 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """What inputs are bounded by: d(x*, x) <= `distance`, and `radius` bounds what adapts (0: nothing does)."""
+    """What is added to u* at most: |k| <= `feedback`, and `adaptation` bounds what adapts (0: nothing does)."""
 
-    distance: Ball
-    radius: Fraction
+    feedback: Ball
+    adaptation: Fraction
 
 
 S = TypeVar("S", bound=Section)
@@ -149,9 +150,14 @@ class Kind(ABC, Generic[S, R]):
         del node
         return ()
 
-    def shares(self, recipe: R, setting: Setting) -> Shares | None:
-        """What bounds the inputs where the recipe is a proof; None if the theorem does not say."""
-        del recipe, setting
+    def shares(self, section: S, recipe: R, ground: Ground) -> Shares | None:
+        """What is added to u*, where the recipe is a proof; None if the theorem does not say."""
+        del section, recipe, ground
+        return None
+
+    def ranges(self, section: S) -> Mapping[str, Range] | None:
+        """Where each input stays, if the section states it itself; None if it is u* with the shares."""
+        del section
         return None
 
     def projection_radii(self, section: S) -> Iterator[Fraction]:

@@ -123,9 +123,11 @@ class Rates(Kind[RateSection, Gains]):
         own: dict[str, object] = {"margins": below, "below_twice_rate": section.below_twice_rate}
         return own if section.binds is None else {**own, "binds": section.binds}
 
-    def shares(self, recipe: Gains, setting: Setting) -> Shares:
+    def shares(self, section: RateSection, recipe: Gains, ground: Ground) -> Shares:
         """Of the distance theorem A says that it stays below dbar."""
-        return Shares(setting.reach, recipe.projection_radius)
+        del section
+        setting = ground.setting
+        return Shares(setting.n.feedback_gain * setting.reach, recipe.projection_radius)
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
         """Predictor, constants, margins, radius, curve."""

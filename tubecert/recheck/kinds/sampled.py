@@ -69,10 +69,13 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
         margins = {self.key: section.margin.below}
         return {"margins": margins, "predictor_gain": section.pair.predictor_gain}
 
-    def shares(self, recipe: SampledRecipe, setting: Setting) -> Shares:
-        """max(d0, d1, sup D) of theorem C."""
+    def shares(self, section: SampledSection, recipe: SampledRecipe, ground: Ground) -> Shares:
+        """The feedback acts within max(d0, d1, sup D) of theorem C."""
+        del section
+        setting = ground.setting
         margin, _ = sampled_margin(setting, recipe.gains, exact(recipe.speed))
-        return Shares((1 - margin) * setting.reach, recipe.gains.projection_radius)
+        feedback = setting.n.feedback_gain * (1 - margin) * setting.reach
+        return Shares(feedback, recipe.gains.projection_radius)
 
     def claims(
         self, section: SampledSection, recipe: SampledRecipe | None, ground: Ground
