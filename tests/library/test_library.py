@@ -144,7 +144,7 @@ def test_expressions_of_sympy_mean_here_what_they_mean_there():
     "entry",
     [
         sympy.E * sympy.Symbol("p"),  # prints as a name
-        sympy.Float(1) / 3,  # prints fewer digits than it has
+        sympy.Float("0.1", 40) * sympy.Symbol("p"),  # has more digits than are printed
         sympy.Symbol("p + v") * 2,  # prints as a sum
         sympy.Symbol("pi"),  # a name that is a number here
         sympy.I,
@@ -161,6 +161,40 @@ def test_what_would_be_read_as_something_else_is_refused(entry):
     finding = refused("TC106", tc.specification, changed(system__f=["v", entry]))
     assert str(finding.location) == "system.f[1]"
     assert finding.help
+
+
+def test_floats_in_expressions_stand_for_their_shortest_decimals():
+    p, v = sympy.symbols("p v")
+    third = 1 / 3
+    spec = tc.specification(changed(system__f=[v, -p / 1.2 - third * v]))
+    inverse = float(1 / sympy.Float(1.2))
+    assert spec == tc.specification(changed(system__f=["v", f"-{inverse!r}*p - {third!r}*v"]))
+
+
+def test_numbers_of_every_library_are_exact():
+    for value, text in (
+        (np.int64(3), "3"),
+        (np.float64(0.1), "0.1"),
+        (np.float32(0.5), "0.5"),
+        (Decimal("0.10"), "0.10"),
+        (sympy.Rational(1, 3), "1/3"),
+        (sympy.Integer(2), "2"),
+        (Fraction(-2, 6), "-1/3"),
+    ):
+        assert plain.number_text(value, "x") == text
+    for value in (10**5000, True, 1j, None, np.longdouble(1) / 3):
+        refused("TC106", plain.number_text, value, "x")
+
+
+def test_a_key_that_occurs_twice_is_refused():
+    p = sympy.Symbol("p")
+    refused("TC106", tc.specification, changed(safe_set={"p": [-2, 2], p: [-1, 1], "v": [-2, 2]}))
+
+
+def test_texts_that_no_file_can_hold_are_refused():
+    for name in ("\ud800", "a\x00b", "a\u2028b", "x" * 2_000_000):
+        with pytest.raises(tc.TubecertError):
+            tc.specification(changed(name=name))
 
 
 def test_a_value_that_holds_itself_is_refused():
@@ -236,9 +270,14 @@ def test_the_values_are_those_of_the_certificate():
     assert str(result).startswith("certified cart: rho = ")
 
 
-def test_numbers_are_rounded_to_the_safe_side():
-    result = tc.certify(changed(tube__epsilon="1/3"))
-    assert Fraction(repr(result.rho)) >= result.result.tube.rho
+@pytest.mark.parametrize("rho", [Fraction(1, 3), Fraction(2, 3), Fraction(1, 10), Fraction(3, 7)])
+def test_the_radius_is_rounded_up(rho):
+    result = certified().result
+    changed_ = dataclasses.replace(result, tube=dataclasses.replace(result.tube, rho=rho))
+    told = dataclasses.replace(
+        certified(), certificate=dataclasses.replace(certified().certificate, result=changed_)
+    ).rho
+    assert rho <= Fraction(repr(told)) < rho + Fraction(1, 10**15)
 
 
 def test_what_is_not_certified_has_no_gains_to_use():
@@ -544,7 +583,7 @@ axes.plot(run.states("l1")[:, 0])
 import tubecert as tc
 tc.certfy("plant.yaml")
 tc.certify("plant.yaml", rho="0.1")
-tc.simulate("plant.yaml")
+tc.simulate(3)
 omega: str = tc.read("x.json").omega
 """
     for name, text in (("right.py", script), ("wrong.py", wrong)):

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tubecert.certificate import file
-from tubecert.certificate.result import Bound, Certificate, MetricData, Result
+from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
-from tubecert.kinds.data import Pair
+from tubecert.kinds.data import Pair, SectionData
 from tubecert.library.specification import File, Specification
 from tubecert.records import FormError
 from tubecert.report import gains as report_gains
@@ -152,13 +152,20 @@ class Certification:
         return MappingProxyType({}) if self.deciding is None else self.deciding.margins
 
     def curve(self, kind: str) -> Array:
-        """Points (K, 2) that are proven for a kind, by its letter: bandwidth in rad/s, and what it needs.
+        """Points (K, 2) that are proven for a kind, by its letter.
 
-        That is the adaptation rate, for sampled adaptation the sample time in s. (0, 2) where there is none. Raises
-        `KeyError` for a kind that there is not.
+        Bandwidth in rad/s and adaptation rate; C: bandwidth and sample time in s; H: sample time in s and level.
+        (0, 2) where there is none. Raises `KeyError` for a kind that there is not.
         """
-        section = self.result.sections.get(name_of(kind).key)
+        section = self.section(kind)
         return _array([] if section is None else section.points()).reshape(-1, 2)
+
+    def section(self, kind: str) -> SectionData | None:
+        """All that the certificate says of a kind, by its letter; None if it says nothing of it.
+
+        Raises `KeyError` for a kind that there is not.
+        """
+        return self.result.sections.get(name_of(kind).key)
 
     # the tube
 
@@ -196,6 +203,11 @@ class Certification:
     def constants(self) -> Mapping[str, Bound]:
         """The constants of the proof: `below` and `above`, `symbol`, `unit`, `equation`, `at`."""
         return MappingProxyType(dict(self.result.constants))
+
+    @property
+    def limits(self) -> Mapping[str, InputData]:
+        """What is proven of each input that has limits, by its name."""
+        return MappingProxyType({item.input: item for item in self.result.inputs})
 
     @property
     def metric(self) -> MetricData | None:

@@ -8,10 +8,13 @@ would print as something else is refused.
 from __future__ import annotations
 
 import json
+import numbers
+import sys
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any, Final, NoReturn, Protocol, SupportsFloat, TypeAlias, runtime_checkable
+from math import isnan
+from typing import Any, Final, NoReturn, Protocol, TypeAlias, runtime_checkable
 
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, NamedPlace
@@ -21,6 +24,7 @@ Number: TypeAlias = int | float | str | Fraction | Decimal
 Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
 Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
 _DEEPEST: Final = 60  # the reader of specifications refuses less
+_LARGEST: Final = 10**4000  # what has more digits is refused by Python, and by the reader
 _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
 
 
@@ -38,6 +42,8 @@ class _Expression(Protocol):
     free_symbols: set[object]
 
     def atoms(self) -> Iterable[object]: ...
+
+    def xreplace(self, rule: Mapping[object, object]) -> _Expression: ...
 
 
 def number_text(value: Number, name: str) -> str:
@@ -75,10 +81,7 @@ def _plain(value: object, path: str, depth: int) -> Plain:
     if value is None or isinstance(value, (str, bool)):
         return value
     if isinstance(value, Mapping):
-        return {
-            _key(key, path): _plain(item, _below(path, _key(key, path)), depth + 1)
-            for key, item in value.items()
-        }
+        return _mapping(value, path, depth)
     if isinstance(value, (list, tuple)):
         return [_plain(item, f"{path}[{i}]", depth + 1) for i, item in enumerate(value)]
     if (text := _number(value)) is not None:
@@ -92,54 +95,77 @@ def _plain(value: object, path: str, depth: int) -> Plain:
     )
 
 
-def _below(path: str, key: str) -> str:
-    return f"{path}.{key}" if path else key
+def _mapping(value: Data, path: str, depth: int) -> dict[str, Plain]:
+    found: dict[str, Plain] = {}
+    for each, item in value.items():
+        key = _key(each, path)
+        if key in found:
+            _refuse(path, f"{key} occurs twice, as a text and as a symbol", "keep one")
+        found[key] = _plain(item, f"{path}.{key}" if path else key, depth + 1)
+    return found
 
 
 def _key(key: object, path: str) -> str:
     if isinstance(key, str):
         return key
-    if getattr(key, "is_Symbol", False):
+    if _is(key, "is_Symbol"):
         return str(key)
     return _refuse(path, f"the key {_shown(key)} is no name", "give a text")
 
 
 def _number(value: object) -> str | None:
-    """Its exact text; a float's is the shortest that is read as the same float."""
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, (int, Decimal)):
+    """Its exact text, of whatever library it is; a float's is the shortest that is read as the same float."""
+    if isinstance(value, Decimal):
         return str(value)
-    if isinstance(value, Fraction):
-        return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else str(value.numerator)
-    return repr(float(value)) if isinstance(value, float) else None
+    if isinstance(value, numbers.Rational) and not isinstance(value, bool):
+        exact = Fraction(int(value.numerator), int(value.denominator))
+        return str(exact) if max(abs(exact.numerator), exact.denominator) < _LARGEST else None
+    if isinstance(value, numbers.Real) and not isinstance(value, (bool, _Expression)):
+        near = float(value)
+        return repr(near) if near == value or isnan(near) else None
+    return None
 
 
 def _expression(value: _Expression, path: str) -> str:
-    """What an expression of sympy prints, if that means the same here."""
+    """What an expression of sympy prints, if that means the same here; floats are their shortest decimals."""
     for atom in value.atoms():
         _check_atom(atom, path)
-    return str(value).replace("Abs(", "abs(")
+    exact = value.xreplace({atom: _decimal(atom, path) for atom in value.atoms() if _is(atom, "is_Float")})
+    return str(exact).replace("Abs(", "abs(")
+
+
+def _is(atom: object, kind: str) -> bool:
+    return bool(getattr(atom, kind, False))
+
+
+def _decimal(atom: object, path: str) -> object:
+    """A float of sympy, which prints fewer digits than it has, as the rational of its shortest decimal."""
+    rational = sys.modules["sympy"].Rational  # who else made it
+    near = repr(float(str(rational(atom).evalf(40))))
+    if rational(atom) != rational(float(near)):
+        _refuse(path, f"{atom} has more digits than a float", "write the number as a Rational, or a text")
+    return rational(near)
 
 
 def _check_atom(atom: object, path: str) -> None:
-    """Refuses an atom that prints as something else than it is: E as a name, a float with fewer digits than it has."""
+    """Refuses an atom that prints as something else than it is: E as a name, a symbol as a sum."""
     text = str(atom)
-    if text == "pi" and not getattr(atom, "is_Symbol", False):
+    if text == "pi" and not _is(atom, "is_Symbol"):
         return
-    if not any(getattr(atom, kind, False) for kind in _ATOMS):
+    if not any(_is(atom, kind) for kind in _ATOMS):
         _refuse(
             path, f"{text} of {type(atom).__name__} has no meaning here", "write it as a text, or as a number"
         )
-    if getattr(atom, "is_Symbol", False) and not (text.isidentifier() and text != "pi"):
+    if _is(atom, "is_Symbol") and not (text.isidentifier() and text != "pi"):
         _refuse(path, f"the symbol {text[:40]!r} is no name", "use letters, digits and _")
-    if getattr(atom, "is_Float", False) and isinstance(atom, SupportsFloat) and float(text) != float(atom):
-        help = "write the number as a Rational or the expression as a text: here it is exact"
-        _refuse(path, f"{text} is not all of the number {float(atom)!r}", help)
 
 
 def _shown(value: object) -> str:
-    return f"{repr(value)[:60]} ({type(value).__name__})"
+    try:
+        text = repr(value)[:60]
+    except ValueError:  # more digits than Python writes
+        text = "a number"
+    return f"{text} ({type(value).__name__})"
 
 
 def _refuse(path: str, message: str, help: str) -> NoReturn:

@@ -18,7 +18,7 @@ from tubecert.expression import suggestion
 from tubecert.findings import Finding
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
 from tubecert.library.asked import Named, one_of
-from tubecert.library.certification import Certification
+from tubecert.library.certification import Certification, read
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import File, Specifiable, spec_of
@@ -128,7 +128,7 @@ class Simulation:
 
 
 def simulate(
-    result: Certification,
+    result: Certification | File,
     *,
     spec: Specifiable | None = None,
     controllers: str | Sequence[str] | None = None,
@@ -143,10 +143,11 @@ def simulate(
     sample_time: Number | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Integrates the closed loops of a certificate and attacks the tube: `tubecert simulate`, with the same options.
+    """Integrates the closed loops of a certificate, or of the file of one, and attacks the tube: `tubecert simulate`.
 
-    `spec` is needed where the certificate was read and its plan is in a file. Needs the extra `simulate`. Raises
-    `TubecertError` if there is no tube that could be left, or the specification is another one.
+    The arguments are the options of the command. `spec` is needed where the certificate was read and its plan is in a
+    file. Needs the extra `simulate`. Raises `TubecertError` if there is no tube that could be left, or if the
+    specification is another one.
     """
     require_extra()
     texts = number_texts(
@@ -164,13 +165,14 @@ def simulate(
     one_of("gains", gains, words_of(ADAPTIVE))
     from tubecert.simulate.certified import adopted, require_plan, require_tube
 
-    system = result.specification.spec if spec is None else spec_of(spec)
+    found = result if isinstance(result, Certification) else read(result)
+    system = found.specification.spec if spec is None else spec_of(spec)
     require_plan(system)
-    system = adopted(system, result.result)
-    require_tube(result.result)
+    system = adopted(system, found.result)
+    require_tube(found.result)
     wishes = wishes_of(system, numbers, chosen, gains)
-    campaign = campaign_of(system, result.result, wishes, None if progress is None else _told(progress))
-    return Simulation(campaign=campaign, compared_with=result.hash)
+    campaign = campaign_of(system, found.result, wishes, None if progress is None else _told(progress))
+    return Simulation(campaign=campaign, compared_with=found.hash)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ METRIC: Final = Kind(
 PLAN: Final = Kind(most=10_000_000, **_CODES)
 
 _BREAK = re.compile(r"\r\n|\r|\n")
-_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _INDICATORS = re.compile(r"([ \t]*)((?:[-?:][ \t]+)*)")
 
 
