@@ -97,6 +97,14 @@ HARMLESS = [
     (r"plan\.knots\.\w+\[\](\[\])?", verified),  # another plan, examined as it stands
     # a recipe may be any that serves
     (r"proof\.(distance|sampled)\.(speed|prediction_error|uncertainty)", verified),
+    # H: what follows from a level may be looser; another recipe, clip or point is examined as it stands
+    (r"hardware\.(level_)?margin\[1\]", anything),
+    (r"hardware\.(level_)?margin\[0\]", lower),
+    (r"hardware\.(radius|budget\.\w+|half_widths\.\w+)", rounded_higher),
+    (r"hardware\.inputs\.\w+\[0\]", lower),
+    (r"hardware\.inputs\.\w+\[1\]", higher),
+    (r"hardware\.clip\[\]\[\]", verified),
+    (r"proof\.hardware\.(floor|speed|bias|ripple|prediction)", verified),
     (r"decided_by\[\]", anything),  # any certified section may decide
     (r"overrides\b.*", anything),
     (r"(conditions_26|no_adaptation)\.shortfalls.*", anything),
