@@ -6,6 +6,7 @@ import copy
 from fractions import Fraction
 
 import pytest
+import tampers
 from rechecked import CONFIGS, certified, examine, failing, sealed, unconfirmed
 from systems import SMALL
 
@@ -311,3 +312,23 @@ def test_the_units_of_a_drift_are_the_least_noise():
         bandwidth=None,
     )
     assert promise(asked).drift == 30
+
+
+@pytest.mark.slow
+def test_no_random_change_of_what_is_stated_of_a_machine_is_confirmed(monkeypatch):
+    made, fields = certified(KINDS["noise per state and wind"], conditions="hardware"), tampers.fields
+    own = (
+        "hardware",
+        "proof.hardware",
+        "spec.effective.hardware",
+        "spec.effective.disturbance",
+        "claim.wind",
+    )
+    monkeypatch.setattr(
+        tampers,
+        "fields",
+        lambda r: {name: paths for name, paths in fields(r).items() if name.startswith(own)},
+    )
+    refusals, _, wrong = tampers.campaign(made, 150, seed=5)
+    assert wrong == []
+    assert refusals > 90
