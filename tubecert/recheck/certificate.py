@@ -311,8 +311,8 @@ def _parameters(node: Node) -> dict[str, Range]:
 
 
 def _wind(node: Node) -> Wind:
-    own = node.closed("bound", optional=("rate",))
-    return Wind(bound=own.known("bound", Node.exact), rate=own.get("rate", Node.exact))
+    own = node.closed(optional=("bound", "rate"))
+    return Wind(bound=own.get("bound", Node.exact), rate=own.get("rate", Node.exact))
 
 
 def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:

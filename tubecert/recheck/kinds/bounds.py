@@ -40,6 +40,13 @@ def at_least(value: Ball, below: Fraction, what: str) -> Outcome:
     )
 
 
+def told(value: Ball, printed: Enclosure, what: str) -> Outcome:
+    """A margin of what is not certified for another reason: an interval, and proven to be at least its lower end."""
+    if not printed.is_interval:
+        return stated(False, f"the printed margin of {what} is not an interval")
+    return CONFIRMED if printed.below is None else at_least(value, printed.below, what)
+
+
 def at_most(value: Ball, printed: Fraction, what: str) -> Outcome:
     """A number that is at most this."""
     if value <= exact(printed):

@@ -21,6 +21,7 @@ from tubecert.recheck.kinds.bounds import (
     at_least,
     margin_at_least,
     not_shown_to_hold,
+    told,
     ultimate,
     words,
 )
@@ -131,11 +132,11 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         certified = section.verdict == "certified"
         for k, (name, pair) in enumerate(section.pairs.items()):
             decides = k == 0
-            if name == "asked" and not certified and not ground.silent:
+            if name == "asked" and not certified:
                 yield ground.claim(
                     "B: what is told of it",
                     (pair,),
-                    lambda pair=pair: not_shown_to_hold([pair.margin]),  # type: ignore[misc]
+                    lambda pair=pair: _told(pair, ground),  # type: ignore[misc]
                 )
                 continue
             yield _pair_claim(pair, recipe, ground, by_recipe=decides and certified)
@@ -222,6 +223,13 @@ def _margin(setting: Setting, at: Gains, proof: DistanceProof) -> Ball:
 
 def _own_margin(setting: Setting, at: Gains) -> Ball:
     return _margin(setting, at, own_distance_proof(setting, at)) if at.sensible else arb("nan")
+
+
+def _told(pair: DistancePair, ground: Ground) -> Outcome:
+    """Gains that were asked for and are not certified."""
+    if not ground.silent:
+        return not_shown_to_hold([pair.margin])
+    return told(_own_margin(ground.setting, pair.gains), pair.margin, "the distance")
 
 
 def _agreed(section: DistanceSection, decisive: DistancePair) -> Outcome:

@@ -19,6 +19,7 @@ from tubecert.recheck.kinds.bounds import (
     at_most,
     margin_at_least,
     not_shown_to_hold,
+    told,
     ultimate,
     words,
 )
@@ -237,7 +238,11 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
         yield ground.claim(
             "A: its recipe", (pair, recipe), lambda: stated(recipe == at, "it is for other gains")
         )
-    elif not ground.silent:
+    elif ground.silent:
+        yield ground.claim(
+            "A: its margins without a disturbance", (pair,), lambda: _margins_told(pair, setting)
+        )
+    else:
         yield ground.claim("A: what is told of it", (pair,), lambda: not_shown_to_hold(pair.margins.values()))
     if radius is not None:
         yield ground.claim(
@@ -276,6 +281,12 @@ def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:
     """(26a)-(26c) hold with the margins printed."""
     found = margins_26(setting, pair.gains)
     return all_of(margin_at_least(found[claim], pair.margins[claim], f"({claim})") for claim in found)
+
+
+def _margins_told(pair: RatePair, setting: Setting) -> Outcome:
+    """The margins printed, whatever follows from them."""
+    found = margins_26(setting, pair.gains)
+    return all_of(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
 
 
 def _derived_hold(constants: dict[str, Enclosure], setting: Setting, at: Gains) -> Outcome:

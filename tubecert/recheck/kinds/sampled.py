@@ -14,7 +14,7 @@ from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
+from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold, told
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.sampling import SampledGains, sampled_margin
@@ -148,8 +148,11 @@ def _told(section: SampledSection, ground: Ground) -> Outcome:
     """Gains that are not certified: no radius in the long run, and no margin that says that they serve."""
     if section.ultimate_radius is not None:
         return stated(False, "a radius is stated of a tube that is not certified")
-    if section.margin is None or ground.silent:
+    if section.margin is None or section.pair is None:
         return CONFIRMED
+    if ground.silent:
+        own, _ = sampled_margin(ground.setting, section.pair, None)
+        return told(own, section.margin, "the distance with sampled adaptation")
     return not_shown_to_hold([section.margin])
 
 
