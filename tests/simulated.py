@@ -58,7 +58,7 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         return Peak(value=values[lanes, at], time=t[at])
 
     none = np.zeros((N, K))
-    peaks = {name: peak(none) for name in ("u", "k", "xtilde", "sigma_error", "h")}
+    peaks = {name: peak(none) for name in ("u", "k", "xtilde", "sigma_error", "h", "estimate", "speed")}
     worst = Worst(
         **(peaks | {"distance": peak(distance), "deviation": peak(deviation)} | changes.pop("peaks", {}))
     )
@@ -75,6 +75,8 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         "xtilde": np.zeros((N, K, n)),
         "distance": distance,
         "worst": worst,
+        "least": np.zeros((N, m)),
+        "greatest": np.zeros((N, m)),
         "error": np.zeros(N),
         "unresolved": np.full(N, np.nan),
         "failures": (),

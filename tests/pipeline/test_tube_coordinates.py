@@ -215,9 +215,14 @@ def test_simulations_stay_within_what_is_certified(tube):
     setting = setting_of(spec, result)
     for controller, source in (("l1", "distance"), ("sampled", "sampled")):
         loop = loop_of(setting, controller, Choice(source=source))
-        cases = [case(setting, 0, number) for number in range(6)]
+        cases = [case(setting, setting.uncertainty, 0, number) for number in range(6)]
         starts = np.array([each.start for each in cases])
-        runs = integrate(loop.problem, starts, disturbance_of(setting, cases), tolerance=setting.tolerance)
+        runs = integrate(
+            loop.problem,
+            starts,
+            disturbance_of(setting, setting.uncertainty, cases),
+            tolerance=setting.tolerance,
+        )
         found = compare(setting, runs, loop.promise)
         assert not found.violations
         assert not found.outside

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.integrator import integrate, ladder, run
-from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
+from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem, nothing_beside, unbounded
 from tubecert.spec import load_text
 from tubecert.trajectory.plan import constant_plan
 
@@ -399,6 +399,8 @@ def test_lanes_do_not_know_each_other():
         push=rng.uniform(0, 0.5, N),
         radius=np.full(N, 1.5),
         centre=np.array([0.1, 0.2]),
+        beside=nothing_beside(N, n, m),
+        box=unbounded(m),
     )
     d.push[7] = 0.0
     gains = LoopGains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
@@ -437,6 +439,8 @@ def test_disturbances_are_what_they_say():
         push=np.array([0.4]),
         radius=np.array([0.6]),
         centre=np.array([0.1, -0.2]),
+        beside=nothing_beside(1, 2, 1),
+        box=unbounded(1),
         layer=0.05,
     )
     case = problem("ccm", K=9)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import tubecert
 from tubecert.expression import as_expression, sin, symbol
@@ -18,11 +17,9 @@ from tubecert.model import ControlAffineModel
 from tubecert.simulate.compiled import entry
 from tubecert.simulate.fast import _rate, generator
 from tubecert.simulate.grid import fast_part
-from tubecert.simulate.integrator import ladder
 from tubecert.simulate.layout import blocks, layout, slices
 from tubecert.simulate.loops import CONTROLLERS, DESIGNS
-from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
-from tubecert.simulate.stepping import output, run, work
+from tubecert.simulate.problem import LoopGains, LoopProblem
 from tubecert.spec.simulation import CONTROLLERS as NAMES
 from tubecert.trajectory import constant_plan
 
@@ -120,63 +117,6 @@ def test_loops_are_named_alike_everywhere():
     assert not DESIGNS["nominal"].disturbed
     assert all(DESIGNS[name].disturbed for name in CONTROLLERS if name != "nominal")
     assert all(hasattr(GAINS, need) for design in DESIGNS.values() for need in design.needs)
-
-
-# the state, and what is measured of it
-
-
-def told(controller, *, measured, **options):
-    """x (K, 2) and d(x*, x) (K,) of a loop whose controller is told that the state is `measured`, all the time."""
-    case = problem(controller, **options)
-    steps = ladder(case, (sin(T), as_expression(Fraction(1, 2))))
-    disturbance = Disturbance.from_expressions((sin(T), as_expression(Fraction(1, 2))), TWO, 1)
-    lane = steps.level(3, disturbance)._replace(exact=False)
-    memory = work(lane.fast.at, steps.point, np.zeros(1))
-    seen = memory.point.plant._replace(f=np.zeros(2), B=np.zeros((2, 2)))
-    memory = memory._replace(measured=np.array(measured, dtype=float), point=memory.point._replace(seen=seen))
-    out = output(1, len(case.times), lane.fast.at)
-    run(0, 1, lane, START, memory, out)
-    assert out.status[0] == 0
-    return case.times, out
-
-
-START = np.array([[0.3, -0.2]])
-B = np.array([[1.0, 0.5], [-0.25, 2.0]])
-M = np.linalg.inv([[1.0, -0.5], [-0.5, 1.0]])
-
-
-def test_a_controller_that_sees_the_plan_does_nothing():
-    """What is measured drives the feedback; the plant, h and the distance are those of the state."""
-    times, out = told("ccm", measured=[0, 0])
-
-    def free(t, x):
-        return np.array([-x[0] + x[1], np.sin(x[0]) - x[1]]) + B @ np.array([np.sin(t), 0.5])
-
-    expected = solve_ivp(free, (0, 1), START[0], t_eval=times, rtol=1e-10, atol=1e-12).y.T
-    np.testing.assert_allclose(out.x[0], expected, atol=1e-7)
-    assert (out.k == 0).all()
-    distance = np.sqrt(np.einsum("ki,ij,kj->k", expected, M, expected))
-    np.testing.assert_allclose(out.distance[0], distance, atol=1e-7)
-
-
-def test_the_feedback_is_that_of_the_measured_state():
-    measured = np.array([0.2, 0.4])
-    _, out = told("ccm", measured=measured)
-    f = np.array([-measured[0] + measured[1], np.sin(measured[0]) - measured[1]])
-    m = M @ measured
-    phi0, phi1 = 2 * m @ f + 2 * 0.5 * measured @ m, 2 * B.T @ m
-    k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(2)
-    assert phi0 > 0
-    np.testing.assert_allclose(out.k[0], np.tile(k, (len(out.k[0]), 1)), rtol=1e-12)
-
-
-def test_a_computer_predicts_from_the_measured_state():
-    """At the first sample xhat is what is measured: xtilde is 0 there, and the state is elsewhere."""
-    _, out = told("l1", measured=[0, 0], control_rate=10.0)
-    assert (out.xtilde[0, 0] == 0).all()
-    # f, B and k are those at the plan: xhat moves by dt B(u_a + sigma_hat), both 0 at first
-    assert np.abs(out.xtilde[0]).max() < 1e-12
-    assert np.abs(out.x[0]).max() > 0.3
 
 
 # the rules of the room

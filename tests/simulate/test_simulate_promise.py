@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from simulated import Failure, certified, runs, setting
 
-from tubecert.simulate.certified import Section, Values, read_numbers
+from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.simulate.certified import Own, Section, Values, read_numbers
 from tubecert.simulate.compare import compare
+from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.promise import KINDS, promise
 from tubecert.simulate.uncertainty import class_of
 
@@ -32,7 +35,7 @@ def numbers():
     return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants, sections=sections)
 
 
-@pytest.mark.parametrize("key", KINDS)
+@pytest.mark.parametrize("key", [key for key in KINDS if key != "hardware"])
 def test_bounds_are_those_of_the_theory(numbers, key):
     c, recipe = numbers.constants, numbers.sections[KINDS[key].name.key].recipe
     kmax = c["feedback_gain"] * 0.4
@@ -53,6 +56,40 @@ def test_bounds_are_those_of_the_theory(numbers, key):
         V = (2 * (c["h"] + R_H) * s1 / q + (c["h"] + R_H) ** 2) / recipe["adaptation_rate"]  # (2.11)
         expected["xtilde"] = V**0.5
     assert promise(numbers, KINDS[key]).bounds == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("prediction", [None, "0.2"])
+def test_bounds_of_a_machine(numbers, prediction):
+    """Theorem H: kb, X, Y and what is left of h at the samples; its tube and its ranges of inputs are its own."""
+    c, recipe = (
+        numbers.constants,
+        {"sample_time": "0.01", "delay": "0.005", "feedback_time": "0.02", "noise": "0.3"},
+    )
+    recipe |= {"clip_radius": "0.7", "level": "0.35", "floor": "0.1", "speed": "0.9", "bias": "0.11"}
+    recipe |= {"ripple": "0.07", "prediction": prediction, "bandwidth": None, "wind": "0"}
+    c |= {"noise_metric": 0.5, "input_rate": 0.6}
+    own = Own(
+        recipe=HardwareRecipe(**{k: None if q is None else Fraction(q) for k, q in recipe.items()}),
+        radius=0.55,
+        half_widths=(0.2, 0.3),
+        clip=None,
+    )
+    section = Section(certified=True, recipe=Values(), ultimate=0.4, own=own)
+    found = promise(replace(numbers, sections={"hardware": section}), KINDS["hardware"])
+    n_M = 0.3 * 0.5 if prediction is None else 1.9**0.5 * 0.2
+    s1, H0 = c["h_t"] + c["h_x"] * 0.9, c["h_initial"]
+    expected = {
+        "distance": 0.35,
+        "deviation": 0.55,
+        "k": c["feedback_gain"] * (0.35 + n_M) + min(0.6 * 0.025, 2 * c["u_star"]),
+        "sigma_error": min(
+            c["h"] + 0.7, max(min(c["h"], H0 + s1 * 0.015), max(0.11, H0) + 0.07 + s1 * 0.015)
+        ),
+        "estimate": max(0.11, H0) + 0.07,
+        "speed": 0.9,
+    }
+    assert found.bounds == pytest.approx(expected, rel=1e-12)
+    assert found.half_widths == own.half_widths
 
 
 def test_the_decay_without_adaptation(numbers):
@@ -116,3 +153,14 @@ def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
     where, found = around(share)
     stopped = replace(found, error=np.array([np.inf]), failures=(Failure(lane=0, t=2.5, reason="stopped"),))
     assert compare(where, stopped, None).outside == ((0,) if left else ())
+
+
+@pytest.mark.parametrize(("least", "broken"), [(-0.9, []), (-1.1, ["input -u"])])
+def test_inputs_stay_in_their_ranges(least, broken):
+    where, found = around(0.5)
+    ranges = (InputRange(name="u", column=0, least=-1.0, greatest=2.0),)
+    promised = replace(promise(where.certified, KINDS["distance"]), ranges=ranges, decay=None)
+    found = replace(found, least=np.array([[least]]), greatest=np.array([[1.0]]))
+    compared = compare(where, found, promised)
+    assert [item.name for item in compared.violations] == broken
+    assert (compared.inputs[0].least, compared.inputs[0].proven) == (least, (-1.0, 2.0))

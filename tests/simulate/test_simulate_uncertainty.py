@@ -129,8 +129,8 @@ def test_pushes_use_the_class():
 
 def test_a_run_is_drawn_from_its_seed_and_number_alone():
     where = setting("flat")
-    one, same = case(where, 3, 17), case(where, 3, 17)
+    one, same = case(where, where.uncertainty, 3, 17), case(where, where.uncertainty, 3, 17)
     for name in ("amplitude", "frequency", "wave", "phase"):
         np.testing.assert_array_equal(getattr(one.member, name), getattr(same.member, name))
-    others = [case(where, 3, 18), case(where, 4, 17)]
+    others = [case(where, where.uncertainty, 3, 18), case(where, where.uncertainty, 4, 17)]
     assert all(not np.array_equal(one.member.frequency, other.member.frequency) for other in others)

@@ -49,7 +49,7 @@ def simulate(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Loops, separated by commas: nominal, ccm, reference, l1, sampled.  [ccm,l1]",
+            help="Loops, separated by commas: nominal, ccm, reference, l1, sampled, hardware.  [ccm,l1,hardware]",
         ),
     ] = None,
     gains: Annotated[

@@ -123,7 +123,8 @@ class Simulation:
         from tubecert.report import notebook
 
         style = "falsified" if self.falsified else ""
-        rows = [(item.loop.controller, f"largest d/dbar {item.use:.4g}") for item in self.campaign.attacks]
+        reach, attacks = self.campaign.setting.reach, self.campaign.attacks
+        rows = [(item.loop.controller, f"largest d/dbar {item.greatest / reach:.4g}") for item in attacks]
         return notebook.of_line(str(self), style, rows)
 
 
@@ -180,6 +181,7 @@ class Wishes:
     """What is asked for, then the specification's section `simulation`, then defaults."""
 
     controllers: tuple[str, ...]
+    defaulted: bool
     gains: str
     runs: int
     seed: int
@@ -239,6 +241,7 @@ def wishes_of(system: Spec, numbers: Mapping[str, Any], chosen: tuple[str, ...],
 
     return Wishes(
         controllers=chosen or default.controllers or ("ccm", adaptive),
+        defaulted=not (chosen or default.controllers),
         gains=option,
         runs=first("runs", RUNS),
         seed=first("seed", SEED),
@@ -257,7 +260,9 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Report | N
     setting = setting_of(system, result, numbers["duration"])
     choice = Choice(source=wishes.gains, **{name: numbers[name] for name in GAINS})
     rate = numbers["control_rate"]
-    loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in wishes.controllers]
+    also = ("hardware",) if wishes.defaulted and setting.certified.machine else ()
+    names = dict.fromkeys((*wishes.controllers, *also))
+    loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in names]
     with told(report):
         return campaign(
             setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report

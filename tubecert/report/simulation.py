@@ -34,6 +34,8 @@ _WORDS: Final = {
     "u": "|u|",
     "xtilde": "|xtilde|",
     "sigma_error": "|sigma_hat - h|",
+    "estimate": "|q - h|",
+    "speed": "|x'|",
 }
 
 
@@ -74,10 +76,14 @@ def _because(data: Data) -> str:
         case "no result":
             return f"the error estimate of some runs exceeds rho/100, or they failed ({_runs(runs)})"
         case "interrupted":
-            return f"{_runs(runs)} finished, in which d/dbar reached {short(use)}"
+            return f"{_runs(runs)} finished, in which d(x*, x) reached {short(use)} of its bound"
         case "not falsified":
-            return f"d/dbar reached {short(use)} in {_runs(runs)}"
-    return f"d/dbar reached {short(use)} in {_runs(runs)}" if use is not None else "no loop adapts"
+            return f"d(x*, x) reached {short(use)} of its bound in {_runs(runs)}"
+    return (
+        f"d(x*, x) reached {short(use)} of its bound in {_runs(runs)}"
+        if use is not None
+        else "no loop adapts"
+    )
 
 
 def _runs(count: int) -> str:
@@ -121,7 +127,7 @@ def _sections(data: Data, verbose: bool) -> Iterator[tuple[str, list[RenderableT
     if any(_counts(part) for part in _parts(data)):
         yield "Largest share of every bound", [_bounds(data)]
     if inputs := _inputs(data):
-        yield "Inputs with limits, in all runs", [_table_of(inputs)]
+        yield "Inputs, in all runs", [_table_of(inputs)]
     if data["obstacles"]["plan"]:
         yield "Obstacles (least distance; negative: collision)", [_obstacles(data)]
     if verbose:
@@ -133,14 +139,16 @@ def _where(part: Data, item: Data) -> str:
     return str(part["what"]).replace("{run}", str(item["run"]))
 
 
+def _when(item: Data) -> str:
+    return "" if item["t"] is None else f"t = {short(item['t'])} s, "
+
+
 def _violation(part: Data, item: Data) -> Text:
     where = _where(part, item)
     what = (
         f"{part['controller']}: {_WORDS.get(item['bound_of'], item['bound_of'])} is {short(item['value'], 6)}"
     )
-    text = Text(
-        f"{what}, promised at most {short(item['bound'], 6)}; t = {short(item['t'])} s, {where}", "red"
-    )
+    text = Text(f"{what}, promised at most {short(item['bound'], 6)}; {_when(item)}{where}", "red")
     if "random run" in where:
         text.append(f"\n  to see it alone: the same command with --replay {item['run']}", style="default")
     return text
@@ -161,7 +169,7 @@ def _unresolved(part: Data, item: Data) -> Text:
 
 
 def _loops(data: Data) -> Table:
-    table = _table("controller", "gains", "are", "max d/dbar", "max |x-x*|/rho", "settled")
+    table = _table("controller", "gains", "are", "max d/bound", "max |x-x*|/bound", "settled")
     for loop in data["loops"]:
         settled = loop["settled"]
         table.add_row(
@@ -179,7 +187,8 @@ def _gain_words(loop: Data) -> str:
     gains = loop.get("gains")
     if not gains:
         return UNKNOWN
-    words = [f"omega {short(gains['bandwidth'])}"]
+    bandwidth = gains["bandwidth"]
+    words = ["no filter" if bandwidth is None else f"omega {short(bandwidth)}"]
     if gains["adaptation_rate"] is not None:
         words.append(f"Gamma {short(gains['adaptation_rate'])}")
     if gains["sample_time"] is not None:
@@ -205,7 +214,7 @@ def _class(data: Data) -> Text:
 
 
 def _attacks(data: Data) -> Table:
-    table = _table("controller", "runs", "left the tube", "no result", "max d/dbar", "adversary", "settled")
+    table = _table("controller", "runs", "left the tube", "no result", "max d/bound", "adversary", "settled")
     for attack in data["attacks"]:
         random, adversary = attack.get("random"), attack.get("adversary")
         settled = random and random["settled"]
@@ -227,7 +236,6 @@ def _attacks(data: Data) -> Table:
 
 def _bounds(data: Data) -> Table:
     """What the loops that adapt used of every bound, over all their runs."""
-    table = _table("controller", *_WORDS.values())
     most: dict[str, dict[str, float]] = {}
     for part in _parts(data):
         if _counts(part):
@@ -235,8 +243,10 @@ def _bounds(data: Data) -> Table:
             for name, use in part["worst"].items():
                 if use["share"] is not None:
                     shares[name] = max(shares.get(name, 0.0), use["share"])
+    names = [name for name in _WORDS if any(name in shares for shares in most.values())]
+    table = _table("controller", *(_WORDS[name] for name in names))
     for controller, shares in most.items():
-        table.add_row(controller, *(short(shares[name]) if name in shares else UNKNOWN for name in _WORDS))
+        table.add_row(controller, *(short(shares[name]) if name in shares else UNKNOWN for name in names))
     return table
 
 

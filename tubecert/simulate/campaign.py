@@ -6,7 +6,7 @@ Interruption keeps what is finished; `interrupted` says that something is missin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from tubecert.simulate.monte_carlo import Case, Progress, Sample, attack, case, 
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
+from tubecert.simulate.uncertainty import usual
 
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
@@ -46,11 +47,9 @@ class Attack:
     worst_comparison: Comparison | None
 
     @property
-    def use(self) -> float:
-        """The largest d/dbar that was met."""
-        found = [
-            c.uses["distance"].share or 0.0 for c in (self.comparison, self.worst_comparison) if c and c.uses
-        ]
+    def greatest(self) -> float:
+        """The largest d(x*, x) that was met."""
+        found = [c.uses["distance"].value for c in (self.comparison, self.worst_comparison) if c and c.uses]
         return max(found, default=float("nan"))
 
 
@@ -122,12 +121,12 @@ def simulate(
     """
     if setting.h is None and replay is None:
         replay = 0
-    start, h, words = _uncertainty(setting, seed, replay)
+    words = SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed)
     drawn = []
     for loop in loops:
         if report is not None:
             report(f"{loop.controller}, {words}", 0, 1)
-        drawn.append(_drawn(setting, loop, start, h))
+        drawn.append(_drawn(setting, loop, *_uncertainty(setting, loop, seed, replay)))
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -155,13 +154,15 @@ def simulate(
     )
 
 
-def _uncertainty(setting: Setting, seed: int, replay: int | None) -> tuple[Array, Disturbance, str]:
-    """Start (n,) and h of the runs that are drawn: the specification's own, or those of a random run."""
+def _uncertainty(setting: Setting, loop: Loop, seed: int, replay: int | None) -> tuple[Array, Disturbance]:
+    """Start (n,) and h of the run that is drawn: the specification's own, or those of a random run."""
+    kind = setting.class_of(loop)
     if replay is not None:
-        found = case(setting, seed, replay)
-        return found.start, disturbance_of(setting, [found]), RANDOM.format(run=replay, seed=seed)
+        found = case(setting, kind, seed, replay)
+        return found.start, disturbance_of(setting, kind, [found])
     start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
-    return start, Disturbance.from_expressions(setting.h, setting.model, 1), SPECIFIED
+    own = Disturbance.from_expressions(setting.h, setting.model, 1)
+    return start, own if kind.sources is None else replace(own, beside=usual(kind, kind.sources))
 
 
 def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
@@ -180,7 +181,7 @@ def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Progres
     if sample is not None and not sample.interrupted:
         try:
             found = attack(setting, loop, seed, report)
-            one = disturbance_of(setting, [found])
+            one = disturbance_of(setting, setting.class_of(loop), [found])
             worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
             measured = compare(setting, worst, loop.promise)
         except KeyboardInterrupt:

@@ -17,11 +17,14 @@ import numpy as np
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
+from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
+from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import SectionData
+from tubecert.kinds.hardware import HardwareData
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
@@ -42,6 +45,16 @@ class Values(dict[str, float]):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Own:
+    """What certificate H proves, and its tube; `clip` is low and high, per input, None for a ball."""
+
+    recipe: HardwareRecipe
+    radius: float
+    half_widths: tuple[float, ...]
+    clip: tuple[tuple[float, float], ...] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """What one kind of certificate states: whether it is certified, by which recipe, and the radius in the long run.
 
@@ -53,6 +66,7 @@ class Section:
     recipe: Values
     ultimate: float | None
     ranges: tuple[InputRange, ...] = ()
+    own: Own | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +90,12 @@ class Certified:
     def __getitem__(self, name: str) -> float:
         """The safe side of a constant."""
         return self.constants[name]
+
+    @property
+    def machine(self) -> Own | None:
+        """What certificate H proves, if it does."""
+        found = self.proven(HARDWARE.key)
+        return None if found is None else found.own
 
     def proven(self, section: str) -> Section | None:
         """A section, if there is one and it is certified."""
@@ -181,4 +201,19 @@ def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Secti
         certified=certified and result.formulas == "corrected",
         recipe=Values({name: float(value) for name, value in numbers.items() if value is not None}),
         ultimate=None if found is None else found.ultimate_radius,
+        own=_own(result, found, recipe)
+        if isinstance(found, HardwareData) and isinstance(recipe, HardwareRecipe)
+        else None,
+    )
+
+
+def _own(result: Result, found: HardwareData, recipe: HardwareRecipe) -> Own | None:
+    """What certificate H states; None if it states nothing."""
+    if found.radius is None:
+        return None
+    return Own(
+        recipe=recipe,
+        radius=found.radius,
+        half_widths=tuple(found.half_widths[name] for name in result.spec.effective.system.states),
+        clip=tuple((float(low), float(high)) for low, high in found.clip) or None,
     )

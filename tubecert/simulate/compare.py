@@ -25,7 +25,7 @@ from tubecert.simulate.setting import Setting
 
 USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
-SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error")
+SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "estimate", "speed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +146,8 @@ def _violations(
         name = f"half-width of {setting.spec.states[i]}"
         found += _over_time(name, gap[:, :, i], np.full(len(runs.t), width), runs.t, room * width)
     for name, values, bound, size in beyond(runs, promise.ranges):
-        found += _over_time(name, values, np.full(len(runs.t), bound), runs.t, room * size)
+        excess = np.where(usable, values - bound - (slack - 1) * size, -np.inf)
+        found += _broken(name, excess, values, np.full(runs.lanes, bound), np.full(runs.lanes, np.nan))
     if promise.decay is not None:
         found += _over_time("D(t)", runs.distance, promise.decay(runs.t), runs.t, room * setting.reach)
     for item in runs.failures:

@@ -30,7 +30,8 @@ _NAMES: list[str] = []  # of all kernels
 _UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 COMPILING = "compiling the loops, once per installation"
 KERNELS = (
-    "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "stepping", "compiled",
+    "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "machine",
+    "stepping", "compiled",
 )  # fmt: skip
 
 

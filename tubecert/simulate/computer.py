@@ -5,13 +5,11 @@ the ball. Controller at a rate: u = u* + k + u_a is held; the filter is exact fo
 stepped by Euler, xhat+ = xhat + dt (f + B(u + sigma_hat) + A_m xtilde), and then sigma_hat+ = clip(sigma_hat + dt
 Gamma Proj(-B'xtilde)) uses the new xtilde, which is stable while dt sqrt(Gamma) |B| < 2 (`held` computes it exactly).
 In coordinates z = S x of the tube, B'P stands for B' and B_z^+ S = (B'PB)^-1 B'P for B^+, with P = S'S.
-
-It knows the state as it is measured, and the model there (`Moment.measured`, `Point.seen`).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +17,10 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled
 from tubecert.simulate.layout import blocks
 from tubecert.simulate.small import clip, copy, dot, factor, solve
+
+if TYPE_CHECKING:
+    from tubecert.simulate.fast import Fast
+    from tubecert.simulate.feedback import Moment, Point
 
 
 class Computer(NamedTuple):
@@ -47,47 +49,57 @@ class Registers(NamedTuple):
 
 
 @compiled
-def sample(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any, kept: Any) -> None:
+def sample(
+    fast: Fast, computer: Any, count: int, now: Moment, point: Point, y: Array, kept: Registers
+) -> None:
     """What happens at sample `count`; without a computer it is not even compiled."""
     if computer is not None:
         if computer.holds:
             _control(fast, computer, count, now, point, y, kept)
         else:
-            _adapt(fast, computer, point.seen.B, y, kept.gram)
+            _adapt(fast, computer, point.plant.B, y, kept.gram)
 
 
 @compiled
-def _adapt(fast: Any, computer: Any, B: Any, y: Any, gram: Any) -> None:
+def _adapt(fast: Fast, computer: Any, B: Array, y: Array, gram: Array) -> None:
     """(4.5): s_hat and sigma_hat from xtilde."""
-    own, m = blocks(y, fast.at), fast.at.m
-    sigma = own.sigma_hat
+    own = blocks(y, fast.at)
     for i in range(fast.at.n):
         own.s_hat[i] = -computer.weight * own.xtilde[i]  # s_hat = -g/(e^{g Ts} - 1) xtilde
+    explain(fast, B, own.s_hat, gram, own.sigma_hat)
+    for j in range(fast.at.m):
+        own.sigma_hat[j] *= computer.growth  # e^{g Ts} B^+ s_hat
+    clip(own.sigma_hat, fast.radius)
+
+
+@compiled
+def explain(fast: Fast, B: Array, s: Array, gram: Array, sigma: Array) -> None:
+    """sigma = (B'PB)^-1 B'P s: what of s (n,) the inputs can make."""
+    m = fast.at.m
     for j in range(m):
         sigma[j] = 0.0
         for i in range(fast.at.n):
-            sigma[j] += B[i, j] * dot(fast.P[i], own.s_hat)
+            sigma[j] += B[i, j] * dot(fast.P[i], s)
         for k in range(m):
             gram[j, k] = 0.0
             for i in range(fast.at.n):
                 gram[j, k] += B[i, j] * dot(fast.P[i], B[:, k])
     if factor(gram, gram):
-        solve(gram, sigma, sigma)  # (B'PB)^-1 B'P s_hat
+        solve(gram, sigma, sigma)
     else:
         sigma[:] = np.nan  # B has lost rank
-    for j in range(m):
-        sigma[j] *= computer.growth  # e^{g Ts} B^+ s_hat
-    clip(sigma, fast.radius)
 
 
 @compiled
-def _control(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any, kept: Any) -> None:
+def _control(
+    fast: Fast, computer: Any, count: int, now: Moment, point: Point, y: Array, kept: Registers
+) -> None:
     """One sample of the whole controller: the filter, the estimate, the input, and the prediction of the next state."""
-    terms, own, B = fast.terms, blocks(y, fast.at), point.seen.B
+    terms, own, B = fast.terms, blocks(y, fast.at), point.plant.B
     if count == 0:
-        copy(kept.xhat, now.measured)
+        copy(kept.xhat, now.x)
     for i in range(fast.at.n):
-        own.xtilde[i] = kept.xhat[i] - now.measured[i]
+        own.xtilde[i] = kept.xhat[i] - now.x[i]
     if terms.filters and count > 0:
         for j in range(fast.at.m):  # (0.8) for a sigma_hat that was held for dt
             own.u_a[j] = computer.decay * own.u_a[j] - (1.0 - computer.decay) * own.sigma_hat[j]
@@ -100,7 +112,7 @@ def _control(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any,
     for j in range(fast.at.m):
         kept.u[j] = now.plan.u[j] + point.k[j] + own.u_a[j]  # (0.4)
     for i in range(fast.at.n):
-        speed = point.seen.f[i] + dot(B[i], kept.u)
+        speed = point.plant.f[i] + dot(B[i], kept.u)
         if terms.adapts:
             speed += dot(B[i], own.sigma_hat)  # (0.6)
         if terms.samples:
@@ -109,7 +121,7 @@ def _control(fast: Any, computer: Any, count: int, now: Any, point: Any, y: Any,
 
 
 @compiled
-def _integrate(fast: Any, dt: float, B: Any, y: Any) -> None:
+def _integrate(fast: Fast, dt: float, B: Array, y: Array) -> None:
     """sigma_hat of (0.7) by one Euler step, then into the ball; Proj is the smooth one of 2.5 if there is a layer."""
     own = blocks(y, fast.at)
     sigma = own.sigma_hat

@@ -1,34 +1,36 @@
-"""The slow part of a loop at a point: f, B and h at the state, the geodesic and the feedback at the measured state.
+"""The slow part of a loop at a point: f, B, h and the wind at the state, the geodesic and the feedback.
 
 The feedback (0.5) is the smallest k with phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where
 phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*) + 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E and phi_1 = 2 B'M gamma_s(1).
 
-What acts is at the state x; what the controller computes is at the state that it measures. Today it measures x: `seen`
-and `measured` are the same memory, and nothing is computed twice.
+What acts is at the state x; a machine (`machine`) computes at what it measures, with the same functions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.expression import ZERO, Expression
+from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.simulate.compiled import compiled
 from tubecert.simulate.geodesic import FOUND, Curve, Metric, connect, metric
-from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.problem import Beside, Disturbance
 from tubecert.simulate.program import Program, assemble, execute
-from tubecert.simulate.small import clip, dot
+from tubecert.simulate.small import boxed, clip, dot
 
 INFEASIBLE = 10
 _ROUNDING = 1e-12
+_STEEP = 3.0  # how much more than a sine the wave of a wind is a square
+_THIN = 0.05  # of the layer: where a wind that aims turns round
 
 
 class Field(NamedTuple):
-    """f (n,), B (n, m) row by row and the base of h (m,) as one program of t and x; the metric and its rate in 1/s."""
+    """f (n,), B (n, m), the base of h (m,) and E (n, k), row by row, as one program of t and x; metric, rate in 1/s."""
 
     program: Program
     metric: Metric
@@ -36,9 +38,9 @@ class Field(NamedTuple):
 
 
 class Force(NamedTuple):
-    """The disturbance of every lane: waves and pushes (`problem.Disturbance`), the centre taken into the phases.
+    """The disturbance of every lane (`problem.Disturbance`), the centre taken into the phases.
 
-    `amplitude` (N, W, m), `wave` (N, W, n), `frequency` and `phase` (N, W), `push` and `radius` (N,).
+    `amplitude` (N, W, m), `wave` (N, W, n), `frequency` and `phase` (N, W), `push` and `radius` (N,), `box` (2, m).
     """
 
     amplitude: Array
@@ -47,6 +49,8 @@ class Force(NamedTuple):
     phase: Array
     push: Array
     radius: Array
+    box: Array
+    beside: Beside
     layer: float
 
 
@@ -59,12 +63,11 @@ class Reference(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Where a lane is evaluated: its number, t in s, the state and what is measured of it (n,), the plan."""
+    """Where a lane is evaluated: its number, t in s, the state (n,), the plan."""
 
     lane: int
     t: float
     x: Array
-    measured: Array
     plan: Reference
 
 
@@ -78,8 +81,9 @@ class Model(NamedTuple):
 class Point(NamedTuple):
     """Working memory and results of `evaluate`.
 
-    `plant`: f and B at the state; `seen`: at the measured state (the same memory as long as these are the same); h (m,)
-    at the state, k (m,), `push` = B'M gamma_s(1) (m,).
+    `plant`: f and B at the state; `seen`: where a machine looks; h (m,) at the state, k (m,), `push` = B'M gamma_s(1)
+    (m,); E (n, k), w (k,) and `wind` = E w (n,). `signal` (2, m): a h that moves along a line (`problem.Beside`), its
+    value and its slope since the time `since` (1,).
     """
 
     memory: Array
@@ -88,23 +92,33 @@ class Point(NamedTuple):
     h: Array
     k: Array
     push: Array
+    E: Array
+    w: Array
+    wind: Array
+    signal: Array
+    since: Array
     curve: Curve
 
 
-def field(model: ControlAffineModel, base: Sequence[Expression] | None, degree: int) -> tuple[Field, Point]:
+def field(
+    model: ControlAffineModel, base: Sequence[Expression] | None, E: Matrix, degree: int
+) -> tuple[Field, Point]:
     """The slow part of a model's loops, and working memory for it."""
     n, m = len(model.states), len(model.inputs)
     h = [ZERO] * m if base is None else list(base)
-    outputs = [*model.f, *(e for row in model.B for e in row), *h]
+    outputs = [*model.f, *(e for row in model.B for e in row), *h, *(e for row in E for e in row)]
     program, memory = assemble(outputs, (TIME, *model.states))
     space, curve = metric(model, degree)
-    return Field(program, space, float(model.rate)), point(memory, curve, n, m)
+    return Field(program, space, float(model.rate)), point(memory, curve, (n, m, len(E[0]) if E else 0))
 
 
-def point(memory: Array, curve: Curve, n: int, m: int) -> Point:
-    """Fresh results around the memory of a program and of a geodesic."""
-    plant = Model(np.zeros(n), np.zeros((n, m)))
-    return Point(memory, plant, plant, np.zeros(m), np.zeros(m), np.zeros(m), curve)
+def point(memory: Array, curve: Curve, sizes: tuple[int, int, int]) -> Point:
+    """Fresh results around the memory of a program and of a geodesic, for n states, m inputs and k winds."""
+    n, m, k = sizes
+    plant, seen = (Model(np.zeros(n), np.zeros((n, m))) for _ in range(2))
+    h, push, feedback = (np.zeros(m) for _ in range(3))
+    wind = np.zeros((n, k)), np.zeros(k), np.zeros(n)
+    return Point(memory, plant, seen, h, feedback, push, *wind, np.zeros((2, m)), np.zeros(1), curve)
 
 
 def force(d: Disturbance) -> Force:
@@ -116,6 +130,8 @@ def force(d: Disturbance) -> Force:
         phase=_dense(d.phase - d.wave @ d.centre),
         push=_dense(d.push),
         radius=_dense(d.radius),
+        box=_dense(d.box),
+        beside=Beside(*map(_dense, d.beside)),
         layer=float(d.layer),
     )
 
@@ -125,33 +141,38 @@ def _dense(part: Array) -> Array:
 
 
 @compiled
-def evaluate(field: Any, force: Any, exact: bool, now: Any, whole: bool, point: Any) -> tuple[int, float]:
-    """(status, d(x*, x)^2) at a moment; f, B, h and k go into `point`.
+def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point) -> tuple[int, float]:
+    """(status, d(x*, x)^2) at a moment; f, B, h, k and the wind go into `point`.
 
-    `exact`: what is measured is the state. Without `whole` the geodesic and k are left out, unless the lane is pushed
-    along it.
+    Without `whole` the geodesic and k are left out, unless something pushes the lane along it.
     """
-    _model(field.program, now.t, now.x, point.memory, point.plant)
-    m = point.h.shape[0]
-    first = field.program.outputs.shape[0] - m
+    model(field.program, now.t, now.x, point.memory, point.plant)
+    n, m = point.plant.B.shape
+    place = n + point.plant.B.size
     for j in range(m):
-        point.h[j] = point.memory[field.program.outputs[first + j]]
+        point.h[j] = point.memory[field.program.outputs[place + j]]
+    for i in range(n):
+        for l in range(point.w.shape[0]):
+            point.E[i, l] = point.memory[field.program.outputs[place + m + i * point.w.shape[0] + l]]
     status, energy = FOUND, 0.0
-    if whole or force.push[now.lane] != 0.0:
-        if not exact:
-            _model(field.program, now.t, now.measured, point.memory, point.seen)
-        status, energy = connect(field.metric, point.curve, point.curve.bend, now.plan.x, now.measured)
-        if status != FOUND:
-            return status, energy
-        status = _feedback(field.rate * energy, now.plan, point)
-        if not exact and status == FOUND:
-            status, energy = connect(field.metric, point.curve, point.curve.bend, now.plan.x, now.x)
+    if whole or force.push[now.lane] != 0.0 or force.beside.aim[now.lane] > 0.0:
+        status, energy = steer(field, now.plan, now.x, point.plant, point)
     _disturb(force, now, point)
+    _blow(force, now, point)
     return status, energy
 
 
 @compiled
-def _model(program: Any, t: float, x: Any, memory: Any, found: Any) -> None:
+def steer(field: Field, plan: Reference, x: Array, model: Model, point: Point) -> tuple[int, float]:
+    """(status, d(x*, x)^2), and k of (0.5) at x, where the model is known."""
+    status, energy = connect(field.metric, point.curve, point.curve.bend, plan.x, x)
+    if status == FOUND:
+        status = _feedback(field.rate * energy, plan, model, point)
+    return status, energy
+
+
+@compiled
+def model(program: Program, t: float, x: Array, memory: Array, found: Model) -> None:
     """f and B at (t, x); the memory keeps the other outputs."""
     n, m = found.B.shape
     memory[0] = t
@@ -165,9 +186,9 @@ def _model(program: Any, t: float, x: Any, memory: Any, found: Any) -> None:
 
 
 @compiled
-def _feedback(decay: float, plan: Any, point: Any) -> int:
-    """k of (0.5) at the measured state; `decay` is lambda E."""
-    f, B, push, k = point.seen.f, point.seen.B, point.push, point.k
+def _feedback(decay: float, plan: Reference, model: Model, point: Point) -> int:
+    """k of (0.5) at the end of the geodesic; `decay` is lambda E."""
+    f, B, push, k = model.f, model.B, point.push, point.k
     n, m = B.shape
     start, end = point.curve.vectors[0], point.curve.vectors[1]  # M gamma_s at plan and state
     phi_0 = 2 * decay - 2 * dot(start, plan.speed)  # 2 lambda E - 2 gamma_s(0)'M(f(x*) + B(x*)u*) ...
@@ -189,8 +210,8 @@ def _feedback(decay: float, plan: Any, point: Any) -> int:
 
 
 @compiled
-def _disturb(force: Any, now: Any, point: Any) -> None:
-    """Adds the lane's waves and push to its base h, and keeps that in its ball (`problem.Disturbance`)."""
+def _disturb(force: Force, now: Moment, point: Point) -> None:
+    """Adds the lane's waves, push and signal to its base h, and keeps that in its set (`problem.Disturbance`)."""
     h, lane = point.h, now.lane
     for w in range(force.phase.shape[1]):
         angle = force.frequency[lane, w] * now.t + dot(now.x, force.wave[lane, w]) + force.phase[lane, w]
@@ -201,4 +222,27 @@ def _disturb(force: Any, now: Any, point: Any) -> None:
         share = force.push[lane] / np.sqrt(dot(point.push, point.push) + force.layer * force.layer)
         for j in range(h.shape[0]):
             h[j] += share * point.push[j]
+    if force.beside.ramp[lane] > 0.0:
+        for j in range(h.shape[0]):
+            h[j] += point.signal[0, j] + (now.t - point.since[0]) * point.signal[1, j]
+    boxed(h, force.box)
     clip(h, force.radius[lane])
+
+
+@compiled
+def _blow(force: Force, now: Moment, point: Point) -> None:
+    """E w: a wave in time, of full size but for its changes of sign, in a direction that aims (`problem.Beside`)."""
+    own, lane, w, wind, B = force.beside, now.lane, point.w, point.wind, point.plant.B
+    wind[:] = 0.0
+    if own.wind[lane] == 0.0:
+        return
+    aim, wave = own.aim[lane], np.sin(own.gusting[lane, 0] * now.t + own.gusting[lane, 1])
+    square = (_THIN * force.layer) ** 2 if aim > 0.0 else 0.0
+    for l in range(w.shape[0]):
+        w[l] = own.blowing[lane, l] if aim == 0.0 else 0.0
+        for i in range(wind.shape[0] if aim > 0.0 else 0):
+            w[l] += point.E[i, l] * (point.curve.vectors[1, i] if aim == 1.0 else dot(B[i], point.push))
+        square += w[l] * w[l]
+    share = own.wind[lane] * min(1.0, max(-1.0, _STEEP * wave)) / np.sqrt(square) if square > 0.0 else 0.0
+    for i in range(wind.shape[0]):
+        wind[i] = share * dot(point.E[i], w)

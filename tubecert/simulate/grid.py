@@ -12,7 +12,8 @@ from tubecert.simulate.computer import Computer
 from tubecert.simulate.fast import Fast, exact_flows
 from tubecert.simulate.feedback import Reference
 from tubecert.simulate.layout import layout
-from tubecert.simulate.problem import LoopProblem
+from tubecert.simulate.machine import EVENTS, Machine
+from tubecert.simulate.problem import LoopProblem, unbounded
 from tubecert.simulate.program import Index
 from tubecert.simulate.stepping import Grid
 from tubecert.spec import Knots
@@ -23,25 +24,38 @@ MOST_STEPS = 4_000_000
 
 
 def corners(problem: LoopProblem) -> tuple[Array, Index]:
-    """Times (C,) that must be ends of steps, and the numbers of the computer's samples at them, or -1."""
+    """Times (C,) that must be ends of steps, and what happens at them: numbers of `EVENTS` (4, C), or -1."""
     end = problem.horizon
-    period = sample_period(problem)
-    ticks = np.array([0.0])
-    if period is not None:
-        if end / period > MOST_STEPS:
-            raise ValueError(
-                f"a sample time of {period:g} s needs more than {MOST_STEPS} samples in {end:g} s"
-            )
-        ticks = np.arange(math.floor(end / period * (1 + 1e-12)) + 1) * period
+    kinds = instants(problem)
     kinks = _kinks(problem.plan.knots)
-    every = np.concatenate([[0.0, end], problem.times, kinks[kinks < end], ticks[ticks <= end]])
+    every = np.concatenate([[0.0, end], problem.times, kinks[kinks < end], *kinds])
     every = np.unique(np.minimum(every, end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
-    samples = np.full(len(t), -1)
-    if period is not None:
-        samples[nearest(t, ticks)] = np.arange(len(ticks))
-    return t, samples
+    events = np.full((len(EVENTS), len(t)), -1)
+    for row, times in zip(events, kinds, strict=True):
+        row[nearest(t, times)] = np.arange(len(times))
+    return t, events
+
+
+def instants(problem: LoopProblem) -> list[Array]:
+    """Of each of `EVENTS` the times in [0, horizon]."""
+    period, machine = sample_period(problem), problem.machine
+    if machine is not None and problem.terms.measures:
+        rates = [(*machine.adaptation,), (*machine.feedback,)]
+        return [_ticks(problem, Ts, after) for Ts, delay in rates for after in (0.0, delay)]
+    return [_ticks(problem, period, 0.0), *[np.zeros(0)] * 3]
+
+
+def _ticks(problem: LoopProblem, period: float | None, delay: float) -> Array:
+    """Times a delay after the samples of a period."""
+    if period is None:
+        return np.zeros(0)
+    end = problem.horizon
+    if end / period > MOST_STEPS:
+        raise ValueError(f"a sample time of {period:g} s needs more than {MOST_STEPS} samples in {end:g} s")
+    ticks = np.arange(math.floor(end / period * (1 + 1e-12)) + 1) * period + delay
+    return np.asarray(ticks[ticks <= end * (1 + 1e-12)])
 
 
 def _kinks(knots: Knots | None) -> Array:
@@ -77,7 +91,7 @@ def sample_period(problem: LoopProblem) -> float | None:
 
 def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     """The steps of a level, each level with twice as many as the one before, and their distinct lengths (Q,)."""
-    t, samples = corners(problem)
+    t, events = corners(problem)
     spans = np.diff(t)
     counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
     if counts.sum() > MOST_STEPS:
@@ -88,14 +102,14 @@ def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
     distinct, which = np.unique(length, return_inverse=True)
     exact_length = np.repeat(spans / counts, counts)
-    sample, output = np.full((2, len(start) + 1), -1)
-    sample[first] = samples
+    output, event = np.full(len(start) + 1, -1), np.full((len(EVENTS), len(start) + 1), -1)
+    event[:, first] = events
     output[first[nearest(t, problem.times)]] = np.arange(len(problem.times))
     grid = Grid(
         start=np.append(start, problem.horizon),
         length=np.append(exact_length, 0.0),
         which=np.append(which, 0),
-        sample=sample,
+        event=event,
         output=output,
         plan=course(problem, start, exact_length),
     )
@@ -144,6 +158,22 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
         return found
     B = np.array([[float(e.fraction) for e in row] for row in model.B])
     return exact_flows(found, B, lengths)
+
+
+def machine(problem: LoopProblem) -> Machine | None:
+    """The machine of the loop, if there is one."""
+    own, m = problem.machine, len(problem.model.inputs)
+    if own is None or not problem.terms.measures:
+        return None
+    return Machine(
+        Ts=own.sample_time,
+        th=-math.expm1(-own.bandwidth * own.sample_time),
+        waiting=1 + math.ceil(own.feedback[1] / own.feedback[0]),
+        predicts=own.predict,
+        plays=not own.held,
+        box=unbounded(m) if own.box is None else own.box,
+        radius=own.radius,
+    )
 
 
 def computer(problem: LoopProblem) -> Computer | None:

@@ -1,7 +1,4 @@
-"""Inputs with limits in runs: how far each went, and whether it left the range that a certificate proves.
-
-Implements: (4.13), at the output times.
-"""
+"""Inputs in runs: how far each went, and whether it left the range that a certificate proves. Implements: (4.13)."""
 
 from __future__ import annotations
 
@@ -13,6 +10,7 @@ from numpy.typing import NDArray
 
 from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
+from tubecert.kinds.hardware import HardwareData
 from tubecert.simulate.runs import Runs
 from tubecert.spec import Spec
 
@@ -28,8 +26,14 @@ class InputRange:
 
 
 def proven_ranges(result: Result, key: str) -> tuple[InputRange, ...]:
-    """What a certificate proves of every input with limits, in the loop of a kind."""
+    """What a certificate proves of every input with limits, in the loop of a kind; H of every input."""
     columns = {name: column for column, name in enumerate(result.spec.effective.system.inputs)}
+    found = result.sections.get(key)
+    if isinstance(found, HardwareData):
+        return tuple(
+            InputRange(name=name, column=columns[name], least=least, greatest=greatest)
+            for name, (least, greatest) in found.inputs.items()
+        )
     return tuple(
         InputRange(
             name=own.input,
@@ -44,7 +48,7 @@ def proven_ranges(result: Result, key: str) -> tuple[InputRange, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputUse:
-    """How far an input with limits went in some runs, and the range that is proven, if one is."""
+    """How far an input went in some runs, and the range that is proven, if one is."""
 
     input: str
     least: float
@@ -60,13 +64,13 @@ class InputUse:
 def used(
     spec: Spec, runs: Runs, usable: NDArray[np.bool_], proven: Sequence[InputRange]
 ) -> tuple[InputUse, ...]:
-    """The range of every input that has limits, over the runs that are results."""
-    if not spec.limits or not usable.any():
-        return ()
+    """The range of every input that has limits or a proven range, over all steps of the runs that are results."""
     ranges = {own.name: (own.least, own.greatest) for own in proven}
-    u = runs.u[usable]
-    least, greatest = u.min(axis=(0, 1)), u.max(axis=(0, 1))
-    columns = {name: spec.inputs.index(name) for name, _ in spec.limits}
+    names = dict.fromkeys((*(name for name, _ in spec.limits or ()), *ranges))
+    if not names or not usable.any():
+        return ()
+    least, greatest = runs.least[usable].min(axis=0), runs.greatest[usable].max(axis=0)
+    columns = {name: spec.inputs.index(name) for name in names}
     return tuple(
         InputUse(input=name, least=float(least[i]), greatest=float(greatest[i]), proven=ranges.get(name))
         for name, i in columns.items()
@@ -74,8 +78,8 @@ def used(
 
 
 def beyond(runs: Runs, proven: Sequence[InputRange]) -> Iterator[tuple[str, Array, float, float]]:
-    """For both ends of every proven range: what it is called, values (N, K), their bound from above, its size."""
+    """For both ends of every proven range: what it is called, values (N,), their bound from above, its size."""
     for own in proven:
-        u, size = runs.u[:, :, own.column], own.greatest - own.least
-        yield f"input {own.name}", u, own.greatest, size
-        yield f"input -{own.name}", -u, -own.least, size
+        size = own.greatest - own.least
+        yield f"input {own.name}", runs.greatest[:, own.column], own.greatest, size
+        yield f"input -{own.name}", -runs.least[:, own.column], -own.least, size

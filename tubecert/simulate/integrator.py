@@ -68,9 +68,9 @@ class Ladder:
         from tubecert.simulate.feedback import field
 
         self.problem = problem
-        self.field, self.point = field(problem.model, base, problem.degree)
-        self.computer = grid.computer(problem)
-        self.holds = self.computer is not None and self.computer.holds
+        self.field, self.point = field(problem.model, base, problem.E, problem.degree)
+        self.computer, self.machine = grid.computer(problem), grid.machine(problem)
+        self.holds = self.machine is not None or (self.computer is not None and self.computer.holds)
         self._levels: dict[int, Lane] = {}
 
     def level(self, number: int, disturbance: Disturbance) -> Lane:
@@ -87,9 +87,10 @@ class Ladder:
                 force=acting,
                 fast=grid.fast_part(self.problem, lengths, number),
                 computer=self.computer,
+                machine=self.machine,
                 holds=self.holds,
+                plays=not self.holds or (self.machine is not None and self.machine.plays),
                 flows=self.problem.adaptive and not self.holds,
-                exact=True,
                 limit=self.problem.limit,
                 grid=steps,
             )
@@ -196,6 +197,8 @@ class _Lanes:
             xtilde=found.xtilde,
             distance=found.distance,
             worst=Worst(**peaks),
+            least=found.least,
+            greatest=found.greatest,
             error=self.error,
             unresolved=self.unresolved,
             failures=tuple(self._failure(int(lane)) for lane in np.flatnonzero(found.status)),
@@ -228,9 +231,10 @@ def run(own: Lane, point: Point, starts: Array, outputs: int) -> Output:
     N, at = len(starts), own.fast.at
     out, stop = stepping.output(N, outputs, at), np.zeros(1)
     chunk = max(1, min(_CHUNK, -(-N // _cores())))
+    waiting = 1 if own.machine is None else own.machine.waiting
 
     def work(first: int, last: int) -> None:
-        stepping.run(first, last, own, starts, stepping.work(at, point, stop), out)
+        stepping.run(first, last, own, starts, stepping.work(at, point, stop, waiting), out)
 
     work(0, 0)  # compiles, in a thread that Ctrl-C ends
     pool = ThreadPoolExecutor(_cores())

@@ -9,6 +9,7 @@ The plant is the same for all of them, x' = f + B(u + h) with u = u* + k + u_a, 
 | `predicts` | xtilde' = A_m xtilde - B h + what follows | (0.6) less (0.1) |
 | `adapts` | ... + B sigma_hat, and sigma_hat' = Gamma Proj(sigma_hat, -B'xtilde) | (0.6), (0.7) |
 | `samples` | ... + s_hat, which is held between samples as sigma_hat is | (4.5) |
+| `measures` | none: a machine holds k and u_a = -sigma_hat between its instants | (H.3)-(H.5) |
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-Controller = Literal["nominal", "ccm", "reference", "l1", "sampled"]
+Controller = Literal["nominal", "ccm", "reference", "l1", "sampled", "hardware"]
 
 
 class Terms(NamedTuple):
@@ -27,6 +28,12 @@ class Terms(NamedTuple):
     predicts: bool = False
     adapts: bool = False
     samples: bool = False
+    measures: bool = False
+
+    @property
+    def estimates(self) -> bool:
+        """Whether the loop estimates h."""
+        return self.predicts or self.measures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,5 +51,6 @@ DESIGNS: Final[dict[Controller, Design]] = {
     "reference": Design(terms=Terms(filters=True, knows=True)),
     "l1": Design(terms=Terms(filters=True, predicts=True, adapts=True), needs=("adaptation_rate",)),
     "sampled": Design(terms=Terms(filters=True, predicts=True, samples=True), needs=("sample_time",)),
+    "hardware": Design(terms=Terms(measures=True)),
 }
 CONTROLLERS: Final[tuple[Controller, ...]] = tuple(DESIGNS)

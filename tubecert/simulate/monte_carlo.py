@@ -17,7 +17,7 @@ from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopProblem
 from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
-from tubecert.simulate.uncertainty import Member, adversary, assembled, genes_of, random_member
+from tubecert.simulate.uncertainty import Class, Member, adversary, assembled, genes_of, random_member
 
 Progress = Callable[[str, int, int], None]  # what is done, how many runs of how many
 
@@ -50,11 +50,11 @@ class Sample:
         return len(self.cases) < self.asked
 
 
-def case(setting: Setting, seed: int, number: int) -> Case:
+def case(setting: Setting, kind: Class, seed: int, number: int) -> Case:
     """What run `number` of a seed does: half of the runs are random members, half are random adversaries."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(number,)))
     start = _random_start(setting, rng)
-    kind, S = setting.uncertainty, setting.S
+    S = setting.S
     centre, begin = S @ setting.centre, S @ start  # the class is one of functions of z
     if rng.random() < 0.5:
         member = random_member(kind, begin, centre, rng)
@@ -76,10 +76,10 @@ def _random_start(setting: Setting, rng: np.random.Generator) -> Array:
     return setting.started(direction, radius)
 
 
-def disturbance_of(setting: Setting, cases: Sequence[Case]) -> Disturbance:
+def disturbance_of(setting: Setting, kind: Class, cases: Sequence[Case]) -> Disturbance:
     """One lane for each case."""
     members = [item.member for item in cases]
-    found = assembled(members, setting.uncertainty, setting.centre, setting.layer)
+    found = assembled(members, kind, setting.centre, setting.layer)
     return replace(found, wave=found.wave @ setting.S)
 
 
@@ -87,37 +87,37 @@ def monte_carlo(
     setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None = None
 ) -> Sample | None:
     """`count` runs; fewer, or None, if the user interrupts."""
-    problem = with_times(loop.problem, TIMES)
+    problem, kind = with_times(loop.problem, TIMES), setting.class_of(loop)
     parts: list[Runs] = []
     cases: list[Case] = []
     name = f"{loop.controller}, random runs"
     try:
-        for batch in _batches(setting, count, seed):
+        for batch in _batches(setting, kind, count, seed):
             if report is not None:
                 report(name, len(cases), count)
-            parts.append(_slim(_run(setting, problem, batch), inputs=bool(setting.spec.limits)))
+            parts.append(_slim(_run(setting, kind, problem, batch)))
             cases += batch
     except KeyboardInterrupt:
         del cases[sum(part.lanes for part in parts) :]
     return Sample(runs=joined(parts), cases=tuple(cases), asked=count) if parts else None
 
 
-def _batches(setting: Setting, count: int, seed: int) -> Iterator[list[Case]]:
+def _batches(setting: Setting, kind: Class, count: int, seed: int) -> Iterator[list[Case]]:
     for first in range(0, count, BATCH):
-        yield [case(setting, seed, number) for number in range(first, min(first + BATCH, count))]
+        yield [case(setting, kind, seed, number) for number in range(first, min(first + BATCH, count))]
 
 
-def _run(setting: Setting, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
+def _run(setting: Setting, kind: Class, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
     starts = np.array([item.start for item in cases])
-    return integrate(problem, starts, disturbance_of(setting, cases), tolerance=setting.tolerance)
+    return integrate(problem, starts, disturbance_of(setting, kind, cases), tolerance=setting.tolerance)
 
 
-def _slim(runs: Runs, *, inputs: bool) -> Runs:
-    """Runs without what only drawings need: many of them fit into memory. With `inputs` u can be told."""
+def _slim(runs: Runs) -> Runs:
+    """Runs without what only drawings need: many of them fit into memory."""
     return replace(
         runs,
-        k=runs.k if inputs else runs.k[:, :0],
-        u_a=runs.u_a if inputs else runs.u_a[:, :0],
+        k=runs.k[:, :0],
+        u_a=runs.u_a[:, :0],
         sigma_hat=runs.sigma_hat[:, :0],
         h=runs.h[:, :0],
         xtilde=runs.xtilde[:, :0],
@@ -132,22 +132,22 @@ def with_times(problem: LoopProblem, count: int) -> LoopProblem:
 def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = None) -> Case:
     """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
-    problem = with_times(loop.problem, 2)
+    problem, kind = with_times(loop.problem, 2), setting.class_of(loop)
     n = len(setting.x0) if setting.varied else 0
-    size = genes_of(setting.uncertainty) + n
+    size = genes_of(kind) + n
     genes, worst = rng.random((_POPULATION, size)), np.full(_POPULATION, -np.inf)
     kept = np.zeros((0, size))
     scores = np.zeros(0)
     for turn in range(_ROUNDS):
         if report is not None:
             report(f"{loop.controller}, adversary", turn * _POPULATION, _ROUNDS * _POPULATION)
-        runs = _run(setting, problem, [_bred(setting, row) for row in genes])
+        runs = _run(setting, kind, problem, [_bred(setting, kind, row) for row in genes])
         worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])
         order = np.argsort(-values, kind="stable")[:_ELITE]
         kept, scores = pool[order], values[order]
         genes = _children(kept, 0.5 ** (turn + 1), rng)
-    return _bred(setting, kept[0])
+    return _bred(setting, kind, kept[0])
 
 
 def _children(parents: Array, spread: float, rng: np.random.Generator) -> Array:
@@ -160,8 +160,7 @@ def _children(parents: Array, spread: float, rng: np.random.Generator) -> Array:
     return np.asarray(folded)
 
 
-def _bred(setting: Setting, genes: Array) -> Case:
-    kind = setting.uncertainty
+def _bred(setting: Setting, kind: Class, genes: Array) -> Case:
     own = genes_of(kind)
     start = setting.started(2 * genes[own:] - 1) if setting.varied else setting.x0
     member = adversary(kind, genes[:own], setting.S @ start, setting.S @ setting.centre, setting.layer)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression, free_symbols
+from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.simulate.loops import CONTROLLERS, DESIGNS, Controller, Terms
 from tubecert.trajectory import Plan
@@ -56,13 +58,51 @@ class LoopGains:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MachineRun:
+    """The machine of theorem H: times in s, `bandwidth` of the filter in rad/s (inf: without memory).
+
+    The estimate is clipped to the box (2, m), or where there is none to the ball of `radius`. `feedback_time` is None
+    where the feedback has no rate of its own; its delay is the same; `held`: u* is played from sample to sample;
+    `predict`: the feedback is that of the predicted state (H-P). ValueError for a delay of more than a sample.
+    """
+
+    sample_time: float
+    delay: float
+    bandwidth: float
+    box: Array | None = None
+    radius: float = math.inf
+    feedback_time: float | None = None
+    held: bool = False
+    predict: bool = False
+
+    def __post_init__(self) -> None:
+        for period, delay in (self.adaptation, self.feedback):
+            short = delay <= period * (1 + 1e-12) or (period == self.feedback_time and not self.predict)
+            if not (np.isfinite(period) and period > 0 and delay >= 0 and short):
+                raise ValueError(f"a delay of {delay} s does not fit a sample time of {period} s")
+        if not self.bandwidth > 0:
+            raise ValueError(f"bandwidth must be a positive number, not {self.bandwidth}")
+
+    @property
+    def adaptation(self) -> tuple[float, float]:
+        """Sample time and delay of the estimate."""
+        return self.sample_time, self.delay
+
+    @property
+    def feedback(self) -> tuple[float, float]:
+        """Sample time and delay of the feedback."""
+        return self.feedback_time or self.sample_time, self.delay
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoopProblem:
     """One closed loop over [0, horizon] in s.
 
     `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference
     system (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in
-    Hz the whole controller is a computer that holds u and its adaptation between its samples. `times` (K,), increasing
-    in [0, horizon], are the output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A
+    Hz the whole controller is a computer that holds u and its adaptation between its samples; `hardware` is the loop of
+    theorem H on a `machine`. `E` (n, k) is that of the wind E w. `times` (K,), increasing in [0, horizon], are the
+    output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A
     lane is stopped where |x - x*| exceeds `limit`. `P` (n, n) is S'S of the coordinates z = S x in which the adaptation
     is designed, None for those of x; |xtilde| and |x - x*| are lengths in z.
     """
@@ -77,6 +117,8 @@ class LoopProblem:
     degree: int = 5
     limit: float = math.inf
     P: Array | None = None
+    machine: MachineRun | None = None
+    E: Matrix = ()
 
     def __post_init__(self) -> None:
         if self.controller not in CONTROLLERS:
@@ -95,6 +137,10 @@ class LoopProblem:
             raise ValueError(f"limit must be a positive distance, not {self.limit}")
         if self.degree < 2:
             raise ValueError("degree must be at least 2")
+        if self.terms.measures and (self.machine is None or self.control_rate is not None):
+            raise ValueError(
+                f"the controller {self.controller} needs a machine, and no control rate beside it"
+            )
         if self.adaptive and self.gains is None:
             raise ValueError(f"the controller {self.controller} needs gains")
         for needed in DESIGNS[self.controller].needs:
@@ -114,17 +160,49 @@ class LoopProblem:
         return self.terms.filters
 
 
+class Beside(NamedTuple):
+    """What acts beside the waves of h: a signal, the wind w of E w, and the noise of what a machine measures.
+
+    Every array has the lanes first. The signal, a part of h, starts at `begin` (N, m) and moves at the rate `ramp` (N,)
+    along `along` (N, m), or where that is 0 along c = B'M gamma_s; it turns at the samples of a machine. The wind is
+    |w| <= `wind` (N,); its `aim` (N,) is 0 along `blowing` (N, k), 1 outward along E'M gamma_s, 2 along the inputs,
+    E'B c. Both go forwards and backwards as square waves of frequency and phase say: `turning`, `gusting` (N, 2). Noise
+    is an entry of `table` (N, Q, n), by `choice` (N,): 0 at random; 1 the first one, its sign changing every `period`
+    (N,) measurements; 2 the one that costs the feedback most. It changes by `most` (N,) per second at most.
+    """
+
+    ramp: Array
+    begin: Array
+    along: Array
+    turning: Array
+    wind: Array
+    aim: Array
+    blowing: Array
+    gusting: Array
+    choice: Array
+    period: Array
+    table: Array
+    most: Array
+
+
+def nothing_beside(N: int, n: int, m: int, k: int = 0) -> Beside:
+    """No signal, no wind and no noise, for N lanes of n states, m inputs and k winds."""
+    shapes = (), (m,), (m,), (2,), (), (), (k,), (2,), (), (), (1, n), ()
+    found = Beside(*(np.zeros((N, *shape)) for shape in shapes))
+    return found._replace(period=found.period + 1, most=found.most + np.inf)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Disturbance:
     """h(t, x) of N lanes, evaluated inside the compiled loop; every array has the lanes first.
 
-    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c), where clip is
-    the projection to the ball of `radius` (inf: none), and c = B'M gamma_s / sqrt(|B'M gamma_s|^2 + layer^2) at x, the
-    direction that pushes away from the plan. At fixed x the rate of a wave is at most |amplitude| frequency, its slope
-    |amplitude| |wave|.
+    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c + signal),
+    where clip is the projection to the `box` and then to the ball of `radius` (inf: none), and c = B'M gamma_s /
+    sqrt(|B'M gamma_s|^2 + layer^2) at x, the direction that pushes away from the plan. At fixed x the rate of a wave is
+    at most |amplitude| frequency, its slope |amplitude| |wave|.
 
     Shapes: base (m,) expressions of t and the states, or None for 0; amplitude (N, W, m), frequency (N, W) in rad/s,
-    wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,).
+    wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,), box (2, m).
     """
 
     base: tuple[Expression, ...] | None
@@ -135,6 +213,8 @@ class Disturbance:
     push: Array
     radius: Array
     centre: Array
+    beside: Beside
+    box: Array
     layer: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -157,33 +237,28 @@ class Disturbance:
     @property
     def is_zero(self) -> bool:
         """Whether h vanishes for every lane."""
-        return self.base is None and not np.any(self.amplitude) and not np.any(self.push)
+        parts = (self.amplitude, self.push, self.beside.ramp, self.beside.wind, self.beside.table)
+        return self.base is None and not any(np.any(part) for part in parts)
 
     def of(self, lanes: NDArray[np.intp]) -> Disturbance:
         """The disturbance of some lanes, given by their numbers."""
-        return Disturbance(
-            base=self.base,
-            amplitude=self.amplitude[lanes],
-            frequency=self.frequency[lanes],
-            wave=self.wave[lanes],
-            phase=self.phase[lanes],
-            push=self.push[lanes],
-            radius=self.radius[lanes],
-            centre=self.centre,
-            layer=self.layer,
-        )
+        own = ("amplitude", "frequency", "wave", "phase", "push", "radius")
+        beside = Beside(*(part[lanes] for part in self.beside))
+        return replace(self, beside=beside, **{name: getattr(self, name)[lanes] for name in own})
 
     @classmethod
     def from_expressions(
-        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int
+        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int, k: int = 0
     ) -> Disturbance:
-        """The same h, given by expressions of t and the states, on every lane."""
+        """The same h, given by expressions of t and the states, on every lane; none of k winds, no noise."""
         if base is not None:
             unknown = free_symbols(base) - {TIME, *model.states}
             if unknown:
                 raise ValueError(f"h depends on {', '.join(sorted(unknown))}")
         n, m = len(model.states), len(model.inputs)
         return cls(
+            beside=nothing_beside(lanes, n, m, k),
+            box=unbounded(m),
             base=base,
             amplitude=np.zeros((lanes, 0, m)),
             frequency=np.zeros((lanes, 0)),
@@ -193,3 +268,8 @@ class Disturbance:
             radius=np.full(lanes, np.inf),
             centre=np.zeros(n),
         )
+
+
+def unbounded(m: int) -> Array:
+    """The box (2, m) without faces."""
+    return np.array([[-np.inf] * m, [np.inf] * m])

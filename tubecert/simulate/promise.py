@@ -13,10 +13,11 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.kinds import ALONE, DISTANCE, RATES, SAMPLED, Name
-from tubecert.simulate.certified import Certified, Values
+from tubecert.kinds import ALONE, DISTANCE, HARDWARE, RATES, SAMPLED, Name
+from tubecert.simulate.certified import Certified, Own, Section, Values
 from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.loops import Controller
+from tubecert.simulate.uncertainty import class_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +95,8 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
     section = certified.proven(kind.name.key)
     if section is None:
         return None
+    if section.own is not None:
+        return _promise_of_machine(certified, kind, section, section.own)
     recipe = section.recipe
     k = certified["feedback_gain"] * certified.reach  # (2.3) |k| <= du dbar
     bounds = {
@@ -121,6 +124,35 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
     )
 
 
+def _promise_of_machine(certified: Certified, kind: Kind, section: Section, own: Own) -> Promise:
+    """Theorem H: d <= dhat, |kappa| <= kb, |h - q^| <= X, |x'| <= Y, and |q - h| of (H.6), (H.7) at the samples."""
+    r, h, feedback = own.recipe, class_of(certified), certified["feedback_gain"]
+    noise = float(r.noise) * certified["noise_metric"]  # n_M, and n_P of (H.17)
+    noise = max(noise, math.sqrt(certified.upper or 0.0) * float(r.prediction or 0))
+    moved = h.rate_at(float(r.speed)) * float(r.sample_time + r.delay)
+    settled = max(float(r.bias), h.h_initial) + float(r.ripple)
+    wait = float(max(r.sample_time, r.feedback_time) + r.delay)
+    late = min(certified.constants.get("input_rate", 0.0) * wait, 2 * certified["u_star"])  # ups
+    bounds = {
+        "distance": float(r.level),
+        "deviation": own.radius,
+        "k": feedback * (float(r.level) + noise) + late,
+        "sigma_error": min(h.h + float(r.clip_radius), max(min(h.h, h.h_initial + moved), settled + moved)),
+        "estimate": settled,
+        "speed": float(r.speed),
+    }
+    return Promise(
+        title=str(kind.name),
+        rho=certified.rho,
+        reach=certified.reach,
+        half_widths=own.half_widths,
+        bounds=bounds,
+        ultimate=section.ultimate,
+        decay=None,
+        ranges=section.ranges,
+    )
+
+
 def _nothing(certified: Certified, recipe: Values) -> None:
     """The kind proves no such bound."""
 
@@ -134,8 +166,8 @@ def _error_of_speed(certified: Certified, recipe: Values) -> float | None:
     """Dxt/sqrt(Gamma), (2.11), with s1 = Dht + Dhx Y and q = 2 g; None for an A_m that is not -g I."""
     if "predictor_gain" not in recipe:
         return None
-    s1 = certified["h_t"] + certified["h_x"] * recipe["speed"]
-    reach = certified["h"] + recipe["projection_radius"]
+    h = class_of(certified)
+    s1, reach = h.rate_at(recipe["speed"]), h.h + recipe["projection_radius"]
     square = 2 * reach * s1 / (2 * recipe["predictor_gain"]) + reach**2
     return math.sqrt(square / recipe["adaptation_rate"])
 
@@ -161,11 +193,12 @@ def _decay_of_distance(certified: Certified, recipe: Values) -> Decay:
 def _decay_of_sampled(certified: Certified, recipe: Values) -> Decay:
     """Theorem C: (2.15) from the first sample on, with H1 and S_T of (4.8) in place of H0 and S."""
     Ts, g, omega, Y = (recipe[name] for name in ("sample_time", "predictor_gain", "bandwidth", "speed"))
-    s1 = certified["h_t"] + certified["h_x"] * Y
+    h = class_of(certified)
+    s1 = h.rate_at(Y)
     turned = min(certified["B_pinv"] * certified["B_x"], certified["B_pinv_x"] * certified["B"])  # b/Dh
     age = 1 / g - Ts / math.expm1(g * Ts) if g * Ts > 1e-6 else Ts / 2  # m of (4.6)
-    rest = s1 * Ts / -math.expm1(-omega * Ts) + age * (s1 + turned * certified["h"] * Y)  # S_T
-    first = min(certified["h"], certified["h_initial"] + s1 * Ts)  # H1
+    rest = s1 * Ts / -math.expm1(-omega * Ts) + age * (s1 + turned * h.h * Y)  # S_T
+    first = min(h.h, h.h_initial + s1 * Ts)  # H1
     return Decay(bandwidth=omega, first=first, rest=rest, delay=Ts, **_common(certified))
 
 
@@ -206,6 +239,12 @@ KINDS: Final[Mapping[str, Kind]] = {
             prediction_error=_nothing,
             decay=_decay_of_sampled,
         ),
+        Kind(
+            name=HARDWARE,
+            controller="hardware",
+            prediction_error=_nothing,
+            decay=_nothing,
+        ),
     )
 }
 PREFERRED: Final = (
@@ -213,4 +252,5 @@ PREFERRED: Final = (
     SAMPLED.option,
     RATES.option,
     ALONE.option,
+    HARDWARE.option,
 )  # where the kind that was asked for is not about the loop

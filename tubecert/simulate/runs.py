@@ -32,6 +32,8 @@ class Worst:
     xtilde: Peak  # |S xtilde|
     sigma_error: Peak  # |sigma_hat - h|; for "sampled" |sigma_hat - h| of the held estimate
     h: Peak
+    estimate: Peak  # |q - h| of a machine, at its samples, before q is clipped
+    speed: Peak  # |S x'|
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +52,10 @@ class Runs:
     Shapes: t (K,), x (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m), xtilde (N, K, n),
     distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a
     is then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is
-    0. After a lane was stopped its values are nan. `error` (N,) is the largest difference in |x| to the run with steps
-    twice as long, an estimate of the error and mostly far above it; it is inf for a lane that was stopped.
-    `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it never does.
+    0. `least` and `greatest` (N, m) are of every input, over all steps. After a lane was stopped its values are nan.
+    `error` (N,) is the largest difference in |x| to the run with steps twice as long, an estimate of the error and
+    mostly far above it; it is inf for a lane that was stopped. `unresolved` (N,) is the first output time at which that
+    difference exceeds the tolerance, nan where it never does.
     """
 
     t: Array
@@ -66,6 +69,8 @@ class Runs:
     xtilde: Array
     distance: Array
     worst: Worst
+    least: Array
+    greatest: Array
     error: Array
     unresolved: Array
     failures: tuple[Failure, ...]
@@ -104,7 +109,19 @@ def joined(parts: list[Runs]) -> Runs:
         )
         for item in fields(Worst)
     }
-    lanewise = ("x", "k", "u_a", "sigma_hat", "h", "xtilde", "distance", "error", "unresolved")
+    lanewise = (
+        "x",
+        "k",
+        "u_a",
+        "sigma_hat",
+        "h",
+        "xtilde",
+        "distance",
+        "error",
+        "unresolved",
+        "least",
+        "greatest",
+    )
     return Runs(
         t=parts[0].t,
         x_plan=parts[0].x_plan,

@@ -14,18 +14,21 @@ from typing import Final
 import numpy as np
 
 from tubecert.certificate.result import Result
+from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.expression import Expression
+from tubecert.expression.matrix import Matrix, combine, multiply
 from tubecert.findings import Finding, Location
+from tubecert.kinds import HARDWARE
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.certified import Certified, certified_plan, read_numbers
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.loops import DESIGNS, Controller
-from tubecert.simulate.problem import LoopGains, LoopProblem
-from tubecert.simulate.promise import Kind, Promise, kind_for, promise
-from tubecert.simulate.uncertainty import Class, class_of
+from tubecert.simulate.problem import LoopGains, LoopProblem, MachineRun, unbounded
+from tubecert.simulate.promise import KINDS, Kind, Promise, kind_for, promise
+from tubecert.simulate.uncertainty import Class, Sources, class_of, noises
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
@@ -66,14 +69,15 @@ class Loop:
     @property
     def tested(self) -> bool:
         """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
-        return self.problem.terms.predicts
+        return self.problem.terms.estimates
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
 
-    `spread` (n,): how far from x0 they may be, state by state.
+    `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind. `uncertainty` is the
+    class of every loop but that of a machine, whose class is `on_machine`.
     """
 
     spec: Spec
@@ -87,6 +91,8 @@ class Setting:
     within: float
     spread: Array
     uncertainty: Class
+    on_machine: Class | None
+    E: Matrix
     h: tuple[Expression, ...] | None
     layer: float
 
@@ -101,6 +107,10 @@ class Setting:
             length = float(np.linalg.norm(direction)) or 1.0
             return np.asarray(self.centre + self.within * radius * direction / length)
         return np.asarray(self.x0 + self.spread * direction)
+
+    def class_of(self, loop: Loop) -> Class:
+        """What may act on a loop."""
+        return self.on_machine if loop.problem.terms.measures and self.on_machine else self.uncertainty
 
     @property
     def rho(self) -> float:
@@ -145,6 +155,8 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
     horizon = _horizon(spec, duration)
     certified = read_numbers(result)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
+    centre = Tape(plan.start, ()).run_floats([], ())
+    n, m = len(spec.states), len(spec.inputs)
     return Setting(
         spec=spec,
         certified=certified,
@@ -153,12 +165,57 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
         horizon=horizon,
         times=np.linspace(0.0, horizon, TIMES),
         x0=np.array([float(value) for value in spec.x0]),
-        centre=Tape(plan.start, ()).run_floats([], ()),
+        centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
-        uncertainty=class_of(certified, len(spec.states), len(spec.inputs)),
+        uncertainty=class_of(certified, n, m),
+        on_machine=_class_on_machine(spec, certified, model, centre),
+        E=_wind(model, result),
         h=None if wanted is None else tuple(term.expression for term in wanted),
         layer=_LAYER * certified["metric_input_gain"] * certified.reach,
+    )
+
+
+def _class_on_machine(
+    spec: Spec, certified: Certified, model: ControlAffineModel, centre: Array
+) -> Class | None:
+    """The class of certificate H, with its noise and wind; None if H is not certified."""
+    own, hardware = certified.machine, spec.hardware
+    if own is None or hardware is None:
+        return None
+    pinv = np.linalg.pinv(certified.S @ _inputs_at(model, centre)) @ certified.S
+    noise = [float(q) for q in hardware.noise] if isinstance(hardware.noise, tuple) else 1.0
+    sources = Sources(
+        pace=certified.rate,
+        k=len(model.E[0]) if model.E else 0,
+        wind=float(own.recipe.wind),
+        table=noises(float(own.recipe.noise) * np.array(noise), pinv),
+        noise_rate=math.inf if hardware.noise_rate is None else float(hardware.noise_rate),
+        signal=class_of(certified).rate_at(float(own.recipe.speed)),
+        box=unbounded(len(spec.inputs)) if own.clip is None else np.array(own.clip).T,
+    )
+    return class_of(certified, len(spec.states), len(spec.inputs), sources)
+
+
+def _wind(model: ControlAffineModel, result: Result) -> Matrix:
+    """E, or where w has a rate (I - B B^+) E: the rest of it is a part of h, which is as large as the class allows."""
+    if model.wind_rate is None:
+        return model.E
+    rows = None if result.tube is None else result.tube.coordinates
+    S = None if rows is None else Coordinates(tuple(tuple(Fraction(q) for q in row) for row in rows))
+    fields = Fields(model, S)
+    reached = multiply(fields.B_pinv, fields.of_vector(model.E))
+    return combine(1, model.E, -1, multiply(model.B, reached))
+
+
+def _inputs_at(model: ControlAffineModel, x: Array) -> Array:
+    """B (n, m) at a state (n,)."""
+    m = len(model.inputs)
+    values = [*x, *np.zeros(m)]
+    return (
+        Tape([e for row in model.B for e in row], (*model.states, *model.inputs))
+        .run_floats(values, ())
+        .reshape(-1, m)
     )
 
 
@@ -191,23 +248,72 @@ def loop_of(
     setting: Setting, controller: Controller, choice: Choice, control_rate: Fraction | None = None
 ) -> Loop:
     """A loop with its gains; raises `TubecertError` if there are none for it, or none at the control rate."""
+    if DESIGNS[controller].terms.measures:
+        return _loop_on_machine(setting, choice)
     tuning = _tuning(setting, controller, choice)
     covered = DESIGNS[controller].terms.predicts and control_rate is None and tuning.certified
     if control_rate is not None:
         tuning = _held(setting, tuning, choice, control_rate)
-    problem = LoopProblem(
+    problem = _problem(
+        setting, controller, tuning.gains, None if control_rate is None else float(control_rate)
+    )
+    promised = promise(setting.certified, tuning.kind) if covered and tuning.kind else None
+    return Loop(problem=problem, origin=tuning.words, promise=promised, caution=_caution(setting, problem))
+
+
+def _problem(
+    setting: Setting,
+    controller: Controller,
+    gains: LoopGains | None = None,
+    control_rate: float | None = None,
+    machine: MachineRun | None = None,
+) -> LoopProblem:
+    return LoopProblem(
         model=setting.model,
         plan=setting.plan,
         controller=controller,
         horizon=setting.horizon,
         times=setting.times,
-        gains=tuning.gains,
-        control_rate=None if control_rate is None else float(control_rate),
+        gains=gains,
+        control_rate=control_rate,
         limit=_LIMIT * setting.greatest_radius,
         P=setting.S.T @ setting.S,
+        machine=machine,
+        E=setting.E,
     )
-    promised = promise(setting.certified, tuning.kind) if covered and tuning.kind else None
-    return Loop(problem=problem, origin=tuning.words, promise=promised, caution=_caution(setting, problem))
+
+
+def _loop_on_machine(setting: Setting, choice: Choice) -> Loop:
+    """The loop of theorem H; with another sample time (the delay in proportion) or bandwidth it is not certified."""
+    kind, own, hardware = KINDS[HARDWARE.option], setting.certified.machine, setting.spec.hardware
+    if own is None or hardware is None:
+        raise TubecertError([_no_machine(setting)])
+    r = own.recipe
+    sample_time, bandwidth = choice.sample_time or r.sample_time, choice.bandwidth or r.bandwidth
+    slower = sample_time / r.sample_time
+    machine = MachineRun(
+        sample_time=float(sample_time),
+        delay=float(slower * r.delay),
+        bandwidth=math.inf if bandwidth is None else float(bandwidth),
+        box=None if own.clip is None else np.array(own.clip).T,
+        radius=float(r.clip_radius) if own.clip is None else math.inf,
+        feedback_time=None if hardware.feedback_time is None else float(slower * r.feedback_time),
+        held=hardware.held,
+        predict=hardware.predict,
+    )
+    same = (sample_time, bandwidth) == (r.sample_time, r.bandwidth)
+    return Loop(
+        problem=_problem(setting, "hardware", machine=machine),
+        origin=f"certified by {kind.name}" if same else CHOSEN,
+        promise=promise(setting.certified, kind) if same else None,
+    )
+
+
+def _no_machine(setting: Setting) -> Finding:
+    hardware = setting.spec.hardware
+    help = "add a section hardware to the specification" if hardware is None else "see its section hardware"
+    message = "the certificate does not certify the controller hardware"
+    return Finding(code="TC705", message=message, help=f"{help}, or simulate other controllers")
 
 
 def _caution(setting: Setting, problem: LoopProblem) -> str:
@@ -215,15 +321,11 @@ def _caution(setting: Setting, problem: LoopProblem) -> str:
     gains, rate = problem.gains, problem.control_rate
     if not problem.terms.adapts or rate is None or gains is None or gains.adaptation_rate is None:
         return ""
-    model = setting.model
-    names = (*model.states, *model.inputs)
-    at_start = [*setting.centre, *np.zeros(len(model.inputs))]
-    B = (
-        Tape([e for row in model.B for e in row], names)
-        .run_floats(at_start, ())
-        .reshape(-1, len(model.inputs))
+    own = (
+        gains.A_m(len(setting.x0)),
+        setting.S @ _inputs_at(setting.model, setting.centre),
+        gains.adaptation_rate,
     )
-    own = gains.A_m(len(model.states)), setting.S @ B, gains.adaptation_rate
     if growth(*own, 1 / rate) <= 1:
         return ""
     least = least_rate(*own, rate)

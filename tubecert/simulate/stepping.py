@@ -1,6 +1,6 @@
 """One lane from start to end: RK4 on the slow part, with the flow of the fast part inside every stage.
 
-x' = f + B(u* + k + h) + B u_a, (0.1) with (0.4). The stages are those of the exponential Runge-Kutta method of
+x' = f + B(u* + k + h) + E w + B u_a, (0.1) with (0.4). The stages are those of the exponential Runge-Kutta method of
 Krogstad: between them h (and a moving B) are the polynomials of time through the stages so far, and the fast part flows
 under these. Without a fast part this is classical RK4. Source: S. Krogstad, Generalized integrating factor methods for
 stiff PDEs, J. Comput. Phys. 203, 2005.
@@ -8,7 +8,7 @@ stiff PDEs, J. Comput. Phys. 203, 2005.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,29 +19,30 @@ from tubecert.simulate.fast import Fast, Inner, advance, inner
 from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, evaluate, point
 from tubecert.simulate.geodesic import FOUND, copied, forget
 from tubecert.simulate.layout import Layout, blocks
+from tubecert.simulate.machine import SAMPLE, Machine, Notes, attend, begin, carry, notes
 from tubecert.simulate.program import Index
 from tubecert.simulate.small import copy, dot
 
 DIVERGED = 20
 STOPPED = 21
 _FAR = 1e6
-PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h")
-_DISTANCE, _DEVIATION, _U, _K, _XTILDE, _SIGMA_ERROR, _H = range(7)  # their places
+PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h", "estimate", "speed")
+_DISTANCE, _DEVIATION, _U, _K, _XTILDE, _SIGMA_ERROR, _H, _ESTIMATE, _SPEED = range(9)  # their places
 START, MIDDLE, END = range(3)  # of a step: the places of its plans
 
 
 class Grid(NamedTuple):
     """Steps: `start` and `length` (S + 1,) in s, the last of length 0.
 
-    `which` (S + 1,) is the number of the length, `sample` and `output` those of the computer's sample and of the output
-    time at which the step starts, or -1. `plan`: x* (S + 1, 3, n), f(x*) + B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m)
-    at start, middle and end of every step.
+    `which` (S + 1,) is the number of the length, `output` that of the output time at which the step starts, or -1, and
+    `event` (4, S + 1) those of what a computer or machine does there (`machine.EVENTS`). `plan`: x* (S + 1, 3, n),
+    f(x*) + B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m) at start, middle and end of every step.
     """
 
     start: Array
     length: Array
     which: Index
-    sample: Index
+    event: Index
     output: Index
     plan: Reference
 
@@ -49,18 +50,18 @@ class Grid(NamedTuple):
 class Lane(NamedTuple):
     """Everything that a compiled lane reads.
 
-    `holds`: the computer holds the whole controller; `flows`: the fast part moves between the samples; `exact`: the
-    controller knows the state itself, else what is in `Work.measured`. A lane is stopped where |x - x*| exceeds
-    `limit`.
+    `holds`: the whole controller is held between the samples of the computer or machine; `plays`: but for u*; `flows`:
+    the fast part moves between the samples. A lane is stopped where |x - x*| exceeds `limit`.
     """
 
     field: Field
     force: Force
     fast: Fast
     computer: Computer | None
+    machine: Machine | None
     holds: bool
+    plays: bool
     flows: bool
-    exact: bool
     limit: float
     grid: Grid
 
@@ -76,15 +77,13 @@ class Stages(NamedTuple):
 class Work(NamedTuple):
     """What a compiled lane writes to while it runs.
 
-    `x` (n,) at the start of the step, `state` (n,) where a stage is, `measured` (n,) what the controller knows of it:
-    the same memory as long as it knows the state exactly. `y`, `end` (Y,): the fast part at the start and at the end of
-    a flow. `u` (m,): the input that acts, but for a u_a that flows. `sizes` (7,): what the peaks are taken of. `stop`
-    (1,): not 0 if all lanes shall end now.
+    `x` (n,) at the start of the step, `state` (n,) where a stage is. `y`, `end` (Y,): the fast part at the start and at
+    the end of a flow. `u` (m,): the input that acts, but for a u_a that flows. `sizes` (9,): what the peaks are taken
+    of. `stop` (1,): not 0 if all lanes shall end now.
     """
 
     x: Array
     state: Array
-    measured: Array
     y: Array
     end: Array
     u: Array
@@ -92,6 +91,7 @@ class Work(NamedTuple):
     stop: Array
     stages: Stages
     kept: Registers
+    notes: Notes
     point: Point
     inner: Inner
 
@@ -99,8 +99,9 @@ class Work(NamedTuple):
 class Output(NamedTuple):
     """What N lanes leave behind at K output times; nan where they did not come.
 
-    x and xtilde (N, K, n), k, u_a, sigma_hat and h (N, K, m), distance (N, K). `peak` and `peak_time` (N, 7): the
-    largest values and when they were met; `status` and `ended` (N,): why (0: it was not) and when a lane was stopped.
+    x and xtilde (N, K, n), k, u_a, sigma_hat and h (N, K, m), distance (N, K). `peak` and `peak_time` (N, 9): the
+    largest values and when they were met; `least` and `greatest` (N, m): of the inputs; `status` and `ended` (N,): why
+    (0: it was not) and when a lane was stopped.
     """
 
     x: Array
@@ -112,18 +113,18 @@ class Output(NamedTuple):
     distance: Array
     peak: Array
     peak_time: Array
+    least: Array
+    greatest: Array
     status: Index
     ended: Array
 
 
-def work(at: Layout, shared: Point, stop: Array) -> Work:
+def work(at: Layout, shared: Point, stop: Array, waiting: int = 1) -> Work:
     """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
     n, m, Y = at.n, at.m, at.size
-    state = np.zeros(n)
     return Work(
         x=np.zeros(n),
-        state=state,
-        measured=state,
+        state=np.zeros(n),
         y=np.zeros(Y),
         end=np.zeros(Y),
         u=np.zeros(m),
@@ -131,7 +132,8 @@ def work(at: Layout, shared: Point, stop: Array) -> Work:
         stop=stop,
         stages=Stages(np.zeros((4, m)), np.zeros((4, n, m)), np.zeros((4, n))),
         kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
-        point=point(shared.memory.copy(), copied(shared.curve), n, m),
+        notes=notes(n, m, waiting),
+        point=point(shared.memory.copy(), copied(shared.curve), (n, m, shared.E.shape[1])),
         inner=inner(at),
     )
 
@@ -152,18 +154,21 @@ def output(lanes: int, K: int, at: Layout) -> Output:
         distance=nothing(),
         peak=np.zeros((lanes, len(PEAKS))),
         peak_time=np.zeros((lanes, len(PEAKS))),
+        least=np.full((lanes, at.m), np.inf),
+        greatest=np.full((lanes, at.m), -np.inf),
         status=np.full(lanes, FOUND),
         ended=np.full(lanes, np.nan),
     )
 
 
 @entry
-def run(first: int, last: int, own: Any, starts: Any, work: Any, out: Any) -> None:
+def run(first: int, last: int, own: Lane, starts: Array, work: Work, out: Output) -> None:
     """Runs the lanes first..last-1 from `starts` (N, n)."""
     for lane in range(first, last):
         copy(work.x, starts[lane])
         work.y[:] = 0.0
         forget(work.point.curve.bend)
+        begin(own.force, lane, work)
         for s in range(own.grid.start.shape[0]):
             status = _step(own, lane, s, work, out)
             if status == STOPPED:
@@ -174,7 +179,7 @@ def run(first: int, last: int, own: Any, starts: Any, work: Any, out: Any) -> No
 
 
 @compiled
-def _step(own: Any, lane: int, s: int, work: Any, out: Any) -> int:
+def _step(own: Lane, lane: int, s: int, work: Work, out: Output) -> int:
     """One step of a lane, and what it leaves behind at the step's start; why it is stopped, if it is."""
     grid, fast, v = own.grid, own.fast, own.fast.at.v
     t, length = grid.start[s], grid.length[s]
@@ -190,31 +195,51 @@ def _step(own: Any, lane: int, s: int, work: Any, out: Any) -> int:
         plan = Reference(grid.plan.x[s, side], grid.plan.speed[s, side], grid.plan.u[s, side])
         if not _near(work.state, plan.x, own.limit):
             return DIVERGED
-        now = Moment(lane, t + share, work.state, work.measured, plan)
+        now = Moment(lane, t + share, work.state, plan)
         whole = stage == 0 or not own.holds
-        status, energy = evaluate(own.field, own.force, own.exact, now, whole, work.point)
+        status, energy = evaluate(own.field, own.force, now, whole, work.point)
+        if status == FOUND and stage == 0:
+            work.sizes[_DISTANCE] = np.sqrt(max(energy, 0.0))
+            status = _begin(own, s, now, work, out)
         if status != FOUND:
             return int(status)
-        if stage == 0:
-            if grid.sample[s] >= 0:
-                sample(fast, own.computer, grid.sample[s], now, work.point, work.y, work.kept)
-            work.sizes[_DISTANCE] = np.sqrt(max(energy, 0.0))
-            if own.holds:
-                _what_acts(fast, plan, work.point, work.y, work.kept)
-            _measure_sizes(fast, now, work.point, work.y, work.sizes)
-            _record(fast, now, grid.output[s], work.point, work.y, work.sizes, out)
         for j in range(work.u.shape[0]):
-            work.u[j] = work.kept.u[j] if own.holds else plan.u[j] + work.point.k[j]
+            work.u[j] = work.kept.u[j] if own.holds else work.point.k[j]
+            work.u[j] += plan.u[j] if own.plays else 0.0
         _keep(stage, work.point, work.u, work.stages)
+        if stage == 0:
+            _hurry(own, lane, t, work, out)
     if own.flows:
         _polynomials(work.stages, 4, work.inner)
         advance(fast, length, 2 * grid.which[s] + END - 1, work.y, work.inner, 0, work.end)
     _finish(work.x, work.stages.slope, work.y, work.end, length, v, own.flows)
+    carry(own.machine, own, s, work)
     return FOUND
 
 
 @compiled
-def _near(x: Any, plan: Any, limit: float) -> bool:
+def _begin(own: Lane, s: int, now: Moment, work: Work, out: Output) -> int:
+    """What happens at the start of a step, and what the lane leaves behind there; why it is stopped, if it is."""
+    fast, point, y, status = own.fast, work.point, work.y, FOUND
+    if fast.terms.measures:  # what acts jumps at the instants of a machine: both sides count
+        if s > 0:
+            _what_acts(own, now.plan, work)
+            _measure_sizes(own, now, work)
+            _peaks(now, work, out)
+        status = attend(own.machine, own, s, now, work)
+    elif own.grid.event[SAMPLE, s] >= 0:
+        sample(fast, own.computer, own.grid.event[SAMPLE, s], now, point, y, work.kept)
+    if own.holds:
+        _what_acts(own, now.plan, work)
+    _measure_sizes(own, now, work)
+    _peaks(now, work, out)
+    if own.grid.output[s] >= 0:
+        _record(fast, now, own.grid.output[s], work, out)
+    return status
+
+
+@compiled
+def _near(x: Array, plan: Reference, limit: float) -> bool:
     """Whether the state is anywhere near the plan: not if it is beyond the limit, or not finite."""
     near, square = True, 0.0
     for i in range(x.shape[0]):
@@ -224,7 +249,7 @@ def _near(x: Any, plan: Any, limit: float) -> bool:
 
 
 @compiled
-def _reach(x: Any, slope: Any, v: Any, stage: int, share: float, flows: bool, state: Any) -> None:
+def _reach(x: Array, slope: Array, v: Array, stage: int, share: float, flows: bool, state: Array) -> None:
     """Where the stage is: x, the slope of the stage before, and v, what u_a has added meanwhile."""
     for i in range(x.shape[0]):
         state[i] = x[i]
@@ -235,7 +260,7 @@ def _reach(x: Any, slope: Any, v: Any, stage: int, share: float, flows: bool, st
 
 
 @compiled
-def _finish(x: Any, slope: Any, y: Any, end: Any, length: float, v: int, flows: bool) -> None:
+def _finish(x: Array, slope: Array, y: Array, end: Array, length: float, v: int, flows: bool) -> None:
     """The end of the step becomes the start of the next: x by RK4 and v, and y but for v."""
     for i in range(x.shape[0]):
         mean = slope[0, i] + 2 * slope[1, i] + 2 * slope[2, i] + slope[3, i]
@@ -245,18 +270,19 @@ def _finish(x: Any, slope: Any, y: Any, end: Any, length: float, v: int, flows: 
 
 
 @compiled
-def _keep(stage: int, point: Any, u: Any, stages: Any) -> None:
-    """h and B of the stage, and its slope w = f + B(u + h), where u is without a u_a that flows."""
+def _keep(stage: int, point: Point, u: Array, stages: Stages) -> None:
+    """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows."""
     n, m = point.plant.B.shape
     for i in range(n):
         stages.slope[stage, i] = point.plant.f[i]
         for j in range(m):
             stages.h[stage, j], stages.B[stage, i, j] = point.h[j], point.plant.B[i, j]
             stages.slope[stage, i] += point.plant.B[i, j] * (u[j] + point.h[j])
+        stages.slope[stage, i] += point.wind[i]
 
 
 @compiled
-def _polynomials(stages: Any, stage: int, inner: Any) -> None:
+def _polynomials(stages: Stages, stage: int, inner: Inner) -> None:
     """h and B as polynomials of the time over the length of the flow.
 
     Before the last stage they are lines from the first stage whose mean is the stage before, as in classical RK4; at
@@ -284,50 +310,74 @@ def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float,
 
 
 @compiled
-def _what_acts(fast: Any, plan: Any, point: Any, y: Any, kept: Any) -> None:
-    """k becomes what acts while a computer holds u: with u* and u_a it adds up to that."""
-    u_a = blocks(y, fast.at).u_a
-    for j in range(fast.at.m):
-        point.k[j] = kept.u[j] - plan.u[j] - u_a[j]
+def _what_acts(own: Lane, plan: Reference, work: Work) -> None:
+    """k becomes what acts while u is held: with u* and u_a it adds up to that."""
+    u_a = blocks(work.y, own.fast.at).u_a
+    for j in range(own.fast.at.m):
+        work.point.k[j] = work.kept.u[j] - u_a[j] - (0.0 if own.plays else plan.u[j])
 
 
 @compiled
-def _measure_sizes(fast: Any, now: Any, point: Any, y: Any, sizes: Any) -> None:
-    """What the peaks are taken of, but for the distance."""
-    own, k, h = blocks(y, fast.at), point.k, point.h
-    deviation, u, error = 0.0, 0.0, 0.0
-    for i in range(fast.at.n):
-        for k2 in range(fast.at.n):
-            deviation += fast.P[i, k2] * (now.x[i] - now.plan.x[i]) * (now.x[k2] - now.plan.x[k2])
+def _length(P: Array, a: Array, b: Array) -> float:
+    """|S (a - b)|."""
+    square = 0.0
+    for i in range(a.shape[0]):
+        for k in range(a.shape[0]):
+            square += P[i, k] * (a[i] - b[i]) * (a[k] - b[k])
+    return float(np.sqrt(max(square, 0.0)))
+
+
+@compiled
+def _measure_sizes(own: Lane, now: Moment, work: Work) -> None:
+    """What the peaks are taken of, but for distance and speed."""
+    fast, sizes, k, h = own.fast, work.sizes, work.point.k, work.point.h
+    y, error = blocks(work.y, fast.at), 0.0
     for j in range(fast.at.m):
-        acting = now.plan.u[j] + k[j] + own.u_a[j]
-        u += acting * acting
-        if fast.terms.predicts:
-            error += (own.sigma_hat[j] - h[j]) ** 2
-    sizes[_DEVIATION], sizes[_U], sizes[_SIGMA_ERROR] = (
-        np.sqrt(max(deviation, 0.0)),
-        np.sqrt(u),
-        np.sqrt(error),
-    )
+        work.u[j] = now.plan.u[j] + k[j] + y.u_a[j]
+        if fast.terms.predicts or fast.terms.measures:
+            error += (y.sigma_hat[j] - h[j]) ** 2
+    sizes[_DEVIATION] = _length(fast.P, now.x, now.plan.x)
+    sizes[_U], sizes[_SIGMA_ERROR] = np.sqrt(dot(work.u, work.u)), np.sqrt(error)
     sizes[_K], sizes[_H] = np.sqrt(dot(k, k)), np.sqrt(dot(h, h))
     square = 0.0
     for i in range(fast.at.n):
-        square += own.xtilde[i] * dot(fast.P[i], own.xtilde)
-    sizes[_XTILDE] = np.sqrt(max(square, 0.0))
+        square += y.xtilde[i] * dot(fast.P[i], y.xtilde)
+    sizes[_XTILDE], sizes[_ESTIMATE] = np.sqrt(max(square, 0.0)), work.notes.error[0]
 
 
 @compiled
-def _record(fast: Any, now: Any, place: int, point: Any, y: Any, sizes: Any, out: Any) -> None:
-    """Peaks at the start of the step, and the values if it is an output time."""
-    lane, own = now.lane, blocks(y, fast.at)
-    for q in range(sizes.shape[0]):
+def _peaks(now: Moment, work: Work, out: Output) -> None:
+    """Peaks, and the extremes of the inputs, which are in `work.u`."""
+    lane, sizes = now.lane, work.sizes
+    for q in range(_SPEED):
         if sizes[q] > out.peak[lane, q]:
             out.peak[lane, q], out.peak_time[lane, q] = sizes[q], now.t
-    if place >= 0:
-        copy(out.x[lane, place], now.x)
-        copy(out.xtilde[lane, place], own.xtilde)
-        copy(out.k[lane, place], point.k)
-        copy(out.u_a[lane, place], own.u_a)
-        copy(out.sigma_hat[lane, place], own.sigma_hat)
-        copy(out.h[lane, place], point.h)
-        out.distance[lane, place] = sizes[_DISTANCE]
+    for j in range(work.u.shape[0]):
+        out.least[lane, j] = min(out.least[lane, j], work.u[j])
+        out.greatest[lane, j] = max(out.greatest[lane, j], work.u[j])
+
+
+@compiled
+def _hurry(own: Lane, lane: int, t: float, work: Work, out: Output) -> None:
+    """The peak of the speed |S x'|, from the slope at the start of a step."""
+    fast, speed = own.fast, work.stages.slope[0]
+    u_a, P, square = blocks(work.y, fast.at).u_a, fast.P, 0.0
+    for i in range(fast.at.n):
+        work.state[i] = speed[i] + (dot(work.point.plant.B[i], u_a) if own.flows else 0.0)
+    for i in range(fast.at.n):
+        square += work.state[i] * dot(P[i], work.state)
+    if square > out.peak[lane, _SPEED] ** 2:
+        out.peak[lane, _SPEED], out.peak_time[lane, _SPEED] = np.sqrt(square), t
+
+
+@compiled
+def _record(fast: Fast, now: Moment, place: int, work: Work, out: Output) -> None:
+    """The values at an output time."""
+    lane, own, point = now.lane, blocks(work.y, fast.at), work.point
+    copy(out.x[lane, place], now.x)
+    copy(out.xtilde[lane, place], own.xtilde)
+    copy(out.k[lane, place], point.k)
+    copy(out.u_a[lane, place], own.u_a)
+    copy(out.sigma_hat[lane, place], own.sigma_hat)
+    copy(out.h[lane, place], point.h)
+    out.distance[lane, place] = work.sizes[_DISTANCE]

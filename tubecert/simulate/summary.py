@@ -11,12 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array
 from tubecert.records import to_json
 from tubecert.simulate.campaign import Attack, Campaign, Drawn
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
-from tubecert.simulate.setting import Loop
+from tubecert.simulate.setting import Loop, Setting
 
 FORMAT: Final = "tubecert-simulation/1"
 
@@ -51,7 +50,7 @@ def summary(campaign: Campaign, certificate: str) -> Data:
         "class": {name: getattr(setting.uncertainty, name) for name in ("h", "h_x", "h_t", "h_initial")},
         "seed": campaign.seed,
         "loops": [_drawn(item) for item in campaign.drawn],
-        "attacks": [_attack(item, setting.S) for item in campaign.attacks],
+        "attacks": [_attack(item, setting) for item in campaign.attacks],
         "obstacles": {
             "plan": [_clearance(item) for item in campaign.plan_clearance],
             "tube": [_clearance(item) for item in campaign.tube_clearance],
@@ -60,7 +59,7 @@ def summary(campaign: Campaign, certificate: str) -> Data:
 
 
 def _loop(loop: Loop) -> Data:
-    gains = loop.problem.gains
+    gains, machine = loop.problem.gains, loop.problem.machine
     data: Data = {"controller": loop.controller, "gains_are": loop.origin}
     if loop.problem.control_rate is not None:
         data["control_rate"] = loop.problem.control_rate
@@ -72,6 +71,16 @@ def _loop(loop: Loop) -> Data:
             "sample_time": gains.sample_time,
             "projection_radius": gains.projection_radius,
             "predictor_gain": predictor.tolist(),
+        }
+    if machine is not None:
+        data["gains"] = {
+            "bandwidth": _finite(machine.bandwidth),
+            "adaptation_rate": None,
+            "sample_time": machine.sample_time,
+            "delay": machine.delay,
+            "feedback_time": machine.feedback_time,
+            "projection_radius": _finite(machine.radius),
+            "predictor_gain": None,
         }
     if loop.caution:
         data["caution"] = loop.caution
@@ -86,8 +95,8 @@ def _drawn(item: Drawn) -> Data:
     }
 
 
-def _attack(item: Attack, S: Array) -> Data:
-    data = _loop(item.loop) | {"largest_distance_over_dbar": _finite(item.use)}
+def _attack(item: Attack, setting: Setting) -> Data:
+    data = _loop(item.loop) | {"largest_distance_over_dbar": _finite(item.greatest / setting.reach)}
     if item.sample is not None and item.comparison is not None:
         data["random"] = {"asked": item.sample.asked, **_comparison(item.comparison)}
     if item.case is not None and item.worst_comparison is not None:
@@ -98,11 +107,14 @@ def _attack(item: Attack, S: Array) -> Data:
             "h": {
                 "amplitude": member.amplitude.tolist(),
                 "frequency": member.frequency.tolist(),
-                "wave": (member.wave @ S).tolist(),
+                "wave": (member.wave @ setting.S).tolist(),
                 "phase": member.phase.tolist(),
                 "push": member.push,
             },
         }
+        if member.beside is not None:
+            beside = member.beside._asdict().items()
+            data["adversary"]["beside"] = {name: part[0].tolist() for name, part in beside if name != "most"}
     return data
 
 

@@ -11,17 +11,23 @@ triangle: slope at most 1, and no overshoot. Where metric and inputs are constan
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.certified import Certified
-from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.problem import Beside, Disturbance, nothing_beside, unbounded
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
+_WAVING, _STRAIGHT = (
+    0.25,
+    0.75,
+)  # genes: h is a sum of waves below, a signal with a direction of its own above
+_STEADY: Final = 0.2  # below, a signal or wind never turns round
+_CANDIDATES: Final = 16  # of the noise at a sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +35,7 @@ class Class:
     """Bounds of |h|, |h_x|, |h_t| and |h(0, x(0))|, n states, m inputs.
 
     `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known.
+    `sources` are those of noise, wind and signals, if there are any.
     """
 
     h: float
@@ -38,17 +45,40 @@ class Class:
     n: int
     m: int
     push: tuple[float, float] | None = None
+    sources: Sources | None = None
+
+    def rate_at(self, speed: float) -> float:
+        """s1 = Dht + Dhx Y, how fast h moves along a loop of the speed Y."""
+        return self.h_t + self.h_x * speed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sources:
+    """What acts beside h, within its bounds: |w| <= `wind` for a w of k entries, and noise from `table` (Q, n).
+
+    `noise_rate` bounds |n_k - n_(k-1)| per second. Where `signal` is positive, |dh/dt| along the loop is at most
+    that (s1 of theorem H, whose proof needs no more of h), and h stays in the `box` (2, m). `pace` in 1/s is lambda.
+    """
+
+    pace: float
+    k: int
+    wind: float
+    table: Array
+    noise_rate: float
+    signal: float
+    box: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Member:
-    """One h: amplitude (W, m), frequency (W,), wave (W, n), phase (W,), push."""
+    """One h: amplitude (W, m), frequency (W,), wave (W, n), phase (W,), push; and what acts beside it, as one lane."""
 
     amplitude: Array
     frequency: Array
     wave: Array
     phase: Array
     push: float = 0.0
+    beside: Beside | None = None
 
     def bounds(self) -> tuple[float, float, float]:
         """Bounds of |h|, |h_x| and |h_t| of a sum of waves, by the triangle inequality."""
@@ -57,7 +87,7 @@ class Member:
         return float(size.sum()), float(size @ slope), float(size @ np.abs(self.frequency))
 
 
-def class_of(certified: Certified, n: int, m: int) -> Class:
+def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | None = None) -> Class:
     """The class that a certificate is about; pushes only where the metric and B are constant."""
     constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
     flat = certified["M_x"] == 0 and certified["B_x"] == 0
@@ -65,7 +95,7 @@ def class_of(certified: Certified, n: int, m: int) -> Class:
     if flat and certified.upper is not None:
         slope = certified["B"] * certified.upper
         push = slope, slope * (certified["drift_on_plan"] + certified["plan_defect"])
-    return Class(**constants, n=n, m=m, push=push)
+    return Class(**constants, n=n, m=m, push=push, sources=sources)
 
 
 def random_member(kind: Class, x0: Array, centre: Array, rng: np.random.Generator) -> Member:
@@ -81,7 +111,7 @@ def random_member(kind: Class, x0: Array, centre: Array, rng: np.random.Generato
     member = Member(
         amplitude=amplitude, frequency=frequency, wave=wave, phase=rng.uniform(0, 2 * np.pi, WAVES)
     )
-    return started(member, kind, x0 - centre)
+    return beset(started(member, kind, x0 - centre), kind, rng.random(genes_beside(kind)))
 
 
 def _directions(rng: np.random.Generator, count: int, size: int) -> Array:
@@ -148,7 +178,7 @@ def adversary(kind: Class, genes: Array, x0: Array, centre: Array, layer: float)
     slope = max(slope, 0.0)
     steepness = genes[2] * room_x / slope if slope > 0 else 0.0
     q = steepness * _unit(genes[4 : 4 + kind.n])
-    amplitude = slope * c[:, None] * _unit(genes[4 + kind.n :])[None, :]
+    amplitude = slope * c[:, None] * _unit(genes[4 + kind.n : 4 + kind.n + kind.m])[None, :]
     member = Member(
         amplitude=amplitude,
         frequency=j * frequency,
@@ -156,12 +186,69 @@ def adversary(kind: Class, genes: Array, x0: Array, centre: Array, layer: float)
         phase=j * 2 * np.pi * genes[1],
         push=pushed[0],
     )
-    return _begun(member, kind, x0 - centre)
+    return beset(_begun(member, kind, x0 - centre), kind, genes[4 + kind.n + kind.m :])
 
 
 def genes_of(kind: Class) -> int:
     """How many numbers describe an adversary."""
-    return 4 + kind.n + kind.m
+    return 4 + kind.n + kind.m + genes_beside(kind)
+
+
+def genes_beside(kind: Class) -> int:
+    """How many of them are about noise, wind and signals."""
+    return 0 if kind.sources is None else 8 + kind.m + kind.sources.k
+
+
+def beset(member: Member, kind: Class, genes: Array) -> Member:
+    """The member with the noise, wind and signal that `genes` in [0, 1] describe; a signal replaces its waves."""
+    if kind.sources is None:
+        return member
+    beside = _beside(kind, kind.sources, genes)
+    waves, push = (member.amplitude, member.push) if beside.ramp[0] == 0 else (member.amplitude * 0.0, 0.0)
+    return replace(member, amplitude=waves, push=push, beside=beside)
+
+
+def usual(kind: Class, sources: Sources) -> Beside:
+    """Random noise, and a wind that blows outward, beside an h that is given."""
+    genes = np.full(genes_beside(kind), 0.5)
+    genes[[0, 4, 6]] = 0.0  # no signal; a wind that does not turn; noise at random
+    return _beside(kind, sources, genes)
+
+
+def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
+    signal = sources.signal > 0 and genes[0] > _WAVING
+    along, blows = _unit(genes[8 : 8 + kind.m]), _unit(genes[8 + kind.m :]) if sources.k else np.zeros(0)
+    turns = [(sources.pace * 10 ** (4 * fast - 1) if fast > _STEADY else 0.0) for fast in genes[[1, 4]]]
+    phases = [2 * np.pi * genes[2], 2 * np.pi * genes[5] if turns[1] else np.pi / 2]
+    lane = Beside(
+        ramp=np.array(sources.signal * _ROUND if signal else 0.0),
+        begin=along * kind.h_initial * _ROUND,
+        along=along * float(genes[0] > _STRAIGHT),
+        turning=np.array([turns[0], phases[0]]),
+        wind=np.array(sources.wind * _ROUND),
+        aim=np.array(int(2.999 * genes[3])),
+        blowing=blows,
+        gusting=np.array([turns[1], phases[1]]),
+        choice=np.array(int(2.999 * genes[6])),
+        period=np.array(int(10 ** (3 * genes[7]))),
+        table=sources.table,
+        most=np.array(sources.noise_rate),
+    )
+    return Beside(*(part[None] for part in lane))
+
+
+def noises(noise: float | Array, B_pinv: Array) -> Array:
+    """Noise (Q, n) of a ball in the states, or of a box: what B^+ (m, n) makes most of, then all directions."""
+    n = B_pinv.shape[1]
+    rng = np.random.default_rng(0)
+    if np.ndim(noise):
+        table = np.where(rng.random((_CANDIDATES, n)) < 0.5, -1.0, 1.0)
+        table[0] = np.where(B_pinv[np.argmax(np.abs(B_pinv) @ noise)] < 0, -1.0, 1.0)
+    else:
+        table = _directions(rng, _CANDIDATES, n)
+        table[0] = np.linalg.svd(B_pinv)[2][0]
+    table[1] = -table[0]
+    return np.asarray(table * noise * _ROUND)
 
 
 def _pushed(kind: Class, share: float, layer: float) -> tuple[float, float, float, float]:
@@ -209,15 +296,18 @@ def _begun(member: Member, kind: Class, offset: Array) -> Member:
 
 
 def assembled(members: Sequence[Member], kind: Class, centre: Array, layer: float) -> Disturbance:
-    """One lane for each member; nothing is clipped, since every member is in the class."""
+    """One lane for each member; only signals, and h in a box, are clipped, since every member is in the class."""
+    rows = [member.beside or nothing_beside(1, kind.n, kind.m) for member in members]
     return Disturbance(
+        beside=Beside(*map(np.concatenate, zip(*rows, strict=True))),
+        box=unbounded(kind.m) if kind.sources is None else kind.sources.box,
         base=None,
         amplitude=np.array([member.amplitude for member in members]),
         frequency=np.array([member.frequency for member in members]),
         wave=np.array([member.wave for member in members]),
         phase=np.array([member.phase for member in members]),
         push=np.array([member.push for member in members]),
-        radius=np.full(len(members), np.inf),
+        radius=np.full(len(members), kind.h if kind.sources else np.inf),
         centre=centre,
         layer=layer,
     )

@@ -13,7 +13,7 @@ from tubecert.spec.reader import Field
 from tubecert.spec.types import Simulation, Trajectory
 
 KEYS: Final = ("controllers", "gains", "duration", "runs", "seed", "control_rate", "plane", "h")
-CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1", "sampled")
+CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1", "sampled", "hardware")
 MAX_RUNS: Final = 1_000_000
 MAX_SEED: Final = 2**63 - 1
 
