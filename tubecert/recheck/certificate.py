@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tubecert.recheck import machine, unknown, wind
+from tubecert.recheck import covariant, machine, unknown, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -425,7 +425,7 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
     """Every constant there is, and no other; those that follow from gains only where such gains are printed.
 
     Those of a disturbance and of a machine are there if and only if the specification has one; that the metric is
-    constant, as two of them ask, is examined with them.
+    constant, as two of them ask, or not, as six of them, is examined with them.
     """
     derived = (kind.derived(result[kind.key]) for kind in KINDS if kind.key in result)
     names = [*MEASURED, *(name for names in derived for name in names)]
@@ -435,10 +435,11 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
         names += unknown.CONSTANTS
     if spec.hardware is not None:
         names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
-    optional = machine.OF_CONSTANT_METRICS if spec.hardware is not None else ()
+    groups = (machine.OF_CONSTANT_METRICS, covariant.NAMES) if spec.hardware is not None else ()
+    optional = [name for group in groups for name in group]
     own = node.closed(*names, optional=optional)
-    if len({name in own for name in optional}) > 1:
-        raise node.refused("has one constant of a constant metric without the other")
+    if any(len({name in own for name in group}) > 1 for group in groups):
+        raise node.refused("has one constant of the metric without the others")
     names += [name for name in optional if name in own]
     n = len(result["safe_set"].mapping())
     return {name: _constant(own[name], n) for name in names}

@@ -14,6 +14,7 @@ from tubecert.recheck import (
     claimed,
     clearances,
     consistency,
+    covariant,
     geodesics,
     inputs,
     machine,
@@ -37,7 +38,7 @@ from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Curve
-from tubecert.recheck.digital import MachineNumbers
+from tubecert.recheck.digital import Bent, MachineNumbers
 from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
@@ -151,7 +152,16 @@ class Case:
         )
         if "input_rate" in self.constants and self.bound_if_any("input_rate") is None:
             del own["input_rate"]  # u* jumps
-        return MachineNumbers(**(absent | own))  # type: ignore[arg-type]
+        return MachineNumbers(**(absent | own), bent=self._bent)  # type: ignore[arg-type]
+
+    @property
+    def _bent(self) -> Bent | None:
+        """The constants of a metric that is not constant, if they are stated and each has a bound."""
+        if any(
+            self.constants.get(name) is None or self.bound_if_any(name) is None for name in covariant.NAMES
+        ):
+            return None
+        return Bent(**{name: self._ball(name) for name in covariant.NAMES})
 
     def _ball(self, name: str) -> Ball:
         """The upper end of a constant, not a number where it has none."""
@@ -404,6 +414,15 @@ def _beside(case: Case) -> Iterator[Claim]:
                 f"{name} <= {float(limit):.6g}",
                 (*over, limit, known),
                 lambda name=name, limit=limit: machine.bounded(place, name, limit, noise, case.bound_if_any),  # type: ignore[misc]
+            )
+
+    for name in covariant.NAMES:
+        limit = case.bound_if_any(name) if name in case.constants else None
+        if limit is not None:
+            yield Claim(
+                f"{name} <= {float(limit):.6g}",
+                (*over, limit),
+                lambda name=name, limit=limit: covariant.bounded(place, name, limit),  # type: ignore[misc]
             )
 
 

@@ -27,6 +27,18 @@ _FASTEST = 40.0  # omega Ts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Bent:
+    """The constants of a metric that is not constant, measured by itself, as balls by their names in a certificate."""
+
+    drift_slope: Ball
+    form_slope: Ball
+    input_slope: Ball
+    input_gain: Ball
+    drift_metric: Ball
+    curvature: Ball
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MachineNumbers:
     """The constants that only theorem H has, as balls by their names in a certificate; None where one is not stated."""
 
@@ -45,6 +57,7 @@ class MachineNumbers:
     input_rate: Ball | None
     symbols: Ball
     symbols_slope: Ball
+    bent: Bent | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -328,6 +341,10 @@ class _Evaluation:
         ell0 = slope * stretched + bend * j0 * self.seen  # (H.8)
         tilt = n.feedback_gain * m.plan_tilt * m.plan_speed * self.level
         ell = slope * V_M + bend * V_J + tilt  # (H.9), per second
+        if m.bent is not None:
+            other = self._by_metric(m.bent, slope)
+            if other is not None:
+                ell0, ell = smaller(ell0, other[0]), smaller(ell, other[1])
         # from here on by the age of the feedback: it starts at its delay, or at the instant that was predicted
         youngest, oldest = (
             (nothing, self.Tf) if self.at.prediction is not None else (self.tau, self.Tf + self.tau)
@@ -340,6 +357,25 @@ class _Evaluation:
         delta_1 = larger(least, base + (ell0 + ell * first) * (1 + begun))
         delta = larger(least, base + ell0 + ell * youngest + (ell0 + ell * oldest) * moved)
         return self._distance(delta_1, delta, ell, base, ell0 * (1 + moved))
+
+    def _by_metric(self, m: Bent, slope: Ball) -> tuple[Ball, Ball] | None:
+        """(H.8c), (H.9c): lengths are measured by the metric, along geodesics; None where chi' may not be positive."""
+        n = self.n
+        K = m.curvature * n.lower * exact(self.setting.rho) ** 2
+        chi = 1 - K / 8
+        if not chi > 0:
+            return None
+        # |Theta E| at any state: the stated push may rest on beta, which is |Theta B| on the plan
+        stretch = larger(arb(1), m.input_gain / n.metric_input_gain)
+        gust = smaller(root(n.upper) * self.blown, self.pushed * stretch)
+        added = m.input_gain * self.push + gust + n.plan_defect_metric
+        fastest = m.drift_metric + added
+        Q = K * fastest / chi
+        bend = m.form_slope * (self.level + self.n_M) / 2
+        ell0 = (slope * (1 + K / (2 * chi)) + bend * (1 + K / (8 * chi))) * self.n_M
+        apart = m.drift_slope * self.level + added + Q / 2
+        tilt = n.feedback_gain * m.input_slope * fastest * self.level
+        return ell0, slope * apart + bend * (fastest + Q / 8) + tilt
 
     def _distance(self, delta_1: Ball, delta: Ball, ell: Ball, base: Ball, noisy: Ball) -> Loop:
         """(H.12), by the comparison equation with two saw-teeth: of the input, and of the feedback.

@@ -92,7 +92,7 @@ def is_flat(place: Place) -> bool:
     return place.system.flat and all(all_zero(a) for a in place.fields.slopes(place.system.B))
 
 
-def _bordered(W: Rows, p: Rows, corner: Rows) -> Matrix:
+def bordered(W: Rows, p: Rows, corner: Rows) -> Matrix:
     """[W p; p' corner]."""
     above = [[*w, *e] for w, e in zip(W, p, strict=True)]
     return [*above, *([*e, *c] for e, c in zip(turned(p), corner, strict=True))]
@@ -187,11 +187,11 @@ def _plan_tilt(place: Place, limit: Fraction) -> Outcome:
     for C, size, others in _directions(parts):
         square = number(limit**2) * d * d * (size.raised(2) if size is UNIT else _square(size))
         corner = [[square if i == j else NOUGHT for j in range(m)] for i in range(m)]
-        S = place.on_plan(_bordered(s.W, turned(C), corner))
+        S = place.on_plan(bordered(s.W, turned(C), corner))
         nothing = [[NOUGHT] * m for _ in s.states]
-        unit = place.on_plan(_bordered(s.W, nothing, corner))
+        unit = place.on_plan(bordered(s.W, nothing, corner))
         test = PositiveDefinite(S, unit, place.numbers)
-        outcomes.append(_along(place, test, others))
+        outcomes.append(along(place, test, others))
         if not outcomes[-1].holds:
             break
     return together(outcomes)
@@ -202,7 +202,7 @@ def _square(size: Term) -> Term:
     return sum((e * e for e in size.args), start=NOUGHT)
 
 
-def _along(
+def along(
     place: Place, test: PositiveDefinite | NormsBelow, extra: dict[str, tuple[Fraction, Fraction]]
 ) -> Outcome:
     """A test in s and in other variables on every part of the plan."""
@@ -306,7 +306,7 @@ def _drift_difference_metric(place: Place, limit: Fraction, known: Known) -> Out
     if limit and len(curve.parts) == 1 and not curve.ranges:
         p = _difference(place, s.f)
         corner = [[number(limit**2)]]
-        S, unit = (_bordered(s.W, a, corner) for a in (p, [[NOUGHT] for _ in s.states]))
+        S, unit = (bordered(s.W, a, corner) for a in (p, [[NOUGHT] for _ in s.states]))
         test = PositiveDefinite(S, unit, place.numbers)
         found = prove(test, place.ball(), min(place.budget, _MANY))
         if found.verdict != "undecided":
@@ -403,8 +403,8 @@ def _noise_metric(place: Place, limit: Fraction, noise: Numbers | None) -> Outco
         return stated(False, "there is noise")
     W, corner = place.system.W, [[number(limit**2)]]
     nothing = [[NOUGHT] for _ in place.system.states]
-    unit = _bordered(W, nothing, corner)
-    return together([_definite(place, _bordered(W, n, corner), unit) for n in _corners(noise)])
+    unit = bordered(W, nothing, corner)
+    return together([_definite(place, bordered(W, n, corner), unit) for n in _corners(noise)])
 
 
 def _noise_explained(place: Place, limit: Fraction, noise: Numbers | None) -> Outcome:

@@ -5,6 +5,9 @@ In: the constants over a tube whose specification has `hardware`. Out: a `Machin
 
 from __future__ import annotations
 
+from math import isinf
+
+from tubecert.bounds.covariant import CovariantConstants, covariant_constants
 from tubecert.bounds.hardware import Box, clip_box, hardware_constants
 from tubecert.bounds.suprema import Suprema
 from tubecert.conditions.machine import Machine
@@ -13,6 +16,7 @@ from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.spec import Spec
 
+_MOST_STATES = 3  # recheck proves covariant constants direction by direction
 _SHARP = 1e-4  # of sup |u*|: how closely u* is enclosed at least
 
 
@@ -24,6 +28,7 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
     ranges = {name: suprema.input_range(i, sharp) for i, name in enumerate(spec.inputs)}
     return Machine(
         constants=hardware_constants(suprema, spec.hardware, geodesics, problem.constants),
+        covariant=_covariant(problem, suprema),
         clip=_clip(spec, suprema),
         asked=spec.hardware,
         widths={
@@ -34,6 +39,14 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
             for name, (least, greatest) in ranges.items()
         },
     )
+
+
+def _covariant(problem: TubeProblem, suprema: Suprema) -> CovariantConstants | None:
+    """Those that serve: where the metric is not constant, recheck can prove them, and each has a bound."""
+    if len(suprema.model.states) > _MOST_STATES:
+        return None
+    found = covariant_constants(suprema, problem.constants)
+    return None if found is None or any(isinf(value.above) for _, value, _ in found.items()) else found
 
 
 def _clip(spec: Spec, suprema: Suprema) -> Box:

@@ -205,8 +205,10 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
     all_of_tube = [*enclosed.constants.items(), *enclosed.problem.beside()]
     own = {name: constant_data(value, meaning) for name, value, meaning in all_of_tube}
     if reached.bounded is not None and reached.bounded.machine is not None:
-        machine = reached.bounded.machine.constants
-        own |= {name: constant_data(value, meaning) for name, value, meaning in machine.items()}
+        machine = reached.bounded.machine
+        bent = [] if machine.covariant is None else machine.covariant.items()
+        of_machine = [*machine.constants.items(), *bent]
+        own |= {name: constant_data(value, meaning) for name, value, meaning in of_machine}
     derived = {} if judged is None else judged.derived()
     return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
 
