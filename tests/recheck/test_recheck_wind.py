@@ -15,6 +15,9 @@ ADAPTED = 'disturbance: {E: [["cos(x)"], ["1 + y"]], bound: 0.01, rate: 0.1}\n'
 DECLARED = REST.replace('h: ["0.1*sin(t) + 0.05*x"]', "bounds: {h: 0.12, h_x: 0.05, h_t: 0.1}")
 TURNS = (CONFIGS / "state_dependent_input.yaml").read_text("utf-8") + "disturbance: {bound: 0.002}\n"
 
+NARROW = REST.replace("[0.2, 0.4]", "[0.28, 0.32]") + "hardware: {rate: 1000, noise: 0.0001}\n"
+SEARCHED = 'disturbance: {E: [["cos(x)"], ["1 + y"]], bound: largest}\n'
+
 CASES = {
     "gusts": (SMALL + FIELD, "B"),
     "adapted": (SMALL + ADAPTED, "C"),
@@ -25,6 +28,8 @@ CASES = {
     "within": (REST.replace("at: [0.05, 0]", "within: 0.05") + ADAPTED, "C"),
     "box": (REST.replace("at: [0.05, 0]", "box: {x: [0, 0.05], y: [0, 0]}") + ADAPTED, "C"),
     "B turns": (TURNS, "C"),
+    "hardware": (NARROW + ADAPTED, "hardware"),
+    "largest wind": (NARROW + SEARCHED, "hardware"),
 }
 
 
@@ -81,10 +86,23 @@ def less(*names, by=0.97):
         ("h_t", "declared"),
         ("h_initial", "within"),
         ("h_initial", "box"),
+        ("residual_size", "hardware"),
     ],
 )
 def test_a_constant_that_is_too_small_is_refused(constant, name):
     assert unconfirmed(forged(less(constant), name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hardware", "largest wind"])
+def test_the_estimate_is_clipped_to_all_that_joins_h(name):
+    """The box holds h with its wind and its parameters; what h alone is would be too little."""
+
+    def narrower(result):
+        result["hardware"]["clip"] = [[-0.12, 0.12]]
+
+    assert abs(certified(CASES[name][0], conditions="hardware")["result"]["hardware"]["clip"][0][0]) > 0.125
+    assert unconfirmed(forged(narrower, name))
 
 
 FAULTS = {

@@ -59,7 +59,7 @@ class Plans:
 class Blowing:
     """Every wind that is claimed about: |w| and, where it is known, |w'| at most; exact texts. None: searched for."""
 
-    bound: str | None = None
+    bound: str | None
     rate: str | None = None
 
 

@@ -53,4 +53,4 @@ def _clip(spec: Spec, suprema: Suprema) -> Box:
     """The box of h where that is given as expressions; else empty, which stands for the ball of its size."""
     bounds = spec.uncertainty.bounds
     declared = suprema.model.h is None or (bounds is not None and bounds.h is not None)
-    return () if declared or suprema.model.parameters else clip_box(suprema)
+    return () if declared else clip_box(suprema)
