@@ -11,7 +11,9 @@ import pytest
 from tubecert.bounds.compute import Radius
 from tubecert.pipeline import Memory, Options, certify, question_of
 from tubecert.pipeline.certification import answer
-from tubecert.spec import load, load_text
+from tubecert.spec import Setting, canonical, load, load_text
+from tubecert.spec.load import load_source
+from tubecert.spec.source import Source
 from tubecert.stages.bounded import Bounded
 from tubecert.stages.judged import Judged
 from tubecert.stages.metric import ProvenMetric
@@ -21,6 +23,19 @@ from tubecert.stages.tube import TubeFound
 CONFIGS = Path(__file__).parents[2] / "configs"
 THREE = load(str(CONFIGS / "three_state.yaml"))
 PLANNED = (CONFIGS / "two_state.yaml").read_text(encoding="utf-8").replace("  knots: 101", "  knots: 51")
+
+
+ONE = """tubecert: 1
+name: one
+system: {states: [x], inputs: [u], parameters: {k: 1}, f: [-k*x], B: [[1]]}
+safe_set: {x: [-1, 1]}
+uncertainty: {h: [0.1*sin(t)]}
+trajectory: {kind: equilibrium, at: [0], horizon: 10}
+initial_state: {at: [0.05]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+adaptation: {A_m: -1}
+"""
 
 
 def radii(epsilon, rho_a):
@@ -33,7 +48,7 @@ def test_other_radii_prove_neither_rank_nor_metric_again():
         certify(THREE, radii(e, r), memory=memory).to_json()
         for e, r in ((".01", ".01"), (".012", ".01"), (".01", ".02"))
     ]
-    assert memory.computed == {"rank": 1, "metric": 1}
+    assert (memory.computed["rank"], memory.computed["metric"], memory.computed["constants"]) == (1, 1, 3)
     for result, options in zip(results[1:], (radii(".012", ".01"), radii(".01", ".02")), strict=True):
         assert result == certify(THREE, options).to_json()  # and what is recalled changes nothing
 
@@ -44,7 +59,84 @@ def test_other_radii_plan_once(tmp_path, monkeypatch):
     for epsilon in (".6", ".5"):
         end = answer(question_of(spec, replace(radii(epsilon, ".1"), gap=Fraction(1, 4)), memory=memory))
         assert isinstance(end, Judged)
-    assert memory.computed == {"rank": 1, "metric": 1, "plan": 1}
+    assert [memory.computed[name] for name in ("rank", "metric", "plan", "knots", "constants")] == [
+        1,
+        1,
+        1,
+        2,
+        2,
+    ]
+
+
+def set_in(text, *words):
+    return load_source(Source.of("spec.yaml", text), [Setting.of(each) for each in words])
+
+
+OVER_THE_TUBE = ("radius", "constants", "geodesics")
+MACHINE = ("hardware.rate=400", "hardware.noise=0.0001")
+NOISY = ("hardware.rate=400", "hardware.noise={x: 0.0001}")
+
+
+@pytest.mark.parametrize(
+    ("fixed", "one", "other", "machines"),
+    [
+        ((), "adaptation.A_m=-1", "adaptation.A_m=-2", 0),
+        ((), "conditions.decides=A", "conditions.decides=B", 0),
+        ((), "limits.u=[-1, 1]", "limits.u=[-2, 1]", 0),
+        (MACHINE[1:], "hardware.rate=400", "hardware.rate=800", 1),
+        (MACHINE, "hardware.delay=0", "hardware.delay=0.001", 1),
+        (MACHINE[:1], "hardware.noise=0.0001", "hardware.noise=0.0002", 1),
+        (MACHINE[:1], NOISY[1], "hardware.noise={x: 0.0002}", 2),
+        (MACHINE, "hardware.feedforward=held", "hardware.feedforward=continuous", 2),
+    ],
+)
+@pytest.mark.slow
+def test_what_the_constants_do_not_rest_on_computes_none_again(fixed, one, other, machines):
+    memory = Memory()
+    for words in (one, other):
+        spec = set_in(ONE, *fixed, words)
+        result = certify(spec, Options(), memory=memory).to_json()
+    assert result == certify(spec, Options()).to_json()
+    assert [memory.computed[name] for name in OVER_THE_TUBE] == [1, 1, 1]
+    assert memory.computed.get("machine", 0) == machines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        "uncertainty.h[0]=0.1*cos(t)",
+        "initial_state.at[0]=0.04",
+        "tube.rho_a=0.2",
+        "system.parameters.k=2",
+        "metric.rate=0.4",
+    ],
+)
+def test_what_they_rest_on_computes_them_again(words):
+    memory = Memory()
+    for settings in ((), (words,)):
+        spec = set_in(ONE, *settings)
+        result = certify(spec, Options(), memory=memory).to_json()
+    assert result == certify(spec, Options()).to_json()
+    assert [memory.computed[name] for name in OVER_THE_TUBE] == [2, 2, 2]
+
+
+def test_only_sections_that_are_named_are_left_out_of_what_constants_rest_on():
+    ground = question_of(set_in(ONE, *MACHINE, "limits.u=[-1, 1]"), Options()).ground
+    rest = {"name", "conditions", "adaptation", "hardware", "limits", "expect", "simulation", "obstacles"}
+    assert ground.keys() == canonical(set_in(ONE)).keys() - rest | {"gap", "budget"}
+
+
+def test_other_knots_of_a_file_are_another_plan(tmp_path):
+    rows = "t,x,u\n0,0,0\n5,0,0\n10,{},0\n"
+    text = ONE.replace("{kind: equilibrium, at: [0], horizon: 10}", "{kind: csv, file: plan.csv}")
+    memory, found = Memory(), []
+    for last in ("0", "0.01"):
+        (tmp_path / "plan.csv").write_text(rows.format(last))
+        spec = load_source(Source.of(str(tmp_path / "one.yaml"), text))
+        found.append(certify(spec, Options(), memory=memory).to_json())
+        assert found[-1] == certify(spec, Options()).to_json()
+    assert found[0]["tube"] != found[1]["tube"] or found[0]["constants"] != found[1]["constants"]
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,11 @@ def plan(metric: ProvenMetric) -> Planned:
     whole = canonical(spec)
     depends_on = {key: whole[key] for key in ("system", "trajectory")}
     course = question.memory.recall("plan", depends_on, lambda: course_of(spec, task, model, report))
-    return lay(metric, knots_of(spec, course, model, room_of(metric), report))
+    room = room_of(metric)
+    knots = question.memory.recall(
+        "knots", question.ground, lambda: knots_of(spec, course, model, room, report)
+    )
+    return lay(metric, knots)
 
 
 def tube(planned: Planned) -> TubeFound | Stopped:

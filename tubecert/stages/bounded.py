@@ -29,10 +29,12 @@ from tubecert.enclosure.constant import Constant, printable_above
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import SumOfNorms
+from tubecert.expression import number_text
 from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
 from tubecert.spec import Obstacle
+from tubecert.spec.types import Hardware
 from tubecert.stages.machine import machine_of
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
@@ -116,7 +118,11 @@ def enclose(tube: TubeFound) -> Enclosed:
     fresh = replace(question.suprema(tube.plan), coordinates=tube.coordinates)
     suprema = fresh.with_radius(tube.rho, tube.sides)
     declared = _declared_in(tube.coordinates, question.declared_uncertainty)
-    constants = bound_constants(suprema, question.start, (tube.lower, tube.upper), declared)
+    constants = question.memory.recall(
+        "constants",
+        tube.ground,
+        lambda: bound_constants(suprema, question.start, (tube.lower, tube.upper), declared),
+    )
     return Enclosed(tube=tube, suprema=suprema, problem=_problem(tube, suprema, constants))
 
 
@@ -155,6 +161,25 @@ def _bounded(enclosed: Enclosed) -> Bounded:
     )
 
 
+def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
+    """What theorem H knows of the machine; the suprema in it are those of any machine with such noise and inputs.
+
+    They are computed for a specification that has nothing else of it, so that they cannot rest on what is not said.
+    """
+    question = enclosed.question
+    spec, asked = question.spec, question.spec.hardware
+    if asked is None:
+        return None
+    noise = asked.noise if isinstance(asked.noise, tuple) else ()
+    any_such = Hardware(sample_time=Fraction(1), noise=noise or Fraction(0), held=asked.held)
+    machine = question.memory.recall(
+        "machine",
+        enclosed.tube.ground | {"noise": [*map(number_text, noise)], "held": asked.held},
+        lambda: machine_of(replace(spec, hardware=any_such), enclosed.problem, enclosed.suprema, geodesics),
+    )
+    return None if machine is None else replace(machine, asked=asked)
+
+
 def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -> LimitedInput:
     """What u* does on the plan, in an input with limits."""
     low, high = limits
@@ -172,10 +197,6 @@ def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -
 def with_machine(enclosed: Enclosed) -> TubeProblem:
     """What theorem H is asked about, where nothing else is told of the tube."""
     return replace(enclosed.problem, machine=_machine(enclosed, _geodesics(enclosed)))
-
-
-def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
-    return machine_of(enclosed.question.spec, enclosed.problem, enclosed.suprema, geodesics)
 
 
 def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:
@@ -286,4 +307,9 @@ def _geodesics(enclosed: Enclosed) -> GeodesicTest:
     question, plan, suprema = enclosed.question, enclosed.tube.plan, enclosed.suprema
     model = question.model
     tube = Tube(plan, suprema.section, states=model.states, inputs=model.inputs, time=plan.time.get(TIME))
-    return unique_geodesics(suprema.fields, tube, suprema.rho, question.effort_of("geodesics"))
+    effort = question.effort_of("geodesics")
+    return question.memory.recall(
+        "geodesics",
+        enclosed.tube.ground,
+        lambda: unique_geodesics(suprema.fields, tube, suprema.rho, effort),
+    )

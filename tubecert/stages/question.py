@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
@@ -16,11 +16,24 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import Range
 from tubecert.model import ControlAffineModel, build
-from tubecert.spec import Spec
+from tubecert.records import Json
+from tubecert.spec import Spec, canonical
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options, Progress, Step
 from tubecert.trajectory import Plan
 from tubecert.verdict import Verdict
+
+# sections of the specification that say nothing of the model, the plan, the start or the tube
+_APART: Final = (
+    "name",
+    "expect",
+    "simulation",
+    "conditions",
+    "adaptation",
+    "hardware",
+    "limits",
+    "obstacles",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +55,15 @@ class Question:
     def question(self) -> Question:
         """Itself: every stage knows its question."""
         return self
+
+    @cached_property
+    def ground(self) -> dict[str, Json]:
+        """Everything that the model, the start and the tube follow from, as data; plans in files have other knots.
+
+        The whole specification but the sections that these are not made of: one that is not in `_APART` counts.
+        """
+        own = {key: value for key, value in canonical(self.spec).items() if key not in _APART}
+        return own | {"gap": str(self.options.gap), "budget": self.options.budget}
 
     @cached_property
     def model(self) -> ControlAffineModel:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from math import isfinite
 
 from tubecert.bounds.compute import Radius, least_radius
@@ -25,6 +27,8 @@ from tubecert.claims import (
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval, sqrt
+from tubecert.expression import number_text
+from tubecert.records import Json
 from tubecert.spec import Knots
 from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.question import Question, Stopped, stopped
@@ -45,6 +49,13 @@ class Planned:
     def question(self) -> Question:
         """What is asked."""
         return self.metric.question
+
+    @cached_property
+    def ground(self) -> dict[str, Json]:
+        """Everything that the tube and the constants over it follow from, as data."""
+        knots = self.plan.knots
+        texts = [] if knots is None else [*map(number_text, knots.t), *_texts((*knots.x, *knots.u))]
+        return self.question.ground | {"knots": texts}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +91,11 @@ class TubeFound:
     def plan(self) -> Plan:
         """The plan in its middle."""
         return self.planned.plan
+
+    @cached_property
+    def ground(self) -> dict[str, Json]:
+        """Everything that the constants over the tube follow from, as data."""
+        return self.planned.ground | {"shape": _shape(self.coordinates, self.rho, self.sides or ())}
 
 
 def radii(question: Question) -> tuple[Fraction, Fraction]:
@@ -124,7 +140,11 @@ def find_tube(planned: Planned, proposed: tuple[Coordinates, Proposed] | None = 
         raise ValueError("coordinates are proposed where the specification asks for them, and nowhere else")
     coordinates = None if proposed is None else proposed[0]
     suprema = replace(question.suprema(planned.plan), coordinates=coordinates)
-    radius = _radius(question, suprema, None if proposed is None else proposed[1])
+    wanted = None if proposed is None else proposed[1]
+    shape = None if wanted is None else _shape(coordinates, wanted.rho, wanted.sides)
+    radius = question.memory.recall(
+        "radius", planned.ground | {"proposed": shape}, lambda: _radius(question, suprema, wanted)
+    )
     if radius.obstacle is not None:
         return stopped(
             planned,
@@ -153,6 +173,15 @@ def find_tube(planned: Planned, proposed: tuple[Coordinates, Proposed] | None = 
         coordinates=coordinates,
         sides=radius.sides,
     )
+
+
+def _shape(coordinates: Coordinates | None, rho: Fraction, sides: tuple[Fraction, ...]) -> Json:
+    rows = None if coordinates is None else _texts(coordinates.rows)
+    return [rows, number_text(rho), *map(number_text, sides)]
+
+
+def _texts(rows: Iterable[Iterable[Fraction]]) -> list[str]:
+    return [", ".join(map(number_text, row)) for row in rows]
 
 
 def _radius(question: Question, suprema: Suprema, proposed: Proposed | None) -> Radius:
