@@ -40,7 +40,7 @@ from tubecert.conditions.theorem import Margins, Theorem
 from tubecert.conditions.verdict import Shortfall, unbounded
 from tubecert.enclosure.interval import Interval
 
-_DUST = 1e-100  # what rounding outwards makes of 0
+_DUST = 1e-9  # a share that is as good as none
 LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
 
 
@@ -599,7 +599,7 @@ THEOREM = Theorem(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What fills the level: shares of lambda dhat, each rounded up.
+    """What fills the level: shares of lambda dhat, each rounded up; 0 for less than 1e-9.
 
     `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the
     rest of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the

@@ -348,7 +348,7 @@ def largest_value(search: Search) -> float:
     one = setting_at(search.problem, search.machine, Fraction(1)).lanes()
 
     def at(x: Array) -> Lanes:
-        base = one[np.zeros(len(x), dtype=int)]
+        base = repeated(one, len(x))
         if asked.largest == "noise":
             return replace(base, nu=x)
         if asked.largest == "wind":
@@ -358,6 +358,11 @@ def largest_value(search: Search) -> float:
         return sampled_at(search.machine, base, x)
 
     return _largest(search, at, _ends(search), points=60)
+
+
+def repeated(lane: Lanes, count: int) -> Lanes:
+    """One lane, so many times."""
+    return lane[np.zeros(count, dtype=int)]
 
 
 def sampled_at(machine: Machine, base: Lanes, Ts: Array) -> Lanes:
@@ -411,7 +416,7 @@ def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
     else:
         ends = (0.5 * given, 1e2 / search.rate)
         most = max(
-            _largest(search, lambda x: sampled_at(machine, base[np.zeros(len(x), dtype=int)], x), ends, 40),
+            _largest(search, lambda x: sampled_at(machine, repeated(base, len(x)), x), ends, 40),
             given,
         )
     least = given / 16 if machine.asked.one_sample else max(given / 16, float(setting.delay), 1e-9 * most)
@@ -429,7 +434,7 @@ def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
         if machine.asked.one_sample or setting.delay <= Ts
     ]
     lanes = sampled_at(
-        machine, base[np.zeros(len(settings), dtype=int)], np.array([float(x.sample_time) for x in settings])
+        machine, repeated(base, len(settings)), np.array([float(x.sample_time) for x in settings])
     )
     choices = search.levels(lanes, rounds=3)
     found = []
