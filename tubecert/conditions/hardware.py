@@ -346,12 +346,7 @@ class Course(Generic[T]):
 
 def _supremum(D: DistanceBound[T], omega: T | None) -> T:
     """sup D; without a filter D is monotone, from d0 to A1."""
-    if omega is not None:
-        return D.supremum()
-    if D.horizon is None:
-        return maximum(D.d0, D.ultimate())
-    left, mean = exp(-D.lam * D.horizon), decay_mean(D.lam * D.horizon)
-    return maximum(D.d0, D.d0 * left + (D.beta * (D.S + D.e) + D.delta) * D.horizon * mean)
+    return maximum(D.d0, D.ultimate()) if omega is None else D.supremum()
 
 
 @quiet

@@ -31,6 +31,7 @@ _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _PREDICTIONS = 4  # steps of the fixed point of np; what is printed is verified
 _LEVELS = 24
 _ZOOMS = 12
+_LONG = 30.0  # times 1/lambda: a horizon that might as well have no end
 _TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
 _CURVE_POINTS = 13
@@ -278,14 +279,18 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     if np.isfinite(choice.dhat[0]):
         return served(search, setting, choice)
     best, nearest = search.least(at)
-    return proof_at(search, setting, printed(setting, nearest, 0.0), 1e-6) if np.isfinite(best[0]) else None
+    return (
+        proof_at(search, setting, printed(search, setting, nearest, 0.0), 1e-6)
+        if np.isfinite(best[0])
+        else None
+    )
 
 
 def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
     """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried."""
     recipe: HardwareRecipe | None = None
     for room in (1e-7, 1e-5, 1e-4, 1e-3, 1e-2):
-        own = printed(setting, choice, room)
+        own = printed(search, setting, choice, room)
         for inflation in (1e-9, 1e-6):
             recipe = proof_at(search, setting, own, inflation)
             if recipe is not None and serves(search.problem, recipe):
@@ -302,10 +307,14 @@ class Printed:
     floor: Fraction
 
 
-def printed(setting: Setting, choice: Choice, room: float) -> Printed:
-    """A choice of one lane as decimals; the level with `room` of its own."""
-    omega, bandwidth = float(choice.omega[0]), setting.bandwidth
-    if bandwidth is None and omega * float(setting.sample_time) < 0.9 * _DEADBEAT:
+def printed(search: Search, setting: Setting, choice: Choice, room: float) -> Printed:
+    """A choice of one lane as decimals; the level with `room` of its own.
+
+    Without a filter the theorem knows of no horizon: a short one asks for some bandwidth.
+    """
+    omega, bandwidth, horizon = float(choice.omega[0]), setting.bandwidth, search.problem.horizon
+    brief = horizon is not None and search.rate * float(horizon) < _LONG
+    if bandwidth is None and (brief or omega * float(setting.sample_time) < 0.9 * _DEADBEAT):
         bandwidth = round_up(omega, DIGITS)
     return Printed(
         bandwidth=bandwidth,
