@@ -8,9 +8,11 @@ from typing import Any
 
 from problems import alive
 
+from tubecert.bounds.constants import WindConstants
+from tubecert.bounds.covariant import CovariantConstants
 from tubecert.bounds.hardware import HardwareConstants
 from tubecert.conditions.machine import Machine
-from tubecert.conditions.problem import TubeProblem
+from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.enclosure.constant import Constant
 from tubecert.spec import Hardware
 
@@ -55,6 +57,30 @@ def asking(problem: TubeProblem, **values: Any) -> TubeProblem:
     """The same problem, with other hardware."""
     assert problem.machine is not None
     return replace(problem, machine=replace(problem.machine, asked=asked_of(**values)))
+
+
+COVARIANT = {
+    "drift_slope": 1.4,
+    "form_slope": 0.4,
+    "input_slope": 0.2,
+    "input_gain": 1.6,
+    "drift_metric": 3.3,
+    "curvature": 0.3,
+}
+WIND = {"push": 1.2, "size": 0.9, "explained": 0.7}
+
+
+def covariant_constants(**values: float) -> CovariantConstants:
+    """The covariant constants by name."""
+    return CovariantConstants(
+        **{name: Constant(below=x, above=x) for name, x in (COVARIANT | values).items()}
+    )
+
+
+def windy(problem: TubeProblem, bound: Fraction | None, **values: float) -> TubeProblem:
+    """The same problem, with a wind."""
+    known = {name: Constant(below=x, above=x) for name, x in (WIND | values).items()}
+    return replace(problem, wind=Wind(bound=bound, constants=WindConstants(**known)))
 
 
 def alive_machine(values: dict[str, float | None] | None = None, **asked: Any) -> TubeProblem:

@@ -30,7 +30,7 @@ _ROOM = 9  # digits of what only the proof needs
 _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _PREDICTIONS = 4  # steps of the fixed point of np; what is printed is verified
 _LEVELS = 24
-_ZOOMS = 12
+_ZOOMS = 26
 _LONG = 30.0  # times 1/lambda: a horizon that might as well have no end
 _TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
@@ -178,18 +178,18 @@ class Search:
         start = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])
         lanes = np.arange(len(at.Ts))
         points = np.repeat(start[:, None, :], len(lanes), axis=1)
-        steps = np.array([0.5 / k for k in counts])
+        steps = np.repeat(np.array([[0.5 / k] for k in counts]), len(lanes), axis=1)
         best: Array = np.full(len(lanes), np.inf)
         place = np.zeros((3, len(lanes)))
+        around = _AROUND_3 if free else _AROUND_2
         for _ in range(_ZOOMS):
             values = self.needed(at[:, None], chosen(points))
             index = np.argmin(values, axis=1)
             better = values[lanes, index] < best
             best = np.where(better, values[lanes, index], best)
             place = np.where(better, points[:, lanes, index], place)
-            around = _AROUND_3 if free else _AROUND_2
-            points = np.clip(place[:, :, None] + (steps[:, None] * around)[:, None, :], 0.0, 1.0)
-            steps = steps * 0.6
+            steps = np.where(better, steps, 0.5 * steps)
+            points = np.clip(place[:, :, None] + steps[:, :, None] * around[:, None, :], 0.0, 1.0)
         found = chosen(place[:, :, None])
         return best, Choice(dhat=found.dhat[:, 0], omega=found.omega[:, 0], f0=found.f0[:, 0])
 
@@ -289,13 +289,23 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
 def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
     """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried."""
     recipe: HardwareRecipe | None = None
-    for room in (1e-7, 1e-5, 1e-4, 1e-3, 1e-2):
-        own = printed(search, setting, choice, room)
+    for own in _near(search, setting, choice):
         for inflation in (1e-9, 1e-6):
             recipe = proof_at(search, setting, own, inflation)
             if recipe is not None and serves(search.problem, recipe):
                 return recipe
     return recipe
+
+
+def _near(search: Search, setting: Setting, choice: Choice) -> Iterator[Printed]:
+    """The choice with more and more room, what is free chosen again for each level; then what has the most of it."""
+    at = setting.lanes()
+    for room in (1e-7, 1e-5, 1e-4, 1e-3):
+        level = printed(search, setting, choice, room).level
+        _, again = search.least(at, np.array([float(level)]))
+        yield printed(search, setting, again, 0.0)
+    _, best = search.least(at)
+    yield printed(search, setting, best, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -318,7 +328,7 @@ def printed(search: Search, setting: Setting, choice: Choice, room: float) -> Pr
         bandwidth = round_up(omega, DIGITS)
     return Printed(
         bandwidth=bandwidth,
-        level=round_up(float(choice.dhat[0]) * (1 + room), DIGITS + 1),
+        level=round_up(float(choice.dhat[0]) * (1 + room) * (1 - 1e-15), DIGITS + 1),
         floor=round_up(float(choice.f0[0]), _ROOM),
     )
 
