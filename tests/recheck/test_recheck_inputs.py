@@ -5,6 +5,7 @@ import copy
 import pytest
 import tampers
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
+from systems import SMALL
 
 from tubecert.errors import TubecertError
 
@@ -236,6 +237,67 @@ def test_the_orbit_is_confirmed_and_less_is_not():
         forged = copy.deepcopy(made)
         FAULTS[fault](forged["result"])
         assert refused(forged), fault
+
+
+MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: 0.0005, feedforward: held, limits: {u: [-0.2, 0.2]}}\n"
+FAULTS_OF_H = {
+    "a bound too low": lambda r: bound(r, "hardware").update(
+        greatest=bound(r, "hardware")["greatest"] - 1e-6
+    ),
+    "a bound too high": lambda r: bound(r, "hardware").update(least=bound(r, "hardware")["least"] + 1e-6),
+    "less feedback": lambda r: bound(r, "hardware").update(feedback=0.999 * bound(r, "hardware")["feedback"]),
+    "less adaptation": lambda r: bound(r, "hardware").update(
+        adaptation=0.999 * bound(r, "hardware")["adaptation"]
+    ),
+    "no bound": lambda r: first(r)["bounds"].pop("hardware"),
+    "limits changed": lambda r: first(r).update(limits=[-0.3, 0.3]),
+    "the input dropped": lambda r: r.pop("inputs"),
+    "the range of the section, too": lambda r: (
+        bound(r, "hardware").update(greatest=0.1),
+        r["hardware"]["inputs"]["u"].__setitem__(1, 0.1),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return certified(SMALL + MACHINE, conditions="hardware")
+
+
+@pytest.mark.slow
+def test_the_range_that_H_proves_is_what_its_limits_are_compared_with(machine):
+    result = machine["result"]
+    assert result["verdict"] == "certified"
+    own = bound(result, "hardware")
+    assert [own["least"], own["greatest"]] == result["hardware"]["inputs"]["u"]
+    assert 0.1 < own["greatest"] < 0.2 < bound(result, "distance")["greatest"]
+    assert not failing(examine(machine, memory=MEMORY))
+    narrower = certified(SMALL + MACHINE.replace("0.2]", "0.15]"), conditions="hardware")["result"]
+    assert narrower["hardware"]["verdict"] == "certified"
+    assert narrower["verdict"] == "undecided"
+    assert narrower["reasons"][-1]["claim"] == "input_within_limits"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS_OF_H)
+def test_planted_faults_of_H_are_refused(machine, fault):
+    forged = copy.deepcopy(machine)
+    FAULTS_OF_H[fault](forged["result"])
+    assert refused(forged)
+
+
+@pytest.mark.slow
+def test_wind_is_a_part_of_the_distance_that_the_feedback_answers():
+    calm, windy = (
+        certified(SMALL + extra + "limits: {u: [-4, 4]}\n", conditions="0")
+        for extra in ("", 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n')
+    )
+    assert not failing(examine(windy, memory=MEMORY))
+    own, other = (bound(made["result"], "no_adaptation")["feedback"] for made in (calm, windy))
+    assert other > own * 1.01
+    forged = copy.deepcopy(windy)
+    bound(forged["result"], "no_adaptation")["feedback"] = own
+    assert refused(forged)
 
 
 @pytest.mark.slow

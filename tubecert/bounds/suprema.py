@@ -178,7 +178,7 @@ class Suprema:
             return self._constant(self._search_plan(f"range of {name}", entry, effort))
 
         least = most(-u)
-        return Constant(below=-least.above, above=-least.below, at=least.at), most(u)
+        return Constant(below=0.0 - least.above, above=0.0 - least.below, at=least.at), most(u)  # no -0.0
 
     # -- uncertainty -------------------------------------------------------------------------------------------
 

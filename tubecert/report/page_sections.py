@@ -214,7 +214,7 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
 
 def _inputs(result: Result) -> Iterator[Block]:
     loops: list[tuple[InputData, str | None]] = [
-        (own, key) for own in result.inputs for key in ((*own.bounds,) or (None,))
+        (own, key) for own in result.inputs for key in ([key for key in NAMES if key in own.bounds] or [None])
     ]
     columns = ("input", "limits", "verdict", "on the plan", "loop of", "stays within", "used")
     yield Table(
