@@ -213,9 +213,7 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
 
 
 def _inputs(result: Result) -> Iterator[Block]:
-    loops: list[tuple[InputData, str | None]] = [
-        (own, key) for own in result.inputs for key in ([key for key in NAMES if key in own.bounds] or [None])
-    ]
+    loops = [(own, key) for own in result.inputs for key in _loops(own)]
     columns = ("input", "limits", "verdict", "on the plan", "loop of", "stays within", "used")
     yield Table(
         columns=(*columns, "feedback", "adaptation"),
@@ -224,6 +222,12 @@ def _inputs(result: Result) -> Iterator[Block]:
         "most. Used: 0 % in the middle of the limits, 100 % at one of them. The verdict is about the loops that "
         "decide.",
     )
+
+
+def _loops(own: InputData) -> list[str | None]:
+    """The kinds that bound an input, in their order; one row without any if there is none."""
+    found: list[str | None] = [key for key in NAMES if key in own.bounds]
+    return found or [None]
 
 
 def _input_row(result: Result, own: InputData, key: str | None) -> tuple[Cell, ...]:
