@@ -8,7 +8,7 @@ from fractions import Fraction
 from tubecert.recheck.document import Node
 from tubecert.recheck.specified.numbers import Rows, positive, square
 
-_DECIDES = ("0", "A", "B", "C", "all")
+_DECIDES = ("0", "A", "B", "C", "H", "all")
 
 
 @dataclass(frozen=True, slots=True)
