@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import tubecert
 from tubecert import lint, spec
-from tubecert.bounds.constants import EVERY
+from tubecert.bounds.meanings import EVERY
 from tubecert.checking import expectations
 from tubecert.cli.app import app
 from tubecert.cli.everyday import Schema, Template

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tubecert
-from tubecert.bounds.constants import EVERY
+from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.sections import assumptions
 from tubecert.claims import UncertaintyAsGiven
 from tubecert.model import build

@@ -20,7 +20,7 @@ from problems import margins_26, problem_of
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
-from tubecert.bounds.constants import EVERY
+from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims import Assumption
 from tubecert.cli.app import app

@@ -14,7 +14,7 @@ from tubecert.enclosure.constant import Constant, Witness
 
 Side = Literal["below", "above"]
 
-__all__ = ["EVERY", "TABLE", "BoundConstants", "Constant", "Meaning", "WindConstants", "Witness"]
+__all__ = ["TABLE", "BoundConstants", "Constant", "Meaning", "WindConstants", "Witness"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,6 +218,3 @@ DERIVED: dict[str, Meaning] = {
         ("zeta_3", "zeta3", "conditions:zeta_3", "1", "effect of the state-dependence of h in (26b)"),
     )
 }
-
-EVERY: dict[str, Meaning] = {**TABLE, **WIND, **DERIVED}
-"""All that a certificate may list, by name."""

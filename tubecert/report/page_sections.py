@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from tubecert.bounds.constants import EVERY
+from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
 from tubecert.kinds import HARDWARE
 from tubecert.report import console, sections

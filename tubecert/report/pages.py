@@ -102,7 +102,7 @@ def equations() -> Mapping[str, EquationPage]:
 @cache
 def constants() -> Mapping[str, ConstantPage]:
     """The pages of the constants, by their names in a certificate."""
-    from tubecert.bounds.constants import EVERY
+    from tubecert.bounds.meanings import EVERY
 
     data = _data("constants")
     return {

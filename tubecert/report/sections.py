@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tubecert.bounds.constants import EVERY
+from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
 from tubecert.claims import Reason
 from tubecert.enclosure.constant import Witness

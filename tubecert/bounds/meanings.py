@@ -1,0 +1,8 @@
+"""What every constant of a certificate is, by its name there."""
+
+from __future__ import annotations
+
+from tubecert.bounds import hardware
+from tubecert.bounds.constants import DERIVED, TABLE, WIND, Meaning
+
+EVERY: dict[str, Meaning] = {**TABLE, **WIND, **hardware.TABLE, **DERIVED}
