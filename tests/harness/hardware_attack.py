@@ -1,0 +1,139 @@
+"""Attacks on certificate H: at its own numbers nothing may break, at several times these the bounds have to.
+
+    python tests/harness/hardware_attack.py                   10 000 runs of every row, hours
+    python tests/harness/hardware_attack.py --runs 200        minutes
+    python tests/harness/hardware_attack.py --rows noise wind --scales 1 4
+
+A row is a specification with its hardware. "scale s": sample time, delay, noise and wind times s at the same bandwidth,
+compared with the bounds that are certified for s = 1. Shares above 1 are broken bounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from tubecert import pipeline
+from tubecert.simulate.campaign import Attack, simulate
+from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
+from tubecert.spec import load_text
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+QUANTITIES = ("distance", "estimate", "sigma_error", "k", "speed")
+WIND = "disturbance: {E: [[1, 0], [0, 1]], bound: 1/20}\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A configuration, and what is added to it."""
+
+    config: str
+    hardware: str
+    wind: str = ""
+    duration: str = "3"
+
+
+ROWS = {
+    "clean": Row("two_state_orbit", "{sample_time: 1/1000, delay: 0}"),
+    "late": Row("two_state_orbit", "{sample_time: 1/1000, delay: 1/1000}"),
+    "noise": Row("two_state_orbit", "{sample_time: 1/1000, delay: 0, noise: 1/1000}"),
+    "wind": Row("two_state_orbit", "{sample_time: 1/1000, delay: 0}", WIND),
+    "all": Row("two_state_orbit", "{sample_time: 1/1000, delay: 1/2000, noise: 1/1000}", WIND),
+    "predicts": Row(
+        "two_state_orbit", "{sample_time: 1/1000, delay: 1/1000, noise: 1/1000, feedback: predicted}", WIND
+    ),
+    "two rates": Row(
+        "two_state_orbit", "{sample_time: 1/500, delay: 1/2000, noise: 1/10000, feedback_time: 1/1000}"
+    ),
+    "transfer": Row("two_state", "{sample_time: 1/2000, delay: 1/4000, noise: 1/2000}"),
+    "curved": Row("three_state", "{sample_time: 1/200, delay: 0, noise: 1/10000}", duration="6"),
+}
+
+
+def certified(row: Row) -> tuple[Setting, Loop]:
+    """The setting of a row and its certified loop."""
+    text = (CONFIGS / f"{row.config}.yaml").read_text("utf-8")
+    spec = load_text(f"{text}\nhardware: {row.hardware}\n{row.wind}")
+    setting = setting_of(
+        spec, pipeline.certify(spec, pipeline.Options(conditions="hardware")), Fraction(row.duration)
+    )
+    return setting, loop_of(setting, "hardware", Choice())
+
+
+def scaled(setting: Setting, loop: Loop, scale: float) -> tuple[Setting, Loop]:
+    """The same with every number of the hardware times `scale`, but for the bandwidth; the promise is the old one."""
+    kind, machine = setting.on_machine, loop.problem.machine
+    assert kind is not None
+    assert kind.sources is not None
+    assert machine is not None
+    sources = replace(kind.sources, table=scale * kind.sources.table, wind=scale * kind.sources.wind)
+    slower = replace(
+        machine,
+        sample_time=scale * machine.sample_time,
+        delay=scale * machine.delay,
+        feedback_time=machine.feedback_time and scale * machine.feedback_time,
+    )
+    problem = replace(loop.problem, machine=slower)
+    return replace(setting, on_machine=replace(kind, sources=sources)), replace(loop, problem=problem)
+
+
+def attacked(setting: Setting, loop: Loop, count: int, seed: int) -> Attack:
+    """Random runs and an adversary."""
+    (found,) = simulate(setting, [loop], count=count, seed=seed).attacks
+    return found
+
+
+def shares(found: Attack) -> dict[str, float]:
+    """The largest share of every bound that was met."""
+    most: dict[str, float] = {}
+    for comparison in (found.comparison, found.worst_comparison):
+        assert comparison is not None
+        for name, use in comparison.uses.items():
+            if name in QUANTITIES:
+                most[name] = max(most.get(name, 0.0), use.share or 0.0)
+        for own in comparison.inputs:
+            assert own.proven is not None
+            middle, half = sum(own.proven) / 2, (own.proven[1] - own.proven[0]) / 2
+            used = max(own.greatest - middle, middle - own.least) / half
+            most["u"] = max(most.get("u", 0.0), used)
+    return most
+
+
+def _broken(found: Attack) -> Iterator[str]:
+    for comparison in (found.comparison, found.worst_comparison):
+        assert comparison is not None
+        yield from (item.name for item in comparison.violations)
+        if comparison.unreliable:
+            yield f"{len(comparison.unreliable)} without result"
+
+
+def main() -> None:
+    """Prints one line for each row and scale; the exit code is 1 where a bound breaks at scale 1."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--few", type=int, default=100, help="runs at the other scales")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rows", nargs="*", default=list(ROWS))
+    parser.add_argument("--scales", nargs="*", type=float, default=[1, 2, 4, 10])
+    asked = parser.parse_args()
+    print(f"{'row':10} {'scale':>5} {'runs':>6} " + " ".join(f"{name:>11}" for name in (*QUANTITIES, "u")))
+    failed = False
+    for name in asked.rows:
+        setting, loop = certified(ROWS[name])
+        for scale in asked.scales:
+            started, count = time.perf_counter(), asked.runs if scale == 1 else min(asked.few, asked.runs)
+            found = attacked(*scaled(setting, loop, scale), count, asked.seed)
+            most, broken = shares(found), sorted(set(_broken(found)))
+            failed = failed or (scale == 1 and bool(broken))
+            row = " ".join(f"{most.get(q, 0.0):11.4f}" for q in (*QUANTITIES, "u"))
+            line = f"{name:10} {scale:5g} {count:6} {row}  {time.perf_counter() - started:.0f} s"
+            print(f"{line}  {'BROKEN: ' + ', '.join(broken) if broken else ''}", flush=True)
+    raise SystemExit(int(failed))
+
+
+if __name__ == "__main__":
+    main()
