@@ -44,10 +44,10 @@ ROWS = {
     "wind": Row("two_state_orbit", "{sample_time: 1/1000, delay: 0}", WIND),
     "all": Row("two_state_orbit", "{sample_time: 1/1000, delay: 1/2000, noise: 1/1000}", WIND),
     "predicts": Row(
-        "two_state_orbit", "{sample_time: 1/1000, delay: 1/1000, noise: 1/1000, feedback: predicted}", WIND
+        "two_state_orbit", "{sample_time: 1/1000, delay: 1/1000, noise: 1/1000, predict: true}", WIND
     ),
     "two rates": Row(
-        "two_state_orbit", "{sample_time: 1/500, delay: 1/2000, noise: 1/10000, feedback_time: 1/1000}"
+        "two_state_orbit", "{sample_time: 1/500, delay: 1/2000, noise: 1/10000, feedback_rate: 1000}"
     ),
     "transfer": Row("two_state", "{sample_time: 1/2000, delay: 1/4000, noise: 1/2000}"),
     "curved": Row("three_state", "{sample_time: 1/200, delay: 0, noise: 1/10000}", duration="6"),
