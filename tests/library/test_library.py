@@ -171,6 +171,13 @@ def test_floats_in_expressions_stand_for_their_shortest_decimals():
     assert spec == tc.specification(changed(system__f=["v", f"-{inverse!r}*p - {third!r}*v"]))
 
 
+def test_a_matrix_of_one_column_is_a_vector():
+    p, v = sympy.symbols("p v")
+    for f in (sympy.Matrix([v, -p - v]), sympy.Matrix([[v, -p - v]]), np.array([[v], [-p - v]])):
+        assert tc.specification(changed(system__f=f, system__B=sympy.Matrix([0, 1]))) == tc.load(DATA)
+    refused("TC107", tc.specification, changed(system__B=np.array([0, 1])))
+
+
 def test_numbers_of_every_library_are_exact():
     for value, text in (
         (np.int64(3), "3"),
@@ -451,6 +458,19 @@ def test_a_simulation(tmp_path):
     assert "not falsified" in found._repr_html_()
 
 
+def test_a_plan_in_a_file_is_looked_for_beside_its_specification(tmp_path, monkeypatch):
+    (tmp_path / "there").mkdir()
+    monkeypatch.chdir(tmp_path / "there")
+    Path("plan.csv").write_text("t,p,v,u\n0,0,0,0\n4,0,0,0\n", encoding="utf-8")
+    plan = {"kind": "csv", "file": "plan.csv", "interpolation": "linear", "horizon": 4}
+    tc.certify(changed(trajectory=plan), bandwidth=50, adaptation_rate=1e9).save("x.json")
+    assert tc.read("x.json").specification == tc.load(changed(trajectory=plan))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(tc.SpecError, match="spec=") as caught:
+        tc.simulate("there/x.json")
+    assert "plan.csv" in str(caught.value)
+
+
 def test_a_simulation_is_refused():
     refused("TC112", tc.simulate, certified(), controllers="l2")
     refused("TC112", tc.simulate, certified(), gains="Z")
@@ -471,6 +491,10 @@ def test_texts_are_escaped_in_notebooks(tmp_path):
         assert "<script" not in html
     assert "m&lt;b&gt;" in result._repr_html_()
     assert "&lt;script&gt;" in tc.verify(DATA, metric)._repr_html_()
+    assert '<b class="certified">certified</b> <b>given in code</b>: rate' in (
+        tc.verify(DATA, DATA["metric"])._repr_html_()
+    )
+    assert "noise or delay" in result._repr_html_()  # what it assumes is not hidden
     framed = tc.report(result)._repr_html_()
     assert framed.startswith("<iframe srcdoc=")
     assert framed.count('"') == 6  # nothing ends the attribute

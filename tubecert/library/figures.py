@@ -122,14 +122,19 @@ def _tube(axes: Axes, result: Result, chosen: Plane) -> None:
     if chosen.rho is None or not chosen.plan:
         return
     proven = result.tube is not None and result.tube.rho_r is not None
-    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
-    outline = chosen.rho * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    if chosen.sides is not None:
-        outline = np.clip(outline, -np.array(chosen.sides), chosen.sides)
-    sections = [outline + point for point in _along(np.array(chosen.plan))]
+    sections = [_outline(chosen.rho, chosen.sides) + point for point in _along(np.array(chosen.plan))]
     color, label = (TUBE, "tube") if proven else (UNPROVEN, "tube, not proven to stay in the safe set")
     drawn = PolyCollection(sections, facecolors=color, edgecolors="none", zorder=1, label=label)
     axes.add_collection(drawn, autolim=False)
+
+
+def _outline(rho: float, sides: tuple[float, float] | None) -> Array:
+    """A disc, cut to a box; the corners of the box where the disc covers it."""
+    if sides is not None and np.hypot(*sides) <= rho * (1 + 1e-9):
+        return np.array([[a * sides[0], b * sides[1]] for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
+    disc = rho * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return disc if sides is None else np.clip(disc, -np.array(sides), sides)
 
 
 def _along(plan: Array) -> Array:

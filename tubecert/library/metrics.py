@@ -120,7 +120,7 @@ class SynthesisedMetric(_Held):
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_line(str(self), self.verdict, _rows(self.dual_metric))
+        return notebook.of_line(str(self), self.given.name, self.verdict, _rows(self.dual_metric))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -171,7 +171,7 @@ class VerifiedMetric(_Held):
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_line(str(self), self.verdict)
+        return notebook.of_line(str(self), self.name, self.verdict)
 
 
 MetricLike: TypeAlias = File | SynthesisedMetric | VerifiedMetric | Data

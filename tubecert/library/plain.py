@@ -25,6 +25,17 @@ Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
 Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
 _DEEPEST: Final = 60  # the reader of specifications refuses less
 _LARGEST: Final = 10**4000  # what has more digits is refused by Python, and by the reader
+_VECTORS: Final = (  # keys for which a matrix with one column, or one row, stands for its entries
+    "system.f",
+    "uncertainty.h",
+    "trajectory.x",
+    "trajectory.u",
+    "trajectory.at",
+    "trajectory.input",
+    "trajectory.start",
+    "trajectory.target",
+    "initial_state.at",
+)
 _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
 
 
@@ -87,11 +98,26 @@ def _plain(value: object, path: str, depth: int) -> Plain:
     if (text := _number(value)) is not None:
         return text
     if isinstance(value, _Array):
-        return _plain(value.tolist(), path, depth + 1)
+        found = _plain(value.tolist(), path, depth + 1)
+        return _vector(found) if path in _VECTORS else found
     if isinstance(value, _Expression):
         return _expression(value, path)
     return _refuse(
         path, f"{_shown(value)} has no place in a specification", "give a text, a number, a list or a mapping"
+    )
+
+
+def _vector(value: Plain) -> Plain:
+    """The entries of a matrix with one column or one row; anything else as it is."""
+    if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
+        return value
+    rows = [row for row in value if isinstance(row, list)]
+    return (
+        [row[0] for row in rows]
+        if all(len(row) == 1 for row in rows)
+        else rows[0]
+        if len(rows) == 1
+        else value
     )
 
 

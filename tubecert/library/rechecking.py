@@ -57,7 +57,9 @@ class Rechecked:
         details = (
             [] if failing is None else [("first failing claim", f"{failing.name}: {failing.outcome.why}")]
         )
-        return notebook.of_line(str(self), self.verdict, [*details, ("claims", str(len(self.claims)))])
+        return notebook.of_line(
+            str(self), self.name, self.verdict, [*details, ("claims", str(len(self.claims)))]
+        )
 
 
 def recheck(

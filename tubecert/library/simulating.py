@@ -125,7 +125,7 @@ class Simulation:
         style = "falsified" if self.falsified else ""
         reach, attacks = self.campaign.setting.reach, self.campaign.attacks
         rows = [(item.loop.controller, f"largest d/dbar {item.greatest / reach:.4g}") for item in attacks]
-        return notebook.of_line(str(self), style, rows)
+        return notebook.of_line(str(self), self.campaign.setting.spec.name, style, rows)
 
 
 def simulate(
@@ -167,13 +167,23 @@ def simulate(
     from tubecert.simulate.certified import adopted, require_plan, require_tube
 
     found = result if isinstance(result, Certification) else read(result)
-    system = found.specification.spec if spec is None else spec_of(spec)
+    system = _specification(found) if spec is None else spec_of(spec)
     require_plan(system)
     system = adopted(system, found.result)
     require_tube(found.result)
     wishes = wishes_of(system, numbers, chosen, gains)
     campaign = campaign_of(system, found.result, wishes, None if progress is None else _told(progress))
     return Simulation(campaign=campaign, compared_with=found.hash)
+
+
+def _specification(found: Certification) -> Spec:
+    """What was certified; raises `SpecError` if the certificate does not say all of it."""
+    try:
+        return found.specification.spec
+    except SpecError as error:
+        help = "give the specification: simulate(result, spec=...)"
+        message = "the certificate alone does not say what to simulate"
+        raise SpecError([*error.findings, Finding(code="TC100", message=message, help=help)]) from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

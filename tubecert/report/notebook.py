@@ -12,17 +12,19 @@ from typing import Any
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.result import Certificate, Result
+from tubecert.printable import visible
 from tubecert.report import console, sections
 from tubecert.report.html import environment
 from tubecert.report.page import Cell, Table
 from tubecert.report.page_origin import equations
 from tubecert.report.page_sections import gains_table, not_certified
 from tubecert.verdict import Verdict
+from tubecert.words.assumptions import assumed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """A verdict (`style` is how it looks), what it is about, a sentence, and tables."""
+    """A verdict (`style` is how it looks), what it is about, a sentence, tables, and what is assumed."""
 
     verdict: str
     name: str
@@ -30,6 +32,7 @@ class Card:
     summary: str = ""
     meaning: str = ""
     tables: Sequence[Table] = ()
+    assumptions: Sequence[str] = ()
 
 
 def render(card: Card) -> str:
@@ -37,10 +40,9 @@ def render(card: Card) -> str:
     return environment().get_template("card.html").render(card=card)
 
 
-def of_line(line: str, style: str, details: Sequence[tuple[str, str]] = ()) -> str:
+def of_line(line: str, name: str, style: str, details: Sequence[tuple[str, str]] = ()) -> str:
     """The card of a verdict line (`certified NAME: what follows`), with names and values below it."""
-    start, _, summary = line.partition(": ")
-    verdict, _, name = start.rpartition(" ")
+    verdict, _, summary = line.partition(f" {visible(name)}: ")
     rows = tuple((Cell(text=what), Cell(text=value)) for what, value in details)
     tables = [Table(columns=("", ""), rows=rows)] if rows else []
     return render(Card(verdict=verdict, name=name, style=style, summary=summary, tables=tables))
@@ -63,6 +65,7 @@ def certificate(certificate: Certificate) -> str:
             summary=console.verdict_line(result).plain.partition(": ")[2],
             meaning=console.meaning(result).plain,
             tables=tables,
+            assumptions=tuple(map(assumed, result.assumptions)),
         )
     )
 
