@@ -6,45 +6,20 @@ B. Out: `CovariantConstants`, each an enclosure. Trusted: yes. Implements: theor
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
-from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
-from tubecert.bounds.hardware import HardwareSuprema, entry
+from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.hardware import HardwareSuprema
+from tubecert.bounds.machines import COVARIANT as TABLE
+from tubecert.bounds.machines import CovariantConstants
 from tubecert.bounds.suprema import Suprema, substituted
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.covariant import Geometry
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CovariantConstants:
-    """What takes the place of coordinate derivatives where the metric is not constant, each an enclosure."""
-
-    drift_slope: Constant = field(
-        metadata=entry("D_nX", "1/s", "sup of the covariant derivative of f + B u*, in the metric")
-    )
-    form_slope: Constant = field(
-        metadata=entry("D_nF", "1/(d s)", "sup of the covariant derivative of F, in the metric")
-    )
-    input_slope: Constant = field(
-        metadata=entry("D_nb", "1/(u s)", "sup on the plan of the covariant derivatives of the columns of B")
-    )
-    input_gain: Constant = field(metadata=entry("beta_O", "d/(u s)", "sup of |Theta B| over the tube"))
-    drift_metric: Constant = field(metadata=entry("phi_M", "d/s", "sup of |Theta (f + B u*)| over the tube"))
-    curvature: Constant = field(metadata=entry("K_R", "1/d^2", "sup of the |curvature| of the metric"))
-
-    def printable(self) -> CovariantConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return replace(self, **{name: value.printable() for name, value, _ in self.items()})
-
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of every constant, in the order of the table."""
-        return [(name, getattr(self, name), meaning) for name, meaning in TABLE.items()]
-
-
-TABLE: dict[str, Meaning] = table_of(fields(CovariantConstants))
+__all__ = ["TABLE", "CovariantConstants", "CovariantSuprema", "covariant_constants"]
 
 
 def covariant_constants(suprema: Suprema, known: BoundConstants) -> CovariantConstants | None:

@@ -8,7 +8,7 @@ it is Theta = L^-T and F~ = L^-T F L^-1. Trusted: yes. Implements: theory 8.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -16,7 +16,9 @@ from itertools import product as choices
 
 import numpy as np
 
-from tubecert.bounds.constants import BoundConstants, Constant, Meaning, table_of
+from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.machines import HARDWARE as TABLE
+from tubecert.bounds.machines import HardwareConstants
 from tubecert.bounds.suprema import Suprema, substituted
 from tubecert.bounds.wind import joined
 from tubecert.coordinates import Coordinates
@@ -48,59 +50,7 @@ _NEGLIGIBLE = 1e-3  # of what a constant is added to
 Box = tuple[tuple[Fraction, Fraction], ...]
 
 
-def entry(symbol: str, unit: str, words: str) -> dict[str, Meaning]:
-    """The registry entry of a constant; in formulas it has its symbol for a name."""
-    return {"meaning": Meaning(symbol=symbol, equation="theory 8", unit=unit, words=words, number=symbol)}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HardwareConstants:
-    """Every constant of certificate H that A, B and C do not have, each an enclosure; None where it does not apply.
-
-    One unit of noise is |n| <= 1, or |n_i| <= what is given for state i.
-    """
-
-    feedback_slope: Constant = field(metadata=entry("D_F", "1/s", "sup |F~|, both signs of its eigenvalues"))
-    feedback_curvature: Constant = field(
-        metadata=entry("D_Fx", "1/(x s)", "how much F~ changes per distance that a geodesic is moved")
-    )
-    plan_tilt: Constant = field(
-        metadata=entry(
-            "D_cx", "1/(u s)", "how much B'M changes per distance that the plan moves, in the metric"
-        )
-    )
-    plan_speed: Constant = field(metadata=entry("Ystar", "x/s", "sup |x*'|"))
-    drift_difference: Constant = field(
-        metadata=entry("phi_rel", "x/s", "sup |f + B u* at x, less the same at x*|")
-    )
-    drift_difference_metric: Constant | None = field(
-        metadata=entry("phi_relM", "d/s", "sup |Theta (f(x) - f(x*))|, for constant M and B")
-    )
-    drift_slope_metric: Constant | None = field(
-        metadata=entry("D_A", "1/s", "sup |Theta f_x Theta^-1|, for constant M and B")
-    )
-    drift_explained: Constant = field(
-        metadata=entry("D_pf", "u/x", "sup |B^+ f_x|: how the drift between two samples enters the estimate")
-    )
-    noise_size: Constant = field(metadata=entry("n_E", "x", "size of one unit of noise"))
-    noise_metric: Constant = field(metadata=entry("n_M", "d", "sup |Theta n| over one unit of noise"))
-    noise_explained: Constant = field(metadata=entry("n_B", "u s", "sup |B^+ n| over one unit of noise"))
-    input_rate: Constant | None = field(
-        metadata=entry("Lus", "u/s", "Lipschitz constant of u*, if u* is held from sample to sample")
-    )
-    symbols: Constant = field(metadata=entry("G", "1/x", "sup of the norm of the Christoffel symbols"))
-    symbols_slope: Constant = field(metadata=entry("L_G", "1/x^2", "sup of the norm of their derivatives"))
-
-    def printable(self) -> HardwareConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return replace(self, **{name: value.printable() for name, value, _ in self.items()})
-
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of every constant that applies, in the order of the table."""
-        return [(name, value, TABLE[name]) for name in TABLE if (value := getattr(self, name)) is not None]
-
-
-TABLE: dict[str, Meaning] = table_of(fields(HardwareConstants))
+__all__ = ["TABLE", "HardwareConstants", "HardwareSuprema", "clip_box", "corners", "hardware_constants"]
 
 
 def hardware_constants(
