@@ -150,7 +150,12 @@ def _sections(comparison: Comparison, *, all_of_it: bool) -> Iterator[Section]:
 
 def _matters(quantity: Quantity) -> bool:
     """Whether it is shown at a glance."""
-    return bool(quantity.role and not quantity.share) or quantity.name == "verdict" or not quantity.section
+    return (
+        bool(quantity.role and not quantity.share)
+        or quantity.name == "verdict"
+        or quantity.name.endswith("radius")
+        or not quantity.section
+    )
 
 
 def _quantity(comparison: Comparison, quantity: Quantity) -> tuple[Cell, ...]:

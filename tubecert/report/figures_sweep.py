@@ -47,7 +47,7 @@ def _shown(table: SweepTable) -> list[Quantity]:
     found: dict[tuple[str, str], Quantity] = {}
     for each in table.columns:
         values = {value for row in table.rows if (value := _value(row, each)) is not None}
-        chosen = each.role or each.name == "ultimate_radius" or not each.section
+        chosen = each.role or each.name.endswith("radius") or not each.section
         if not chosen or each.share or each.name in _PARTS or len(values) < 2:
             continue
         place = each.section, each.name
