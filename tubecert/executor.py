@@ -1,4 +1,4 @@
-"""Who does independent pieces of work: this process, or several.
+"""Who does independent pieces of work: this process, several, or a cluster.
 
 `map` gives the results in the order of the items, whichever is ready first. An exception of a piece is raised, a worker
 that dies is a `WorkerError`; after either, and after an interruption, no worker is left. Functions, items and results
@@ -17,6 +17,7 @@ from typing import Protocol, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+_PATIENCE = 30  # s until a scheduler answers and has a worker
 Ready = Callable[[], None] | None
 
 
@@ -74,6 +75,51 @@ class Processes:
             for worker in set(multiprocessing.active_children()) - before:
                 worker.terminate()
                 worker.join()
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """At the same time, by the workers of a Dask cluster that runs already; needs the extra `cluster`.
+
+    A piece whose worker is lost is given to another one. Workers have the same version of tubecert, and what functions
+    name in the file system is there for them.
+    """
+
+    address: str
+
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
+        """The results, in the order of the items. Raises `WorkerError` where the cluster cannot do it."""
+        from distributed import Client, as_completed
+        from distributed.scheduler import KilledWorker
+
+        try:
+            with Client(self.address, timeout=_PATIENCE, set_as_default=False) as client:
+                client.wait_for_workers(1, timeout=_PATIENCE)
+                tasks = client.map(function, items, pure=False)
+                for task in as_completed(tasks, loop=client.loop):
+                    task.result()
+                    if ready is not None:
+                        ready()
+                found: list[R] = client.gather(tasks)
+                return found
+        except KilledWorker as error:
+            message = (
+                f"workers of {self.address} were lost again and again at the same piece of work: {error}"
+            )
+            raise WorkerError(message) from None
+        except (OSError, TimeoutError) as error:
+            raise WorkerError(f"no cluster with workers at {self.address}: {error}") from None
+
+    def versions(self, function: Callable[[], R]) -> list[R]:
+        """What a function says on each worker. Raises `WorkerError`."""
+        from distributed import Client
+
+        try:
+            with Client(self.address, timeout=_PATIENCE, set_as_default=False) as client:
+                client.wait_for_workers(1, timeout=_PATIENCE)
+                return list(client.run(function).values())
+        except (OSError, TimeoutError) as error:
+            raise WorkerError(f"no cluster with workers at {self.address}: {error}") from None
 
 
 def chosen(workers: int, pieces: int) -> Executor:

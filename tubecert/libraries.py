@@ -1,4 +1,4 @@
-"""The libraries: which of them a result can depend on, and which only show it.
+"""The libraries: which of them a result can depend on, which only run or show it.
 
 What runs is recorded with every certificate, and names what a cache keeps; both read it here.
 """
@@ -22,6 +22,7 @@ DECIDING: Final = (
     "numba",
     "llvmlite",
 )
+RUNNING: Final = ("distributed",)  # decides who computes, never what
 SHOWING: Final = ("typer", "rich", "jinja2", "matplotlib")
 
 

@@ -66,6 +66,7 @@ HEAVY = {
     "jinja2",
     "flint",
     "numba",
+    "distributed",
 }
 ALLOWED_AT_START = {"typer"}
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "sympify", "safe_load", "unsafe_load", "full_load", "load_all"}

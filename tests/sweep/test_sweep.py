@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from tubecert import pipeline
 from tubecert.cli.app import app
 from tubecert.errors import SpecError, TargetError
-from tubecert.executor import Serial
+from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.pipeline import Options
 from tubecert.report.figures_sweep import sweep_figures
 from tubecert.report.sweep import SweepTable, can_write_parquet
@@ -308,3 +308,26 @@ def test_parquet_says_what_it_needs(done, tmp_path):
     assert table["tube.epsilon"].to_pylist() == [0.2, 0.4, 1.2, -1.0]
     assert table["rho"].to_pylist()[:2] == [float(row["rho"]) for row in rows[:2]]
     assert table["rho"].to_pylist()[3] is None
+
+
+@pytest.mark.parametrize(
+    ("there", "others", "said"),
+    [
+        (None, [], "--scheduler needs distributed"),
+        ("spec", [{"numpy": "0"}], "have other versions of"),
+        ("spec", WorkerError("no cluster with workers at a"), "no cluster with workers at a"),
+    ],
+)
+def test_a_cluster_that_could_find_other_results_is_refused(tmp_path, monkeypatch, there, others, said):
+    def asked(self, function):
+        if isinstance(others, WorkerError):
+            raise others
+        return [function() | each for each in others]
+
+    monkeypatch.setattr("tubecert.cli.sweep.importlib.util.find_spec", lambda name: there)
+    monkeypatch.setattr(Cluster, "versions", asked)
+    spec = tmp_path / "one.yaml"
+    spec.write_text(ONE, encoding="utf-8")
+    done = run("sweep", spec, *OVER, "--scheduler", "a", "-o", tmp_path / "out")
+    assert (done.exit_code, said in " ".join(done.output.split())) == (2, True), done.output
+    assert not (tmp_path / "out").exists()

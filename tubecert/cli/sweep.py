@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import PARAMETER, settings_of
 from tubecert.errors import ExitCode, SpecError
-from tubecert.executor import chosen
+from tubecert.executor import Cluster, WorkerError, chosen
 from tubecert.files import replace
 from tubecert.findings import Finding
+from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json, visible
 from tubecert.records import exact_json
@@ -47,6 +49,7 @@ class Given:
     gap: str
     budget: str | None
     jobs: str
+    scheduler: str | None
     parquet: bool
     folder: str | None
 
@@ -64,11 +67,15 @@ def run(given: Given, output: Output) -> ExitCode:
         raise SpecError([Finding(code="TC122", message=message, help=help)])
     source = read_source(given.spec)
     folder = Path(given.folder or f"{Path(given.spec).stem}.sweep")
+    cluster = None if given.scheduler is None else _cluster(given.scheduler)
+    folder = folder if cluster is None else folder.resolve()
     task = Task(path=source.file, text=source.text, fixed=fixed, options=options, folder=folder)
     sweep = Sweep.of(task, axes)
+    if cluster is not None:
+        _require_paths(sweep)
     terminal = Terminal.stderr(color=output.color)
     with progress.counted(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        sweep.run(chosen(jobs or 1, len(sweep.points)), report)
+        sweep.run(cluster or chosen(jobs or 1, len(sweep.points)), report)
     table = told.SweepTable.of(Path(source.file).stem, axes, sweep.outcomes())
     files = write(folder, table, parquet=given.parquet)
     data = printable_json(json.dumps(_rows(table), indent=1, ensure_ascii=False)) + "\n"
@@ -112,6 +119,38 @@ def _options(given: Given, numbers: Numbers) -> pipeline.Options:
         gap=gap or default.gap,
         budget=budget or default.budget,
     )
+
+
+def _cluster(address: str) -> Cluster:
+    """The cluster at an address; raises `SpecError` if there is none, or if its workers could find other results."""
+    if importlib.util.find_spec("distributed") is None:
+        message = "--scheduler needs distributed"
+        help = "install tubecert with its extra: pip install 'tubecert[cluster]'"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
+    cluster, own = Cluster(address), versions()
+    try:
+        others = cluster.versions(versions)
+    except WorkerError as error:
+        help = "start one: dask scheduler, then dask worker ADDRESS on each machine"
+        raise SpecError([Finding(code="TC122", message=visible(str(error)), help=help)]) from None
+    other = {name for each in others for name in {*own, *each} if own.get(name) != each.get(name)}
+    if other:
+        message = f"workers of {visible(address)} have other versions of {', '.join(sorted(other))}"
+        help = "what comes out must not depend on who computes it: install the same everywhere"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
+    return cluster
+
+
+def _require_paths(sweep: Sweep) -> None:
+    """Raises `SpecError` where workers, whose folder is another, would look for files that are not there."""
+    read = sweep.first().trajectory.table is not None
+    metric = sweep.task.options.metric
+    if (read and not Path(sweep.task.path).is_absolute()) or (
+        metric is not None and not metric.is_absolute()
+    ):
+        message = "workers of a cluster read the plan file or the metric file in folders of their own"
+        help = "give the specification, and --metric, by paths from the root that are the same everywhere"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
 
 
 def _axes(words: Sequence[str]) -> list[Axis]:

@@ -59,6 +59,13 @@ def sweep(
     gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
     budget: Budget = None,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Points certified at a time.")] = "1",
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Certify on a running Dask cluster (extra: tubecert[cluster]), not in --jobs.",
+        ),
+    ] = None,
     parquet: Annotated[
         bool,
         typer.Option(
@@ -86,6 +93,7 @@ def sweep(
             gap=gap,
             budget=budget,
             jobs=jobs,
+            scheduler=scheduler,
             parquet=parquet,
             folder=output,
         )

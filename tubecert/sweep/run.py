@@ -40,7 +40,7 @@ class Sweep:
 
     def run(self, executor: Executor, told: Told | None = None) -> None:
         """Certify what is missing. Raises `TargetError`, and `TubecertError` if no point can be read at all."""
-        spec = self._first()
+        spec = self.first()
         table = spec.trajectory.table
         prepare(self.task.folder, identity(self.task, self.axes, None if table is None else table.sha256))
         missing = [point for point in self.points if not _done(outcome(self.task, point))]
@@ -65,7 +65,7 @@ class Sweep:
                 raise ValueError(f"the point {point.name} is gone")
             yield point, found
 
-    def _first(self) -> Spec:
+    def first(self) -> Spec:
         """The first specification that can be read: a mistake that all points share is told before any work."""
         for point in self.points:
             with contextlib.suppress(TubecertError):

@@ -1,0 +1,137 @@
+"""A sweep on a Dask cluster: a scheduler and workers on this machine, one of them killed; the bytes of a serial run."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from test_sweep import ONE, bytes_in
+
+from tubecert.executor import Cluster, WorkerError
+from tubecert.libraries import versions
+
+pytest.importorskip("distributed")
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(280)]
+OVER = ("--over", "tube.epsilon=.2:.4:6")
+
+
+@contextmanager
+def running(*words, env=None):
+    """A process that is ended, whatever happens."""
+    process = subprocess.Popen(
+        [sys.executable, *map(str, words)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **(env or {})},
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def until(condition, seconds=100):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert condition()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """The address of a scheduler with three workers, and their processes."""
+    folder = tmp_path_factory.mktemp("cluster")
+    place = folder / "scheduler.json"
+    start = ("-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    with ExitStack() as stack:
+        stack.enter_context(running(*start, "--scheduler-file", place))
+        until(place.exists)
+        address = json.loads(place.read_text())["address"]
+        own = (
+            "-m",
+            "distributed.cli.dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--no-nanny",
+        )
+        workers = [stack.enter_context(running(*own, "--local-directory", folder / f"{i}")) for i in range(3)]
+        until(lambda: len(Cluster(address).versions(versions)) == 3)
+        yield address, workers
+
+
+def swept(folder, *words):
+    """The exit code of a sweep in a process of its own, started in the folder of the specification."""
+    return subprocess.run(
+        [sys.executable, "-m", "tubecert", "sweep", "one.yaml", *OVER, *map(str, words)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=250,
+        check=False,
+    )
+
+
+def test_a_killed_worker_loses_nothing_and_changes_no_byte(cluster, tmp_path):
+    address, workers = cluster
+    (tmp_path / "one.yaml").write_text(ONE, encoding="utf-8")
+    assert swept(tmp_path, "-o", "serial").returncode == 0
+    words = [
+        sys.executable,
+        "-m",
+        "tubecert",
+        "sweep",
+        "one.yaml",
+        *OVER,
+        "-o",
+        "spread",
+        "--scheduler",
+        address,
+    ]
+    points = tmp_path / "spread/points"
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        until(lambda: points.is_dir() and any(points.glob("*.certificate.json")))
+        assert len(list(points.glob("*.certificate.json"))) < 6
+        workers[0].send_signal(signal.SIGKILL)
+        assert process.wait(timeout=200) == 0
+    assert bytes_in(tmp_path / "spread") == bytes_in(tmp_path / "serial")
+
+
+def test_what_a_cluster_cannot_do_is_refused(cluster, tmp_path):
+    address, _ = cluster
+    text = ONE.replace("{kind: equilibrium, at: [0], horizon: 10}", "{kind: csv, file: plan.csv}")
+    (tmp_path / "one.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "plan.csv").write_text("t,x,u\n0,0,0\n10,0,0\n")
+    done = swept(tmp_path, "--scheduler", address)
+    assert (done.returncode, "in folders of their own" in done.stderr) == (2, True), done.stderr
+    assert not (tmp_path / "one.sweep").exists()
+
+
+def test_other_versions_on_workers_are_found(cluster):
+    assert all(each == versions() for each in Cluster(cluster[0]).versions(versions))
+
+
+def test_where_there_is_no_cluster_that_is_said(monkeypatch):
+    monkeypatch.setattr("tubecert.executor._PATIENCE", 1)
+    with pytest.raises(WorkerError, match="no cluster with workers at"):
+        Cluster("tcp://127.0.0.1:9").versions(versions)
+    with pytest.raises(WorkerError, match="no cluster with workers at"):
+        Cluster("tcp://127.0.0.1:9").map(abs, [1])
+
+
+def test_results_are_in_the_order_of_the_items_and_exceptions_are_raised(cluster):
+    ready: list[None] = []
+    assert Cluster(cluster[0]).map(abs, [-1, 2, -3], lambda: ready.append(None)) == [1, 2, 3]
+    assert len(ready) == 3
+    with pytest.raises(TypeError):
+        Cluster(cluster[0]).map(abs, ["x"])
