@@ -179,9 +179,9 @@ def test_the_wind_is_there_at_the_start(start):
 
 
 def test_without_a_rate_nothing_joins():
-    assert not Beside(suprema([["-1"], ["4"]])).joins_uncertainty
-    assert not Beside(suprema([["4"], ["1"]], rate="1")).joins_uncertainty  # B'E = 0
-    assert Beside(suprema([["-1"], ["4"]], rate="1")).joins_uncertainty
+    assert not Beside(suprema([["-1"], ["4"]]).fields).joins_uncertainty
+    assert not Beside(suprema([["4"], ["1"]], rate="1").fields).joins_uncertainty  # B'E = 0
+    assert Beside(suprema([["-1"], ["4"]], rate="1").fields).joins_uncertainty
 
 
 def test_what_vanishes_is_seen_to_vanish():
@@ -234,13 +234,13 @@ def own_slope(s):
 def test_a_parameter_along_the_input_leaves_nothing():
     s = unknown(("-x1 + 2*x2 + 0.5*m*x1 - 0.5*x1", "-0.25*x2**3 - 3*x1 + 4*x2 - 2*m*x1 + 2*x1"), MASS)
     assert residual_constants(s).push == residual_constants(s).size == Constant.exactly(0.0)
-    assert Beside(s).joins_uncertainty
+    assert Beside(s.fields).joins_uncertainty
 
 
 def test_a_parameter_that_the_middle_knows_exactly_adds_nothing():
     s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2"), MASS)
     assert residual_constants(s).push == Constant.exactly(0.0)
-    assert not Beside(s).joins_uncertainty
+    assert not Beside(s.fields).joins_uncertainty
 
 
 def test_wider_ranges_never_need_less():

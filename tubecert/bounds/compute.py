@@ -111,7 +111,7 @@ def bound_constants(
     if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
         declared = {**declared, "h_initial": declared["h"]}
     derived: dict[str, Constant] = {}
-    if Beside(suprema).joins_uncertainty:
+    if Beside(suprema.fields).joins_uncertainty:
         derived = uncertainty_constants(suprema, start, declared)
         declared = {}
     elif suprema.model.h is not None:

@@ -15,6 +15,7 @@ from functools import cached_property
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
+from tubecert.coordinates import Fields
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression import ZERO, Expression, constant, derivatives, is_zero
@@ -28,17 +29,17 @@ Entries = tuple[Expression, ...]
 class Beside:
     """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly."""
 
-    suprema: Suprema
+    fields: Fields
 
     @cached_property
     def reached(self) -> Matrix:
         """B^+ E, (m, k): what of the wind an input can make; empty without wind."""
-        return self._split(self.suprema.model.E)[0]
+        return self._split(self.fields.model.E)[0]
 
     @cached_property
     def unreached(self) -> Matrix:
         """(I - B B^+) E, (n, k)."""
-        return self._split(self.suprema.model.E)[1]
+        return self._split(self.fields.model.E)[1]
 
     @cached_property
     def known(self) -> Entries:
@@ -52,14 +53,14 @@ class Beside:
 
     @property
     def _unknown_drift(self) -> Matrix:
-        model = self.suprema.model
+        model = self.fields.model
         return combine(1, column(model.drift), -1, column(model.f)) if model.drift else ()
 
     def _split(self, field: Matrix) -> tuple[Matrix, Matrix]:
         """B^+ v and v - B B^+ v of fields v, the columns of a matrix."""
         if not field:
             return (), ()
-        fields = self.suprema.fields
+        fields = self.fields
         own = fields.of_vector(field)
         reached = _exact(multiply(fields.B_pinv, own))
         return reached, _exact(combine(1, own, -1, multiply(fields.B, reached)))
@@ -67,7 +68,7 @@ class Beside:
     @property
     def blown(self) -> Matrix:
         """B^+ E times the bound of |w|, where B^+ E w is a part of h; empty where it is not."""
-        model = self.suprema.model
+        model = self.fields.model
         if not model.E or model.wind_bound is None or model.wind_rate is None or _vanishes(self.reached):
             return ()
         return _times(model.wind_bound, self.reached)
@@ -75,7 +76,7 @@ class Beside:
     @property
     def rate(self) -> Fraction:
         """The bound of |w'|."""
-        return self.suprema.model.wind_rate or Fraction(0)
+        return self.fields.model.wind_rate or Fraction(0)
 
     @property
     def joins_uncertainty(self) -> bool:
@@ -97,7 +98,7 @@ def wind_constants(suprema: Suprema, beta: Constant) -> WindConstants | None:
 
     The push is the smaller of sup smax(Theta E) and beta eps_w + sup smax(Theta (I - B B^+) E): (7.2).
     """
-    model, beside = suprema.model, Beside(suprema)
+    model, beside = suprema.model, Beside(suprema.fields)
     if not model.E:
         return None
     if model.wind_rate is not None:
@@ -122,7 +123,7 @@ def wind_constants(suprema: Suprema, beta: Constant) -> WindConstants | None:
 
 def residual_constants(suprema: Suprema) -> ResidualConstants | None:
     """What unknown parameters do that no input can; None if all are known."""
-    rest = Beside(suprema).residual
+    rest = Beside(suprema.fields).residual
     if not rest:
         return None
     return ResidualConstants(
@@ -144,7 +145,7 @@ def uncertainty_constants(
 
     What is declared is about the specification's own h.
     """
-    beside = Beside(suprema)
+    beside = Beside(suprema.fields)
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
     total, blown = joined(suprema)
 
@@ -172,7 +173,7 @@ def uncertainty_constants(
 
 def joined(suprema: Suprema) -> tuple[Entries, Matrix]:
     """H = v + G w/|w|: its entries v without wind, of what is given as expressions, and G (empty without wind)."""
-    beside, own = Beside(suprema), suprema.model.h
+    beside, own = Beside(suprema.fields), suprema.model.h
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
     total = known if own is None else tuple(a + b for a, b in zip(own, known, strict=True))
     return total, beside.blown

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from tubecert.bounds.constants import WIND
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
@@ -70,12 +71,21 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Acting:
+    """What a wind of the size given, and unknown parameters, do: beta_w |w| + beta_r, D_E |w| + D_r, eps_w |w|."""
+
+    push: float
+    size: float
+    taken: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Certified:
     """What simulation reads of a certificate, as numbers: nothing else in this room reads its JSON.
 
     `S` (n, n): the tube and the loop are designed in z = S x. `reach` is dbar = sqrt(a) rho; `rate` lambda in 1/s;
     `upper` the bound A of lmax(M), where there is one; `constants` the safe sides, by their names in the certificate;
-    `sections` by the names in `proof`.
+    `sections` by the names in `proof`. `beside`: what acts and is no input.
     """
 
     rho: float
@@ -86,6 +96,7 @@ class Certified:
     S: Array
     constants: Values
     sections: Mapping[str, Section]
+    beside: Acting
 
     def __getitem__(self, name: str) -> float:
         """The safe side of a constant."""
@@ -191,7 +202,19 @@ def read_numbers(result: Result) -> Certified:
             )
             for name, recipe in result.proof.of.items()
         },
+        beside=_acting(result),
     )
+
+
+def _acting(result: Result) -> Acting:
+    found = {name: item.above or 0.0 for name, item in result.constants.items()}
+    blown, left = (
+        [found.get(name, 0.0) for name in WIND if name.startswith(kind)] for kind in ("wind_", "residual_")
+    )
+    wind = result.claim.wind
+    size = 0.0 if wind is None or wind.bound is None else float(Fraction(wind.bound))
+    push, speed, taken = (size * value for value in blown)
+    return Acting(push=push + left[0], size=speed + left[1], taken=taken)
 
 
 def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Section:

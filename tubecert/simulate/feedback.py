@@ -30,7 +30,10 @@ _THIN = 0.05  # of the layer: where a wind that aims turns round
 
 
 class Field(NamedTuple):
-    """f (n,), B (n, m), the base of h (m,) and E (n, k), row by row, as one program of t and x; metric, rate in 1/s."""
+    """f (n,), B (n, m), the base of h (m,), E (n, k), row by row, and r (n,) as one program; metric, rate in 1/s.
+
+    The program is one of t, x and the parameters of which ranges are known.
+    """
 
     program: Program
     metric: Metric
@@ -101,13 +104,14 @@ class Point(NamedTuple):
 
 
 def field(
-    model: ControlAffineModel, base: Sequence[Expression] | None, E: Matrix, degree: int
+    model: ControlAffineModel, base: Sequence[Expression] | None, E: Matrix, rest: Matrix, degree: int
 ) -> tuple[Field, Point]:
-    """The slow part of a model's loops, and working memory for it."""
+    """The slow part of a model's loops, and working memory for it; `rest` (n, 1) acts beside the inputs, or is ()."""
     n, m = len(model.states), len(model.inputs)
     h = [ZERO] * m if base is None else list(base)
     outputs = [*model.f, *(e for row in model.B for e in row), *h, *(e for row in E for e in row)]
-    program, memory = assemble(outputs, (TIME, *model.states))
+    outputs += [row[0] for row in rest]
+    program, memory = assemble(outputs, (TIME, *model.states, *dict(model.parameters)))
     space, curve = metric(model, degree)
     return Field(program, space, float(model.rate)), point(memory, curve, (n, m, len(E[0]) if E else 0))
 
@@ -146,8 +150,11 @@ def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point)
 
     Without `whole` the geodesic and k are left out, unless something pushes the lane along it.
     """
-    model(field.program, now.t, now.x, point.memory, point.plant)
     n, m = point.plant.B.shape
+    theta = force.beside.theta
+    for l in range(theta.shape[1]):
+        point.memory[1 + n + l] = theta[now.lane, l]
+    model(field.program, now.t, now.x, point.memory, point.plant)
     place = n + point.plant.B.size
     for j in range(m):
         point.h[j] = point.memory[field.program.outputs[place + j]]
@@ -159,6 +166,10 @@ def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point)
         status, energy = steer(field, now.plan, now.x, point.plant, point)
     _disturb(force, now, point)
     _blow(force, now, point)
+    rest = place + m + n * point.w.shape[0]
+    if theta.shape[1] > 0 and field.program.outputs.shape[0] > rest:
+        for i in range(n):
+            point.wind[i] += point.memory[field.program.outputs[rest + i]]
     return status, energy
 
 

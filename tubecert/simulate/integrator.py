@@ -68,7 +68,7 @@ class Ladder:
         from tubecert.simulate.feedback import field
 
         self.problem = problem
-        self.field, self.point = field(problem.model, base, problem.E, problem.degree)
+        self.field, self.point = field(problem.model, base, problem.E, problem.rest, problem.degree)
         self.computer, self.machine = grid.computer(problem), grid.machine(problem)
         self.holds = self.machine is not None or (self.computer is not None and self.computer.holds)
         self._levels: dict[int, Lane] = {}

@@ -101,7 +101,8 @@ class LoopProblem:
     `nominal` is the min-norm feedback without any disturbance, `ccm` the same under h, `reference` the reference
     system (u_a = -C[h]), `l1` the projection-based loop, `sampled` the loop of certificate C. With a `control_rate` in
     Hz the whole controller is a computer that holds u and its adaptation between its samples; `hardware` is the loop of
-    theorem H on a `machine`. `E` (n, k) is that of the wind E w. `times` (K,), increasing in [0, horizon], are the
+    theorem H on a `machine`. `E` (n, k) is that of the wind E w, `rest` (n, 1) what unknown
+    parameters do that no input can. `times` (K,), increasing in [0, horizon], are the
     output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A
     lane is stopped where |x - x*| exceeds `limit`. `P` (n, n) is S'S of the coordinates z = S x in which the adaptation
     is designed, None for those of x; |xtilde| and |x - x*| are lengths in z.
@@ -119,6 +120,7 @@ class LoopProblem:
     P: Array | None = None
     machine: MachineRun | None = None
     E: Matrix = ()
+    rest: Matrix = ()
 
     def __post_init__(self) -> None:
         if self.controller not in CONTROLLERS:
@@ -168,7 +170,8 @@ class Beside(NamedTuple):
     |w| <= `wind` (N,); its `aim` (N,) is 0 along `blowing` (N, k), 1 outward along E'M gamma_s, 2 along the inputs,
     E'B c. Both go forwards and backwards as square waves of frequency and phase say: `turning`, `gusting` (N, 2). Noise
     is an entry of `table` (N, Q, n), by `choice` (N,): 0 at random; 1 the first one, its sign changing every `period`
-    (N,) measurements; 2 the one that costs the feedback most. It changes by `most` (N,) per second at most.
+    (N,) measurements; 2 the one that costs the feedback most. It changes by `most` (N,) per second at most. `theta`
+    (N, p) are the parameters of which ranges are known.
     """
 
     ramp: Array
@@ -183,11 +186,12 @@ class Beside(NamedTuple):
     period: Array
     table: Array
     most: Array
+    theta: Array
 
 
 def nothing_beside(N: int, n: int, m: int, k: int = 0) -> Beside:
-    """No signal, no wind and no noise, for N lanes of n states, m inputs and k winds."""
-    shapes = (), (m,), (m,), (2,), (), (), (k,), (2,), (), (), (1, n), ()
+    """No signal, no wind and no noise, for N lanes of n states, m inputs and k winds; all parameters are known."""
+    shapes = (), (m,), (m,), (2,), (), (), (k,), (2,), (), (), (1, n), (), (0,)
     found = Beside(*(np.zeros((N, *shape)) for shape in shapes))
     return found._replace(period=found.period + 1, most=found.most + np.inf)
 
@@ -238,7 +242,8 @@ class Disturbance:
     def is_zero(self) -> bool:
         """Whether h vanishes for every lane."""
         parts = (self.amplitude, self.push, self.beside.ramp, self.beside.wind, self.beside.table)
-        return self.base is None and not any(np.any(part) for part in parts)
+        known = not self.beside.theta.size
+        return known and self.base is None and not any(np.any(part) for part in parts)
 
     def of(self, lanes: NDArray[np.intp]) -> Disturbance:
         """The disturbance of some lanes, given by their numbers."""

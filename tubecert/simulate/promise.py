@@ -163,13 +163,16 @@ def _error_of_paper(certified: Certified, recipe: Values) -> float:
 
 
 def _error_of_speed(certified: Certified, recipe: Values) -> float | None:
-    """Dxt/sqrt(Gamma), (2.11), with s1 = Dht + Dhx Y and q = 2 g; None for an A_m that is not -g I."""
+    """Dxt/sqrt(Gamma), (2.11), with s1 = Dht + Dhx Y and q = 2 g, (7.8) beside a wind; None if A_m is not -g I."""
     if "predictor_gain" not in recipe:
         return None
     h = class_of(certified)
     s1, reach = h.rate_at(recipe["speed"]), h.h + recipe["projection_radius"]
-    square = 2 * reach * s1 / (2 * recipe["predictor_gain"]) + reach**2
-    return math.sqrt(square / recipe["adaptation_rate"])
+    q, rate = 2 * recipe["predictor_gain"], recipe["adaptation_rate"]
+    drag = certified.beside.size / q
+    if not drag:
+        return math.sqrt((2 * reach * s1 / q + reach**2) / rate)
+    return math.hypot(reach / math.sqrt(rate), drag + math.sqrt(drag**2 + 2 * reach * s1 / (q * rate)))
 
 
 def _decay_alone(certified: Certified, recipe: Values) -> Decay:
@@ -198,6 +201,7 @@ def _decay_of_sampled(certified: Certified, recipe: Values) -> Decay:
     turned = min(certified["B_pinv"] * certified["B_x"], certified["B_pinv_x"] * certified["B"])  # b/Dh
     age = 1 / g - Ts / math.expm1(g * Ts) if g * Ts > 1e-6 else Ts / 2  # m of (4.6)
     rest = s1 * Ts / -math.expm1(-omega * Ts) + age * (s1 + turned * h.h * Y)  # S_T
+    rest += certified.beside.taken + certified["B_pinv_x"] * certified.beside.size * age * Y  # (7.6)
     first = min(h.h, h.h_initial + s1 * Ts)  # H1
     return Decay(bandwidth=omega, first=first, rest=rest, delay=Ts, **_common(certified))
 
@@ -208,7 +212,7 @@ def _common(certified: Certified) -> dict[str, float]:
         "rate": certified.rate,
         "start": certified["initial_distance"],
         "beta": certified["metric_input_gain"],
-        "defect": certified["plan_defect_metric"],
+        "defect": certified["plan_defect_metric"] + certified.beside.push,
     }
 
 

@@ -13,13 +13,14 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.bounds.wind import Beside
 from tubecert.certificate.result import Result
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.expression import Expression
-from tubecert.expression.matrix import Matrix, combine, multiply
+from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding, Location
 from tubecert.kinds import HARDWARE
 from tubecert.model import ControlAffineModel, build
@@ -93,6 +94,7 @@ class Setting:
     uncertainty: Class
     on_machine: Class | None
     E: Matrix
+    rest: Matrix
     h: tuple[Expression, ...] | None
     layer: float
 
@@ -168,9 +170,10 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
-        uncertainty=class_of(certified, n, m),
+        uncertainty=class_of(certified, n, m, _beside(certified, model)),
         on_machine=_class_on_machine(spec, certified, model, centre),
         E=_wind(model, result),
+        rest=_rest(model, result),
         h=None if wanted is None else tuple(term.expression for term in wanted),
         layer=_LAYER * certified["metric_input_gain"] * certified.reach,
     )
@@ -193,17 +196,53 @@ def _class_on_machine(
         noise_rate=math.inf if hardware.noise_rate is None else float(hardware.noise_rate),
         signal=class_of(certified).rate_at(float(own.recipe.speed)),
         box=unbounded(len(spec.inputs)) if own.clip is None else np.array(own.clip).T,
+        ranges=_ranges(model),
     )
     return class_of(certified, len(spec.states), len(spec.inputs), sources)
+
+
+def _beside(certified: Certified, model: ControlAffineModel) -> Sources | None:
+    """What acts beside h on loops that see everything; None if nothing does."""
+    if not model.E and not model.parameters:
+        return None
+    return Sources(
+        pace=certified.rate,
+        k=len(model.E[0]) if model.E else 0,
+        wind=float(model.wind_bound or 0),
+        table=np.zeros((1, len(model.states))),
+        noise_rate=math.inf,
+        signal=0.0,
+        box=unbounded(len(model.inputs)),
+        ranges=_ranges(model),
+    )
+
+
+def _ranges(model: ControlAffineModel) -> Array:
+    """Those of the parameters, (p, 2)."""
+    return np.array([[float(low), float(high)] for _, (low, high) in model.parameters]).reshape(-1, 2)
+
+
+def _rest(model: ControlAffineModel, result: Result) -> Matrix:
+    """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
+    if not model.drift:
+        return ()
+    known = Beside(_fields(model, result)).known
+    unknown = combine(1, column(model.drift), -1, column(model.f))
+    return combine(1, unknown, -1, multiply(model.B, column(known)))
+
+
+def _fields(model: ControlAffineModel, result: Result) -> Fields:
+    """The model in the coordinates of the tube."""
+    rows = None if result.tube is None else result.tube.coordinates
+    S = None if rows is None else Coordinates(tuple(tuple(Fraction(q) for q in row) for row in rows))
+    return Fields(model, S)
 
 
 def _wind(model: ControlAffineModel, result: Result) -> Matrix:
     """E, or where w has a rate (I - B B^+) E: the rest of it is a part of h, which is as large as the class allows."""
     if model.wind_rate is None:
         return model.E
-    rows = None if result.tube is None else result.tube.coordinates
-    S = None if rows is None else Coordinates(tuple(tuple(Fraction(q) for q in row) for row in rows))
-    fields = Fields(model, S)
+    fields = _fields(model, result)
     reached = multiply(fields.B_pinv, fields.of_vector(model.E))
     return combine(1, model.E, -1, multiply(model.B, reached))
 
@@ -280,6 +319,7 @@ def _problem(
         P=setting.S.T @ setting.S,
         machine=machine,
         E=setting.E,
+        rest=setting.rest,
     )
 
 

@@ -27,6 +27,7 @@ _WAVING, _STRAIGHT = (
     0.75,
 )  # genes: h is a sum of waves below, a signal with a direction of its own above
 _STEADY: Final = 0.2  # below, a signal or wind never turns round
+_ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
 _CANDIDATES: Final = 16  # of the noise at a sample
 
 
@@ -67,6 +68,7 @@ class Sources:
     noise_rate: float
     signal: float
     box: Array
+    ranges: Array  # (p, 2), of parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -196,7 +198,7 @@ def genes_of(kind: Class) -> int:
 
 def genes_beside(kind: Class) -> int:
     """How many of them are about noise, wind and signals."""
-    return 0 if kind.sources is None else 8 + kind.m + kind.sources.k
+    return 0 if kind.sources is None else 8 + kind.m + kind.sources.k + len(kind.sources.ranges)
 
 
 def beset(member: Member, kind: Class, genes: Array) -> Member:
@@ -217,7 +219,9 @@ def usual(kind: Class, sources: Sources) -> Beside:
 
 def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
     signal = sources.signal > 0 and genes[0] > _WAVING
-    along, blows = _unit(genes[8 : 8 + kind.m]), _unit(genes[8 + kind.m :]) if sources.k else np.zeros(0)
+    first, last = 8 + kind.m, 8 + kind.m + sources.k
+    along, blows = _unit(genes[8:first]), _unit(genes[first:last]) if sources.k else np.zeros(0)
+    low, high = sources.ranges[:, 0], sources.ranges[:, 1]
     turns = [(sources.pace * 10 ** (4 * fast - 1) if fast > _STEADY else 0.0) for fast in genes[[1, 4]]]
     phases = [2 * np.pi * genes[2], 2 * np.pi * genes[5] if turns[1] else np.pi / 2]
     lane = Beside(
@@ -233,6 +237,7 @@ def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
         period=np.array(int(10 ** (3 * genes[7]))),
         table=sources.table,
         most=np.array(sources.noise_rate),
+        theta=low + (high - low) * np.clip(_ENDS * (genes[last:] - 0.5) + 0.5, 0.0, 1.0),
     )
     return Beside(*(part[None] for part in lane))
 

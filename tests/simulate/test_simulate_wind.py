@@ -1,0 +1,96 @@
+"""Wind and unknown parameters in simulated loops: what acts, and that no certified bound is exceeded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from systems import SMALL
+
+from tubecert import pipeline
+from tubecert.simulate.compare import compare
+from tubecert.simulate.integrator import integrate
+from tubecert.simulate.monte_carlo import monte_carlo
+from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.spec import load_text
+
+RANGES = SMALL.replace("0.3*sin(x)", "m*sin(x)").replace(
+    "  inputs: [u]", "  inputs: [u]\n  parameters: {m: [0.28, 0.32], c: [-0.02, 0.02]}"
+)
+STIRRED = RANGES.replace('"-x + y"', '"-x + y + c*cos(x)"').replace("input: [0]", "input: [0], horizon: 6")
+GUSTS = STIRRED + 'disturbance: {E: [["cos(x)"], ["1 + y"]], bound: 0.01}\n'
+CHOICES = {
+    "none": ("ccm", "none"),
+    "B": ("l1", "distance"),
+    "C": ("sampled", "sampled"),
+    "hardware": ("hardware", "hardware"),
+}
+
+
+@lru_cache
+def stirred(kind):
+    spec = load_text(
+        GUSTS + ("hardware: {rate: 500, noise: 0.0001}\n" if kind == "hardware" else ""), "s.yaml"
+    )
+    result = pipeline.certify(spec, pipeline.Options(conditions=kind))
+    return setting_of(spec, result)
+
+
+def loop(kind):
+    controller, source = CHOICES[kind]
+    return loop_of(stirred(kind), controller, Choice(source=source))
+
+
+@pytest.mark.slow
+def test_a_run_is_that_of_the_plant_with_its_parameters():
+    """The feedback alone against scipy: x' = f(x, theta) + B (k - what is told of h) written out."""
+    setting = stirred("none")
+    problem = replace(loop("none").problem, times=np.linspace(0, 2, 5), horizon=2.0)
+    model = setting.model
+    still = Disturbance.from_expressions(None, model, 1, 1)
+    theta = np.array([[0.31, 0.02]])
+    moved = replace(still, beside=still.beside._replace(theta=theta))
+    x0 = np.array([[0.05, 0.0]])
+    found = integrate(problem, x0, moved, tolerance=1e-10)
+    M = np.linalg.inv(np.array([[1, -0.3], [-0.3, 2]]))
+    B = np.array([0.0, 1.0])
+
+    def f(x):
+        return np.array([-x[0] + x[1], -x[1] + 0.3 * np.sin(x[0])])
+
+    def slope(t, x):
+        m = M @ x
+        grown = m @ (f(x) + 0.8 * x)
+        k = -grown / (B @ m) if grown > 0 else 0.0
+        return f(x) + B * k + np.array([0.02 * np.cos(x[0]), 0.0])  # what no input reaches
+
+    own = solve_ivp(slope, (0, 2), x0[0], rtol=1e-10, atol=1e-12, t_eval=problem.times)
+    np.testing.assert_allclose(found.x[0], own.y.T, atol=1e-6)
+    at_rest = integrate(problem, x0, still, tolerance=1e-10)
+    assert np.abs(at_rest.x - found.x).max() > 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["B", "C", "hardware"])
+def test_no_bound_is_exceeded_by_adversaries(kind):
+    setting, own = stirred(kind), loop(kind)
+    sample = monte_carlo(setting, own, 8 if kind == "hardware" else 60, 3)
+    found = compare(setting, sample.runs, own.promise)
+    assert own.promise is not None
+    assert not found.violations
+    assert not found.outside
+    assert not found.failures
+
+
+@pytest.mark.slow
+def test_cases_differ_in_their_parameters():
+    setting, own = stirred("C"), loop("C")
+    sample = monte_carlo(setting, own, 12, 5)
+    thetas = np.array([case.member.beside.theta[0] for case in sample.cases])
+    assert thetas.shape == (12, 2)
+    assert np.all((thetas >= [0.28, -0.02]) & (thetas <= [0.32, 0.02]))
+    assert len(np.unique(thetas[:, 0])) > 3
