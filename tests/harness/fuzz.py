@@ -302,6 +302,8 @@ def grammar(rng: random.Random) -> str:
             "verdict": rng.choice(["certified", "refuted", "undecided"]),
             "rho": ["0", positive(rng)],
         }
+    if rng.random() < 0.2:
+        data["limits"] = {inputs[0]: [number(rng), number(rng)]}
     if n >= 2 and rng.random() < 0.2:
         disc = {"center": [number(rng), number(rng)], "radius": positive(rng)}
         corners = [[number(rng), number(rng)] for _ in range(rng.randint(3, 6))]
