@@ -174,7 +174,7 @@ def noise_in_feedback(p: Plant[T], loop: Loop[T]) -> tuple[T, T]:
 
 
 def feedforward_error(p: Plant[T], loop: Loop[T]) -> T:
-    """ups >= |u0 - u*|: 0, or what u* does while it is held."""
+    """ups >= |u0 - u*|: 0, or what u* does while it is held, (H.6a)."""
     if not p.held:
         return number(0, loop.Ts)
     most = 2 * p.n.Dus
@@ -231,7 +231,7 @@ def prediction_error(p: Plant[T], loop: Loop[T], known: T, X: T) -> T | None:
     )
 
 
-# -- what time and noise cost the feedback: (H.8), (H.9)
+# -- what time and noise cost the feedback: (H.8), (H.9), (H.18), (H.19)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -280,7 +280,7 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
 
 @quiet
 def covariant_loss(p: Plant[T], m: Bent[T], loop: Loop[T], e: Estimate[T]) -> tuple[T, T]:
-    """ell0 and ell' of (H.8c), (H.9c): every length is measured by the metric; infinite where chi' <= 0."""
+    """ell0 and ell' of (H.18), (H.19): every length is measured by the metric; infinite where chi' <= 0."""
     n = p.n
     K = m.K_R * reach(n) ** 2
     chi = 1 - K / 8
@@ -366,7 +366,7 @@ def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[
     # before t_a nothing is compensated; where the feedback is the slower one, the estimate acts already
     xi = e.H1 + loop.late * (e.X - e.H1)
     d1 = start * exp(-n.lam * t_a) + (n.beta * xi + delta_1) * t_a * decay_mean(n.lam * t_a)
-    # where the saw-tooth of the faster clock does not begin at t_a, P is only below its periodic solution: (8.9)
+    # where the saw-tooth of the faster clock does not begin at t_a, it adds its periodic solution at most: theory 8.4
     faster = loop.late * (n.beta * e.s1 * mu) + (1 - loop.late) * waiting
     d1 = d1 + loop.off * faster / n.lam
     lag = e.s1 * (loop.tau + mu)

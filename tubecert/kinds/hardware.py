@@ -147,7 +147,7 @@ class HardwareSection(Section[HardwareRecipe]):
         return InputBound(least=found[0], greatest=found[1], shares=shares)
 
     def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
-        """What every input does: u*, the feedback, and the clip with its other sign."""
+        """What every input does, (H.16): u*, the feedback, and the clip with its other sign."""
         R, feedback = recipe.clip_radius, Fraction(known.feedback)
         ranges = self.machine.inputs
         clip = self.machine.clip if self.machine.clip and ranges else tuple((-R, R) for _ in ranges)
