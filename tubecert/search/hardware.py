@@ -31,7 +31,7 @@ _DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _PREDICTIONS = 4  # steps of the fixed point of np; what is printed is verified
 _LEVELS = 24
 _ZOOMS = 26
-_LONG = 30.0  # times 1/lambda: a horizon that might as well have no end
+_HAIR = 1 + 1e-12
 _TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
 _CURVE_POINTS = 13
@@ -53,11 +53,6 @@ class Lanes:
     def __getitem__(self, index: object) -> Lanes:
         """Some of the lanes, or the same with axes added."""
         return Lanes(**{name: getattr(self, name)[index] for name in Lanes.__slots__})
-
-    @property
-    def possible(self) -> Mask:
-        """Whether a machine is one at all."""
-        return np.asarray(self.tau <= self.Ts * (1 + 1e-12))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +141,9 @@ class Search:
         stays = (x.course.supremum() + _TIE * x.course.bound.ultimate()) / x.loop.dhat
         fits = (x.loop.dhat + x.estimate.n_fb) / self.dbar
         worst = np.maximum(stays, fits)
-        good = np.isfinite(worst) & (x.loss.chi > 0) & at.possible
+        good = np.isfinite(worst) & (x.loss.chi > 0) & (at.tau <= at.Ts * _HAIR)
+        if self.machine.asked.predict:
+            good = good & (at.tau <= at.Tf * _HAIR)
         return np.where(good, worst, np.inf)
 
     # -- minima over what is free
@@ -279,11 +276,7 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     if np.isfinite(choice.dhat[0]):
         return served(search, setting, choice)
     best, nearest = search.least(at)
-    return (
-        proof_at(search, setting, printed(search, setting, nearest, 0.0), 1e-6)
-        if np.isfinite(best[0])
-        else None
-    )
+    return proof_at(search, setting, printed(setting, nearest, 0.0), 1e-6) if np.isfinite(best[0]) else None
 
 
 def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
@@ -299,13 +292,14 @@ def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe |
 
 def _near(search: Search, setting: Setting, choice: Choice) -> Iterator[Printed]:
     """The choice with more and more room, what is free chosen again for each level; then what has the most of it."""
-    at = setting.lanes()
+    at, tried = setting.lanes(), []
     for room in (1e-7, 1e-5, 1e-4, 1e-3):
-        level = printed(search, setting, choice, room).level
-        _, again = search.least(at, np.array([float(level)]))
-        yield printed(search, setting, again, 0.0)
-    _, best = search.least(at)
-    yield printed(search, setting, best, 0.0)
+        level = printed(setting, choice, room).level
+        tried.append(search.least(at, np.array([float(level)]))[1])
+    tried.append(search.least(at)[1])
+    yield from (printed(setting, each, 0.0) for each in tried)
+    # without a filter the theorem knows of no horizon, and a short one may be what is needed
+    yield from (printed(setting, each, 0.0, filtered=True) for each in tried)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -317,14 +311,10 @@ class Printed:
     floor: Fraction
 
 
-def printed(search: Search, setting: Setting, choice: Choice, room: float) -> Printed:
-    """A choice of one lane as decimals; the level with `room` of its own.
-
-    Without a filter the theorem knows of no horizon: a short one asks for some bandwidth.
-    """
-    omega, bandwidth, horizon = float(choice.omega[0]), setting.bandwidth, search.problem.horizon
-    brief = horizon is not None and search.rate * float(horizon) < _LONG
-    if bandwidth is None and (brief or omega * float(setting.sample_time) < 0.9 * _DEADBEAT):
+def printed(setting: Setting, choice: Choice, room: float, *, filtered: bool = False) -> Printed:
+    """A choice of one lane as decimals, the level with `room`; `filtered`: with a bandwidth in any case."""
+    omega, bandwidth = float(choice.omega[0]), setting.bandwidth
+    if bandwidth is None and (filtered or omega * float(setting.sample_time) < 0.9 * _DEADBEAT):
         bandwidth = round_up(omega, DIGITS)
     return Printed(
         bandwidth=bandwidth,
