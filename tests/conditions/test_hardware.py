@@ -72,6 +72,15 @@ FORMS = {
         {"noise": F(1)},
     ),
     "u* played in time": (alive_machine(held=False), {}),
+    "noise by state that drifts": (
+        alive_machine(noise=(F("0.001"), F("0.002")), noise_rate=F(1, 10**5), values=BOX),
+        {"noise": F(1)},
+    ),
+    "a low floor": (alive_machine(), {"floor": F(1, 1000)}),
+    "prediction with a low floor": (
+        alive_machine(predict=True),
+        {"floor": F(1, 1000), "prediction": F("0.004")},
+    ),
     "a u* that jumps": (
         replace(
             alive_machine(values={"input_rate": float("inf")}),
@@ -379,6 +388,29 @@ def integrated(g, q):
 def test_it_is_stated_for_machines_only(change):
     problem, own = FORMS["plain"][0], SETTLED["plain"]
     assert not isinstance(check(problem, replace(own, **change)), Proof)
+    assert not all(margin.lo > 0 for margin in margins_hardware(problem, replace(own, **change)))
+
+
+def test_a_delay_is_at_most_one_sample():
+    problem, T = FORMS["plain"][0], F(1001, 10**6)
+    late = replace(SETTLED["plain"], delay=T)
+    possible = replace(late, sample_time=T, feedback_time=T)
+    assert margins_hardware(problem, settled(problem, possible))[1].lo > 0
+    assert margins_hardware(problem, settled(problem, late))[1].lo == -np.inf
+
+
+def test_the_rate_of_noise_is_in_units_of_noise():
+    """A ball of radius r lies in the box of sizes n_i times r/min n_i; what is not noisy does not count."""
+    assert alive_machine(noise_rate=F(1, 50)).machine.drift == F(1, 50)
+    assert alive_machine(noise_rate=F(1, 50), noise=(F(1, 1000), F(0))).machine.drift == 20
+    assert alive_machine(noise_rate=F(1, 50), noise=(F(0), F(0))).machine.drift == 0
+    assert alive_machine().machine.drift is None
+
+
+def test_the_noise_has_to_fit_into_dbar_beside_the_level():
+    problem, own = FORMS["plain"][0], SETTLED["plain"]
+    level = margins_hardware(problem, own)[0]
+    assert float(level.lo) == pytest.approx(1 - (0.8 + 0.00125) / (0.9**0.5 * 0.9), abs=1e-12)
 
 
 @pytest.mark.parametrize(
