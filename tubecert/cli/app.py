@@ -10,7 +10,16 @@ from typing import Annotated
 
 import typer
 
-from tubecert.cli import comparing, everyday, rechecking, simulating, sweeping, synthesising, verifying
+from tubecert.cli import (
+    comparing,
+    designing,
+    everyday,
+    rechecking,
+    simulating,
+    sweeping,
+    synthesising,
+    verifying,
+)
 from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
 from tubecert.cli.options import Budget, Deadline, Output, Settings, SpecFile, number_option, with_output
 from tubecert.errors import ExitCode
@@ -177,6 +186,7 @@ def make_report(
 synthesising.register(app)
 sweeping.register(app)
 comparing.register(app)
+designing.register(app)
 verifying.register(app)
 simulating.register(app)
 rechecking.register(app)

@@ -8,6 +8,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `certification` | stage after stage, with what planners and searches propose |
 | `reasons` | why a verdict about gains is what it is |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
+| `design` | the narrowest tube for a machine |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 

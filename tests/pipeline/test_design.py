@@ -1,0 +1,69 @@
+"""The narrowest tube: every attempt is a certification, the best one is no worse than those on a grid beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from tubecert.pipeline import Options, certify
+from tubecert.pipeline.design import narrowest, needed_of, size_of
+from tubecert.spec import load_text
+from tubecert.verdict import Verdict
+
+SCALAR = """
+tubecert: 1
+name: scalar
+system: {states: [x], inputs: [u], f: ["-x + 0.1*sin(x)"], B: [[1]]}
+safe_set: {x: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.5, rho_a: 0.5}
+hardware: {rate: 200, noise: 0.001}
+conditions: {decides: H}
+"""
+
+
+def scaled(text=SCALAR):
+    spec = load_text(text)
+
+    def at(scale):
+        tube = replace(spec.tube, epsilon=spec.tube.epsilon * scale, rho_a=spec.tube.rho_a * scale)
+        return replace(spec, tube=tube)
+
+    return at
+
+
+@pytest.mark.slow
+def test_the_best_is_certified_and_no_size_beside_it_is_better():
+    at = scaled()
+    found = narrowest(at, Options(), {})
+    best = found.best
+    assert best is not None
+    again = certify(at(best.scale), Options())
+    assert again.verdict is Verdict.CERTIFIED
+    assert size_of(again, {}) == best.size
+    for scale in (Fraction(1, 8), Fraction(1, 5), Fraction(1, 3), Fraction(2, 3), Fraction(3, 2)):
+        size = size_of(certify(at(scale), Options()), {})
+        assert size is None or size >= best.size * 0.995
+    needed = needed_of(best.result)
+    assert needed is not None
+    assert needed > Fraction(99, 100), "it is narrowed to what it needs"
+
+
+@pytest.mark.slow
+def test_a_machine_that_keeps_no_tube_has_no_design():
+    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), Options(), {})
+    assert found.best is None
+    assert all(each.result.verdict is not Verdict.CERTIFIED for each in found.attempts)
+
+
+@pytest.mark.slow
+def test_the_largest_sample_time_is_proven_and_a_much_larger_one_is_not():
+    found = certify(load_text(SCALAR.replace("rate: 200", "sample_time: largest")), Options())
+    assert found.verdict is Verdict.CERTIFIED
+    section = found.sections["hardware"]
+    longer = SCALAR.replace("rate: 200", f"sample_time: {float(section.sample_time) * 1.05}")
+    assert certify(load_text(longer), Options()).verdict is Verdict.UNDECIDED

@@ -1,0 +1,136 @@
+"""`design`: a specification with a machine in; the narrowest certified tube, and every attempt, out."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tubecert import certificate, pipeline
+from tubecert.cli.options import Output
+from tubecert.cli.presenting import present
+from tubecert.cli.settings import PARAMETER, settings_of
+from tubecert.cli.targets import spare
+from tubecert.errors import ExitCode, SpecError
+from tubecert.expression import number_text, suggestion
+from tubecert.findings import Finding
+from tubecert.libraries import versions
+from tubecert.library.numbers import Numbers
+from tubecert.printable import printable_json, visible
+from tubecert.report import design as told
+from tubecert.report import progress
+from tubecert.report.terminal import Terminal
+from tubecert.spec.load import load_source
+from tubecert.spec.metric_file import with_metric
+from tubecert.spec.override import Setting
+from tubecert.spec.source import read_source
+
+if TYPE_CHECKING:
+    from tubecert.pipeline.design import Design
+    from tubecert.spec import Spec
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says, as texts."""
+
+    spec: str
+    minimise: str | None
+    settings: Sequence[str]
+    metric: Path | None
+    gap: str
+    budget: str | None
+    target: str | None
+
+
+def run(given: Given, output: Output) -> ExitCode:
+    """Try tubes of every size, and write the certificate of the narrowest."""
+    numbers = Numbers()
+    gap = numbers.positive("--gap", given.gap, below=1)
+    budget = numbers.count("--budget", given.budget)
+    numbers.check()
+    target = given.target or f"{Path(given.spec).stem}.design.json"
+    certificate.check_target(target)
+    spare(target, {"specification": given.spec, "metric file": given.metric})
+    fixed = settings_of({PARAMETER: given.settings, "metric": given.metric})
+    source = read_source(given.spec)
+
+    def at(settings: Sequence[Setting]) -> Spec:
+        found = load_source(source, (*fixed, *settings))
+        return found if given.metric is None else with_metric(found, str(given.metric))
+
+    first = at(())
+    _check(first)
+    from tubecert.pipeline.design import narrowest
+
+    default = pipeline.Options()
+    options = pipeline.Options(metric=given.metric, gap=gap or default.gap, budget=budget or default.budget)
+    states = _minimised(first, given.minimise)
+    terminal = Terminal.stderr(color=output.color)
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        found = narrowest(lambda scale: at(_scaled(first, scale)), options, states, report)
+    text = _sealed(found)
+    if text is not None:
+        certificate.write_text(target, text)
+    written = None if text is None else visible(target)
+    data = printable_json(json.dumps(told.as_data(found), indent=1, ensure_ascii=False)) + "\n"
+    present(
+        output,
+        told.summary(first, found),
+        lambda: told.report(first, found, written),
+        data if output.json else None,
+    )
+    best = found.best or found.attempts[0]
+    return best.result.verdict.exit_code
+
+
+def _check(spec: Spec) -> None:
+    """What a design needs; raises `SpecError`."""
+    if spec.metric is None:
+        raise _error(spec, "metric", "a design needs a metric", "tubecert synth, then --metric FILE")
+    if spec.tube.epsilon is None and not spec.tube.half_widths:
+        raise _error(spec, "tube", "a design needs a tube to begin with", "write tube: {half_widths: {...}}")
+
+
+def _error(spec: Spec, path: str, message: str, help: str) -> SpecError:
+    return SpecError([Finding(code="TC105", message=message, location=spec.location(path), help=help)])
+
+
+def _minimised(spec: Spec, words: str | None) -> Mapping[str, float]:
+    """The states that count, each with the unit that its half-width is compared in; raises `SpecError`."""
+    asked = {name: float(width) for name, width in spec.tube.half_widths}
+    if words is None:
+        return asked
+    names = [name.strip() for name in words.split(",")]
+    wrong = [name for name in names if name not in spec.states]
+    if wrong:
+        help = suggestion(wrong[0], spec.states, what="states")
+        raise SpecError(
+            [Finding(code="TC122", message=f"--minimise: {visible(wrong[0])} is no state", help=help)]
+        )
+    return {name: asked.get(name, 1.0) for name in names}
+
+
+def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:
+    """The keys of the tube, times a scale."""
+    if scale == 1:
+        return []
+    sizes = {f"tube.half_widths.{name}": width for name, width in spec.tube.half_widths}
+    if not sizes:
+        radii = (("tube.epsilon", spec.tube.epsilon), ("tube.rho_a", spec.tube.rho_a))
+        sizes = {key: value for key, value in radii if value is not None}
+    return [Setting.of(f"{key}={number_text(value * scale)}") for key, value in sizes.items()]
+
+
+def _sealed(found: Design) -> str | None:
+    """The certificate of the best attempt, as a text."""
+    if found.best is None:
+        return None
+    command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
+    run = {"command": command, "versions": versions()}
+    return certificate.dump(certificate.seal(found.best.result.to_json(), run))

@@ -1,0 +1,72 @@
+"""The command `design`: its options. `register` adds it to the app."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tubecert.cli.guard import guarded
+from tubecert.cli.options import Budget, Output, Settings, SpecFile, number_option, with_output
+
+_AFTER = """\b
+Examples:
+  tubecert design configs/hardware_orbit.yaml
+  tubecert design plant.yaml --minimise px,pz --set hardware.rate=250
+
+\b
+The tube of the specification is scaled up and down; every attempt is a full certification of the kind that
+decides (conditions.decides, normally H: the machine), and the narrowest one that is certified is written.
+
+\b
+Exit codes: 0 a tube was found; 1 none, and a claim is refuted; 2 invalid input; 4 none.
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the app."""
+    app.command(epilog=_AFTER, short_help="The narrowest tube that the machine keeps.")(design)
+
+
+@with_output
+def design(
+    context: typer.Context,
+    spec: SpecFile,
+    *,
+    minimise: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STATES",
+            help="States whose half-widths count, separated by commas.  [those of tube.half_widths, or the radius]",
+            show_default=False,
+        ),
+    ] = None,
+    set_: Settings = None,
+    metric: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
+    ] = None,
+    gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
+    budget: Budget = None,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The certificate.  [SPEC's stem.design.json]"),
+    ] = None,
+    how: Output,
+) -> None:
+    """Find the narrowest certified tube for the machine of a specification."""
+    del context
+    with guarded(how):
+        from tubecert.cli.design import Given, run
+
+        given = Given(
+            spec=spec,
+            minimise=minimise,
+            settings=set_ or (),
+            metric=metric,
+            gap=gap,
+            budget=budget,
+            target=output,
+        )
+        code = run(given, how)
+    raise typer.Exit(code)

@@ -1,0 +1,119 @@
+"""The narrowest tube that a machine can be proven to keep: the tube of a specification scaled up and down.
+
+Whether there are gains for a tube is not monotone in its size: a wide one has large constants, in a narrow one the
+start or the machine does not fit. So sizes are tried by factors of two in both directions until one fails, and the best
+is then narrowed to what it was proven to need. In: a specification at every scale. Out: every attempt, each a full
+certification.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from tubecert.certificate.result import Result
+from tubecert.conditions.decimals import round_up
+from tubecert.kinds import HARDWARE
+from tubecert.kinds.hardware import HardwareData
+from tubecert.pipeline import Options, Progress, certify
+from tubecert.spec import Spec
+from tubecert.stages.memory import Memory
+from tubecert.verdict import Verdict
+
+_FARTHEST: Final = 6  # factors of two in one direction
+_NARROWINGS: Final = 8
+_ROOM: Final = Fraction(1001, 1000)  # between what is needed and what is tried next
+_SETTLED: Final = Fraction(998, 1000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """The tube at a scale: what came of it, and how wide it was proven to be; None if it was not proven."""
+
+    scale: Fraction
+    result: Result
+    size: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """Every attempt in the order in which they were made."""
+
+    attempts: tuple[Attempt, ...]
+
+    @property
+    def best(self) -> Attempt | None:
+        """The narrowest that is proven."""
+        found = [each for each in self.attempts if each.size is not None]
+        return min(found, key=lambda each: each.size or 0.0, default=None)
+
+
+def narrowest(
+    at: Callable[[Fraction], Spec],
+    options: Options,
+    minimise: Mapping[str, float],
+    progress: Progress | None = None,
+) -> Design:
+    """The narrowest tube, by the largest half-width of some states in the units given (empty: by the radius)."""
+    memory = Memory()
+    attempts: dict[Fraction, Attempt] = {}
+
+    def attempt(scale: Fraction) -> Attempt:
+        if scale not in attempts:
+            result = certify(at(scale), options, progress, memory)
+            attempts[scale] = Attempt(scale=scale, result=result, size=size_of(result, minimise))
+        return attempts[scale]
+
+    first = attempt(Fraction(1))
+    for factor in (Fraction(1, 2), Fraction(2)):
+        scale, failed = Fraction(1), 0
+        for _ in range(_FARTHEST):
+            scale *= factor
+            found = attempt(scale)
+            failed = 0 if found.size is not None else failed + 1
+            if (
+                not found.result.sections
+                or failed > 1
+                or (factor > 1 and _is_wider(found, attempts.values()))
+            ):
+                break
+    best = Design(attempts=tuple(attempts.values())).best or first
+    for _ in range(_NARROWINGS):
+        needed = needed_of(best.result)
+        if best.size is None or needed is None or needed >= _SETTLED:
+            break
+        best = attempt(round_up(float(best.scale * needed * _ROOM), 5))
+    return Design(attempts=tuple(attempts.values()))
+
+
+def _is_wider(found: Attempt, others: Iterable[Attempt]) -> bool:
+    """Whether a wider tube was proven, and is wider than another: a still wider one will not be narrower."""
+    sizes = [each.size for each in others if each.size is not None and each is not found]
+    return found.size is not None and bool(sizes) and min(sizes) < found.size
+
+
+def size_of(result: Result, minimise: Mapping[str, float]) -> float | None:
+    """How wide a tube is proven to be; None unless it is certified."""
+    if result.verdict is not Verdict.CERTIFIED or result.tube is None:
+        return None
+    own = _machine(result)
+    widths = (result.tube.half_widths or {}) if own is None else own.half_widths
+    if minimise:
+        return max(widths[name] / unit for name, unit in minimise.items())
+    return float(result.tube.rho) if own is None or own.radius is None else own.radius
+
+
+def needed_of(result: Result) -> Fraction | None:
+    """What share of the tube is needed for what was proven; None where the theorem does not say."""
+    own = _machine(result)
+    if own is None or own.level_margin is None:
+        return None
+    return 1 - Fraction(own.level_margin.below)
+
+
+def _machine(result: Result) -> HardwareData | None:
+    """The section of certificate H, if that is what decides."""
+    found = result.sections.get(HARDWARE.key)
+    return found if isinstance(found, HardwareData) and result.decided_by == (HARDWARE.key,) else None

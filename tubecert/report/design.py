@@ -1,0 +1,82 @@
+"""What `design` tried and what it found, in words, and as data for programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.text import Text
+
+from tubecert.kinds import HARDWARE
+from tubecert.kinds.hardware import HardwareData
+from tubecert.report import sections
+from tubecert.report.console import verdict_line
+from tubecert.report.layout import plain_table, titled
+from tubecert.report.machine import lines
+from tubecert.report.numbers import exact, percent, up
+from tubecert.words.claims import sentence
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from tubecert.pipeline.design import Attempt, Design
+    from tubecert.spec import Spec
+
+
+def summary(spec: Spec, found: Design) -> Text:
+    """The best tube, or that there is none."""
+    del spec
+    if found.best is not None:
+        return verdict_line(found.best.result)
+    return verdict_line(found.attempts[0].result)
+
+
+def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType]:
+    """The best, then every attempt."""
+    parts: list[RenderableType] = [summary(spec, found)]
+    best = found.best
+    if best is not None:
+        parts += titled("Machine", [Text(line) for line in lines(best.result)])
+        scale = f"{exact(best.scale)} times as wide as the specification's"
+        parts += titled("Tube", [Text(f"{scale}: {sections.extent(best.result)}")])
+    table = plain_table(">scale", "verdict", ">proven size", ">used", "what stops it", wrapped=4)
+    for each in sorted(found.attempts, key=lambda each: each.scale):
+        mark = " *" if each is best else ""
+        table.add_row(
+            f"{exact(each.scale)}{mark}",
+            Text(str(each.result.verdict), style=sections.VERDICTS[each.result.verdict]),
+            "" if each.size is None else up(each.size),
+            _used(each),
+            _stops(each),
+        )
+    covered = f"{len(found.attempts)} sizes were tried, by factors of two and then inward from the best"
+    parts += titled("Attempts", [table, Text(f"{covered}; what lies between them was not.", style="dim")])
+    if target is not None:
+        parts += [Text(), Text(f"certificate {target}")]
+    return parts
+
+
+def _used(each: Attempt) -> str:
+    own = each.result.sections.get(HARDWARE.key)
+    known = isinstance(own, HardwareData) and own.level_margin is not None and each.size is not None
+    return percent(1 - own.level_margin.below) if known else ""  # type: ignore[union-attr]
+
+
+def _stops(each: Attempt) -> str:
+    reason = each.result.reason
+    return "" if each.size is not None or reason is None else sentence(reason)
+
+
+def as_data(found: Design) -> dict[str, Any]:
+    """Every attempt, for programs."""
+    return {
+        "best": None if found.best is None else str(found.best.scale),
+        "attempts": [
+            {
+                "scale": str(each.scale),
+                "verdict": str(each.result.verdict),
+                "size": each.size,
+                "reason": None if each.result.reason is None else each.result.reason.claim.tag,
+            }
+            for each in found.attempts
+        ],
+    }
