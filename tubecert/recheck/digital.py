@@ -333,8 +333,7 @@ class _Evaluation:
             assert m.drift_difference_metric is not None
             assert m.drift_slope_metric is not None
             drift = smaller(m.drift_difference_metric, m.drift_slope_metric * self.level)
-            V_M = smaller(V_M, drift + forced)
-            V_d = smaller(V_d, V_M)
+            V_M, V_d = smaller(V_M, drift + forced), smaller(V_d, drift + forced)
         slope = m.feedback_slope + n.metric_input_gain * n.feedback_gain
         bend = m.feedback_curvature * (self.level + self.n_M) / 2
         stretched = self.n_M + (j1 - 1) * top_A * self.seen

@@ -13,8 +13,13 @@ from tubecert.recheck.balls import Ball, larger, smaller
 
 
 def log_ratio(x: Ball) -> Ball:
-    """log(1 + x)/x, 1 at 0."""
-    return arb(1) if x.is_zero() else x.log1p() / x
+    """log(1 + x)/x, 1 at 0; it falls with x."""
+    if x.is_zero():
+        return arb(1)
+    if not x.contains(0):
+        return x.log1p() / x
+    ends = [y.log1p() / y if y != 0 else arb(1) for y in (x.lower(), x.upper())]
+    return ends[0].union(ends[1])
 
 
 def kappa(c: Ball, w: Ball) -> Ball:
@@ -90,5 +95,6 @@ class Distance:
         A1, C1 = self.ultimate(), self.beta * (self.H0 - self.S)
         slow, fast = (-self.rate * t).exp(), (-self.omega * t).exp()
         D1 = self.omega - self.rate
-        K = t * slow if D1.is_zero() else (slow - fast) / D1
+        # a mean value: t times something between both
+        K = t * slow.union(fast) if D1.contains(0) else (slow - fast) / D1
         return A1 + (self.d0 - A1) * slow + C1 * K
