@@ -312,7 +312,8 @@ def _parameters(node: Node) -> dict[str, Range]:
 
 def _wind(node: Node) -> Wind:
     own = node.closed(optional=("bound", "rate"))
-    return Wind(bound=own.get("bound", Node.exact), rate=own.get("rate", Node.exact))
+    bound = own.known("bound", Node.exact) if "bound" in own else None
+    return Wind(bound=bound, rate=own.get("rate", Node.exact))
 
 
 def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:

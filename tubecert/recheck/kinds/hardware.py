@@ -40,6 +40,8 @@ SHARES = (
 _MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
 _PROOF = ("floor", "speed", "bias", "ripple")
 
+_DUST = 1e-9  # of the level: a share that is printed as none
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareSection(Section):
@@ -297,7 +299,7 @@ def _holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome
     if section.ultimate_radius is not None:
         outcomes.append(at_most(found.ultimate / least, section.ultimate_radius, "the ultimate radius"))
     for key, share in section.budget.items():
-        outcomes.append(at_most(found.shares[key].max(0), share, f"the share of {key}"))
+        outcomes.append(at_most((found.shares[key] - _DUST).max(0), share, f"the share of {key}"))
     return all_of(outcomes)
 
 
