@@ -104,9 +104,10 @@ def _limit(axis: Axes, plan: Array, width: float, curves: list[Array]) -> None:
 
 
 def _inputs(campaign: Campaign) -> Figure:
-    """What acts: u = u* + k + u_a, for every loop and input, and what u_a should cancel."""
+    """What acts: u = u* + k + u_a, for every loop and input, what u_a should cancel, limits and proven ranges."""
     setting = campaign.setting
     names, loops = setting.spec.inputs, campaign.drawn
+    limits = {name: [float(end) for end in ends] for name, ends in setting.spec.limits}
     figure = blank(1.2 + 3.6 * len(loops), 0.9 + 2.2 * len(names))
     axes = figure.subplots(len(names), len(loops), sharex=True, sharey="row", squeeze=False)
     for column, item in enumerate(loops):
@@ -117,7 +118,17 @@ def _inputs(campaign: Campaign) -> Figure:
             axis.plot(runs.t, runs.u_plan[:, row], color="#7F7F7F", ls="--", label="plan u*")
             axis.plot(runs.t, runs.k[0, :, row], color=COLORS["ccm"], label="feedback k")
             axis.plot(runs.t, -runs.h[0, :, row], color=TUBE, lw=2.6, alpha=0.7, label="-h")
-            if item.loop.problem.adaptive:
+            promise = item.loop.promise
+            stays = (
+                [(own.least, own.greatest) for own in promise.ranges if own.column == row] if promise else []
+            )
+            ends = [("limits", end) for end in limits.get(name, ())] + [
+                ("proven", e) for two in stays for e in two
+            ]
+            for label, end in ends:
+                style = "-" if label == "limits" else ":"
+                axis.axhline(end, color="#7F7F7F", lw=1.0, ls=style, label=label)
+            if item.loop.problem.adaptive or item.loop.tested:
                 axis.plot(runs.t, runs.u_a[0, :, row], color=COLORS["l1"], lw=1.0, label="adaptive u_a")
             if column == 0:
                 axis.set_ylabel(labelled(setting, name))
@@ -125,7 +136,9 @@ def _inputs(campaign: Campaign) -> Figure:
         axes[-1, column].set_xlabel("t [s]")
         axes[-1, column].set_xlim(0, setting.horizon)
     fullest = max(range(len(loops)), key=lambda column: len(axes[0, column].lines))
-    figure.legend(*axes[0, fullest].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    handles, labels = axes[0, fullest].get_legend_handles_labels()
+    shown = dict(zip(labels, handles, strict=True))  # both ends of a range have one
+    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=5)
     return figure
 
 
