@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -193,6 +194,52 @@ def test_smooth_projection_agrees_with_dop853():
     assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
     assert np.abs(found.sigma_hat).max() <= 1.5 * (1 + 1e-9)
     assert np.abs(found.sigma_hat).max() > 1.5 / np.sqrt(1.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["ccm", "l1"])
+@pytest.mark.parametrize("radius", [50.0, 1.0])
+def test_a_wind_moves_the_state_and_not_what_is_predicted(controller, radius):
+    """x' = ... + E w, so xtilde' = ... - E w; with the smaller radius the projection works."""
+    gains = LoopGains(
+        bandwidth=10.0, projection_radius=radius, predictor_gain=2.0, adaptation_rate=400.0, smooth=0.2
+    )
+    E, f = np.array([0.4, -0.7]), right_hand_side(controller, gains)
+
+    def rate(t, z):
+        blown = np.clip(3 * np.sin(2 * t + 0.4), -1, 1) * E
+        return f(t, z) + np.concatenate([blown, -blown, np.zeros(2)])[: len(z)]
+
+    z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
+    case = problem(controller, gains=gains, E=tuple((constant(Fraction(repr(float(e)))),) for e in E))
+    expected = dop853(rate, z0, case.times, max_step=1e-3)
+    h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=1)
+    blowing = {"wind": 1.0, "blowing": [1.0], "gusting": [2.0, 0.4]}
+    h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
+    found = integrate(case, START, h, tolerance=1e-7)
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    if controller == "l1":
+        assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-6
+        assert np.abs(found.sigma_hat[0] - expected[:, 4:5]).max() < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("aim", [1, 2])
+def test_a_wind_that_aims(aim):
+    """Along E'M x, or along E'B c with c = B'M x, but for a thin layer where that turns round."""
+    E, M, f = np.array([[0.4, 0.1], [-0.7, 0.2]]), np.linalg.inv(W2), right_hand_side("ccm", None)
+
+    def rate(t, z):
+        v = M @ z if aim == 1 else B2 @ (B2.T @ M @ z)
+        w = E.T @ v
+        return f(t, z) + E @ w / np.sqrt(w @ w + (0.05 * 2.0) ** 2) * 0.5
+
+    case = problem("ccm", E=tuple(tuple(constant(Fraction(repr(float(e)))) for e in row) for row in E))
+    h = replace(Disturbance.from_expressions(wavy_h(), TWO, 1, k=2), layer=2.0)
+    blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
+    h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
+    found = integrate(case, START, h, tolerance=1e-7)
+    assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() < 1e-6
 
 
 def sampled_reference(gains, times, h=h2):

@@ -79,3 +79,18 @@ def test_without_certificate_h_there_is_no_such_loop():
     setting = setting_of(spec, pipeline.certify(spec, pipeline.Options(conditions="distance")))
     with pytest.raises(TubecertError, match="does not certify the controller hardware"):
         loop_of(setting, "hardware", Choice())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["l1", "sampled"])
+def test_a_wind_blows_on_the_loops_of_b_and_c_and_breaks_nothing(controller):
+    spec = load_text(FLAT + "disturbance: {E: [[1, 0], [0, 1]], bound: 1/100}\n")
+    result = pipeline.certify(spec, pipeline.Options(conditions="all"))
+    setting = setting_of(spec, result)
+    loop = loop_of(setting, controller, Choice())
+    assert loop.promise.decay.defect > 0.009 * setting.certified["wind_push"] > 0  # the plan has none
+    found = attacked(setting, loop, 15, 2)
+    assert found.worst_comparison.uses["distance"].share > 0.1
+    for comparison in (found.comparison, found.worst_comparison):
+        assert not comparison.violations
+        assert not comparison.unreliable

@@ -220,7 +220,7 @@ def test_the_loop_is_that_of_theorem_h(name):
     assert (found.greatest[0] >= u.max(axis=0) - 1e-7).all()
 
 
-def scalar(machine, f, beside, *, horizon=2.0, h=None):
+def scalar(machine, f, beside, *, horizon=2.0, h=None, start=0.0):
     """x' = f + u + h at x* = 0, W = 1, with what acts beside h."""
     model = ControlAffineModel(
         states=("x1",), inputs=("u",), f=(f,), B=((ONE,),), W=((ONE,),), rate=Fraction(1), h=None
@@ -228,7 +228,7 @@ def scalar(machine, f, beside, *, horizon=2.0, h=None):
     acting = Disturbance.from_expressions(h, model, 1)
     acting = replace(acting, beside=acting.beside._replace(**{k: np.array([v]) for k, v in beside.items()}))
     case = problem(machine, np.linspace(0, horizon, 5), model=model, plan=ORIGIN, wind=())
-    return integrate(case, np.zeros((1, 1)), acting, tolerance=1e-8)
+    return integrate(case, np.full((1, 1), start), acting, tolerance=1e-8)
 
 
 ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
@@ -268,6 +268,13 @@ def test_a_signal_moves_at_its_rate_and_is_known_a_sample_late():
     assert found.h[0, -1, 0] == pytest.approx(1.0)
     assert found.worst.sigma_error.value[0] == pytest.approx(0.5 * 2.5e-2, rel=1e-3)
     assert found.worst.estimate.value[0] == pytest.approx(0.5 * 0.5e-2, rel=1e-3)
+
+
+def test_the_noise_that_costs_most_is_found():
+    """x' = u - x/100 from x = .5: kappa(y) = -(1 - 1/100) y, and c'kappa is largest where y is least."""
+    machine = MachineRun(sample_time=1e-2, delay=0.0, bandwidth=1e-6, radius=10.0)
+    found = scalar(machine, -X / 100, {"choice": 2.0, "table": [[3e-2], [-5e-2], [1e-2]]}, start=0.5)
+    assert found.k[0, 0, 0] == pytest.approx(-0.99 * 0.45)
 
 
 def test_a_machine_is_slower_than_its_delay():

@@ -29,6 +29,8 @@ _CLOSE = 1e-7  # of a step: how near a crossing is found
 class Fast(NamedTuple):
     """Terms and gains of the fast part; `layer` nu 0 is the hard projection, `radius` is R_H.
 
+    `forces`: what drives it, h (m,) and where a wind blows E w (n,) after that.
+
     `exact` says that B is constant: then `flow` (2 Q, Y, Y) and `forced` (2 Q, 3, Y, m) are the exact flows over half
     and whole steps of Q lengths, for y and for the coefficients of h. `turn` is the angle in rad that RK4 may step
     over. `A` (n, n) is A_m in 1/s, `omega` in rad/s; `P` (n, n) is S'S in the tube's coordinates z = S x, where the
@@ -37,6 +39,7 @@ class Fast(NamedTuple):
 
     terms: Terms
     at: Layout
+    forces: int
     A: Array
     P: Array
     Gamma: float
@@ -50,9 +53,9 @@ class Fast(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """h and B while the fast part flows, and working memory.
+    """h, with E w after it where a wind blows, and B while the fast part flows, and working memory.
 
-    `h` (4, m), `B` (4, n, m): the coefficients by powers of the time over the step's length, then the values at a
+    `h` (4, forces), `B` (4, n, m): the coefficients by powers of the time over the step's length, then the values at a
     time. `rates` (4, Y), `trial` (Y,) and `end` (Y,): of RK4 the rates, where they are taken, and the end of a step.
     """
 
@@ -63,25 +66,26 @@ class Inner(NamedTuple):
     end: Array
 
 
-def inner(at: Layout) -> Inner:
+def inner(at: Layout, forces: int) -> Inner:
     """Fresh working memory."""
     n, m, Y = at.n, at.m, at.size
-    return Inner(np.zeros((4, m)), np.zeros((4, n, m)), np.zeros((4, Y)), np.zeros(Y), np.zeros(Y))
+    return Inner(np.zeros((4, forces)), np.zeros((4, n, m)), np.zeros((4, Y)), np.zeros(Y), np.zeros(Y))
 
 
 def generator(fast: Fast, B: Array) -> tuple[Array, Array]:
-    """L (Y, Y) and E (Y, m) with y' = L y + E h, for a constant B (n, m) and an idle projection."""
+    """L (Y, Y) and E (Y, forces) with y' = L y + E h, for a constant B (n, m) and an idle projection."""
     terms, y, Y, m = fast.terms, slices(fast.at), fast.at.size, fast.at.m
-    L, E = np.zeros((Y, Y)), np.zeros((Y, m))
+    L, E = np.zeros((Y, Y)), np.zeros((Y, fast.forces))
     L[y.v, y.u_a] = B  # v' = B u_a
     if terms.filters:
         L[y.u_a, y.u_a] = -fast.omega * np.eye(m)  # (0.8) u_a' = -omega (u_a + ...
         if terms.knows:
-            E[y.u_a] = -fast.omega * np.eye(m)  # ... h)
+            E[y.u_a, :m] = -fast.omega * np.eye(m)  # ... h)
         else:
             L[y.u_a, y.sigma_hat] = -fast.omega * np.eye(m)  # ... sigma_hat)
     if terms.predicts:
-        L[y.xtilde, y.xtilde], E[y.xtilde] = fast.A, -B  # (0.6) - (0.1): xtilde' = A_m xtilde - B h ...
+        L[y.xtilde, y.xtilde], E[y.xtilde, :m] = fast.A, -B  # (0.6) - (0.1): xtilde' = A_m xtilde - B h ...
+        E[y.xtilde, m:] = -np.eye(fast.at.n, fast.forces - m)  # ... - E w
     if terms.adapts:
         L[y.xtilde, y.sigma_hat] = B  # (0.6) ... + B sigma_hat
         L[y.sigma_hat, y.xtilde] = -fast.Gamma * B.T @ fast.P  # (0.7) sigma_hat' = -Gamma B'P xtilde
@@ -120,7 +124,7 @@ def exact_flows(fast: Fast, B: Array, lengths: Array) -> Fast:
 @compiled
 def advance(fast: Any, length: float, index: int, y: Any, inner: Any, first: int, out: Any) -> None:
     """y after a length; of an exact flow, whose number is `index`, only the entries from `first` on."""
-    if fast.exact and (not fast.terms.adapts or _idle(fast, y, inner.h)):
+    if fast.exact and (not fast.terms.adapts or _idle(fast, length, y, inner.h)):
         _exact(fast.flow[index], fast.forced[index], y, inner.h, first, fast.at.v, out)
     else:
         copy(out, y)
@@ -140,11 +144,11 @@ def _exact(flow: Any, forced: Any, y: Any, h: Any, first: int, v: int, out: Any)
 
 
 @compiled
-def _idle(fast: Any, y: Any, h: Any) -> bool:
+def _idle(fast: Any, length: float, y: Any, h: Any) -> bool:
     """Whether sigma_hat provably stays where the projection does nothing, up to the rounding.
 
     While it is idle, |sigma_hat - h|^2 + Gamma xtilde'P xtilde grows by the drift of h only: |sigma_hat| is at most the
-    root of that at the start, plus |h| and twice what h moves.
+    root of that at the start, plus |h| and twice what h moves, plus what a wind has moved xtilde.
     """
     now = blocks(y, fast.at)
     amplitude, reach = 0.0, 0.0
@@ -153,7 +157,12 @@ def _idle(fast: Any, y: Any, h: Any) -> bool:
     for j in range(fast.at.m):
         amplitude += (now.sigma_hat[j] - h[0, j]) ** 2
     for p in range(3):  # |h| and its drift
-        reach += (1 + p) * np.sqrt(dot(h[p], h[p]))
+        square, blown = 0.0, 0.0
+        for j in range(fast.at.m):
+            square += h[p, j] * h[p, j]
+        for i in range(fast.forces - fast.at.m):
+            blown += fast.Gamma * h[p, fast.at.m + i] * dot(fast.P[i], h[p, fast.at.m :])
+        reach += (1 + p) * np.sqrt(square) + length * np.sqrt(blown)
     return bool(np.sqrt(amplitude) + reach <= fast.radius / np.sqrt(1.0 + fast.layer))  # 2.5: where F <= 0
 
 
@@ -163,6 +172,7 @@ def _place(inner: Any, s: float) -> None:
     h, B = inner.h, inner.B
     for j in range(h.shape[1]):
         h[3, j] = h[0, j] + s * (h[1, j] + s * h[2, j])
+    for j in range(B.shape[2]):
         for i in range(B.shape[1]):
             B[3, i, j] = B[0, i, j] + s * (B[1, i, j] + s * B[2, i, j])
 
@@ -179,7 +189,7 @@ def _outward(fast: Any, y: Any, B: Any) -> float:
 
 @compiled
 def _rate(fast: Any, sliding: bool, y: Any, h: Any, B: Any, dy: Any) -> None:
-    """y' for given h (m,) and B (n, m), term by term; `sliding`: along the ball of the hard projection."""
+    """y' for given h (forces,) and B (n, m), term by term; `sliding`: along the ball of the hard projection."""
     terms, now, rate = fast.terms, blocks(y, fast.at), blocks(dy, fast.at)
     dy[:] = 0.0
     if terms.filters:
@@ -190,6 +200,8 @@ def _rate(fast: Any, sliding: bool, y: Any, h: Any, B: Any, dy: Any) -> None:
         rate.v[i] = dot(B[i], now.u_a)  # v' = B u_a
         if terms.predicts:
             rate.xtilde[i] = dot(fast.A[i], now.xtilde) - dot(B[i], h)  # (0.6) - (0.1): A_m xtilde - B h ...
+            if fast.forces > fast.at.m:
+                rate.xtilde[i] -= h[fast.at.m + i]  # ... - E w
         if terms.samples:
             rate.xtilde[i] += now.s_hat[i]  # (4.5) ... + s_hat
         if terms.adapts:

@@ -166,7 +166,7 @@ def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point)
         status, energy = steer(field, now.plan, now.x, point.plant, point)
     _disturb(force, now, point)
     _blow(force, now, point)
-    rest = place + m + n * point.w.shape[0]
+    rest = place + m + point.E.size
     if theta.shape[1] > 0 and field.program.outputs.shape[0] > rest:
         for i in range(n):
             point.wind[i] += point.memory[field.program.outputs[rest + i]]

@@ -143,6 +143,7 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
     found = Fast(
         terms=problem.terms,
         at=at,
+        forces=at.m + (at.n if problem.E or problem.rest else 0),
         A=np.zeros((at.n, at.n)) if gains is None else gains.A_m(at.n),
         P=np.eye(at.n) if problem.P is None else problem.P,
         Gamma=1.0 if gains is None or gains.adaptation_rate is None else gains.adaptation_rate,

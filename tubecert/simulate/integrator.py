@@ -234,7 +234,7 @@ def run(own: Lane, point: Point, starts: Array, outputs: int) -> Output:
     waiting = 1 if own.machine is None else own.machine.waiting
 
     def work(first: int, last: int) -> None:
-        stepping.run(first, last, own, starts, stepping.work(at, point, stop, waiting), out)
+        stepping.run(first, last, own, starts, stepping.work(own.fast, point, stop, waiting), out)
 
     work(0, 0)  # compiles, in a thread that Ctrl-C ends
     pool = ThreadPoolExecutor(_cores())

@@ -67,7 +67,7 @@ class Lane(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Of the four stages of a step: h (4, m), B (4, n, m), and the slopes w = f + B(u* + k + h) (4, n)."""
+    """Of the four stages of a step: h (4, forces) as in `fast.Inner`, B (4, n, m), and the slopes (4, n)."""
 
     h: Array
     B: Array
@@ -119,8 +119,9 @@ class Output(NamedTuple):
     ended: Array
 
 
-def work(at: Layout, shared: Point, stop: Array, waiting: int = 1) -> Work:
+def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
     """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
+    at, forces = fast.at, fast.forces
     n, m, Y = at.n, at.m, at.size
     return Work(
         x=np.zeros(n),
@@ -130,11 +131,11 @@ def work(at: Layout, shared: Point, stop: Array, waiting: int = 1) -> Work:
         u=np.zeros(m),
         sizes=np.zeros(len(PEAKS)),
         stop=stop,
-        stages=Stages(np.zeros((4, m)), np.zeros((4, n, m)), np.zeros((4, n))),
+        stages=Stages(np.zeros((4, forces)), np.zeros((4, n, m)), np.zeros((4, n))),
         kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
         notes=notes(n, m, waiting),
         point=point(shared.memory.copy(), copied(shared.curve), (n, m, shared.E.shape[1])),
-        inner=inner(at),
+        inner=inner(at, forces),
     )
 
 
@@ -279,6 +280,8 @@ def _keep(stage: int, point: Point, u: Array, stages: Stages) -> None:
             stages.h[stage, j], stages.B[stage, i, j] = point.h[j], point.plant.B[i, j]
             stages.slope[stage, i] += point.plant.B[i, j] * (u[j] + point.h[j])
         stages.slope[stage, i] += point.wind[i]
+        if stages.h.shape[1] > m:
+            stages.h[stage, m + i] = point.wind[i]
 
 
 @compiled
@@ -291,6 +294,7 @@ def _polynomials(stages: Stages, stage: int, inner: Inner) -> None:
     h, B = stages.h, stages.B
     for j in range(h.shape[1]):
         inner.h[0, j], inner.h[1, j], inner.h[2, j] = _through(h[0, j], h[1, j], h[2, j], h[3, j], stage)
+    for j in range(B.shape[2]):
         for i in range(B.shape[1]):
             inner.B[0, i, j], inner.B[1, i, j], inner.B[2, i, j] = _through(
                 B[0, i, j], B[1, i, j], B[2, i, j], B[3, i, j], stage
