@@ -123,7 +123,7 @@ def _inputs(campaign: Campaign) -> Figure:
                 [(own.least, own.greatest) for own in promise.ranges if own.column == row] if promise else []
             )
             ends = [("limits", end) for end in limits.get(name, ())] + [
-                ("proven", e) for two in stays for e in two
+                ("certified range", e) for two in stays for e in two
             ]
             for label, end in ends:
                 style = "-" if label == "limits" else ":"
