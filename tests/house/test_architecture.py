@@ -189,3 +189,9 @@ def test_the_command_line_starts_with_typer_errors_and_names_only():
         assert all(name.startswith(light) for name in own), own
         foreign = {name.split(".")[0] for name in names - own} - set(sys.stdlib_module_names)
         assert foreign <= ALLOWED_AT_START
+
+
+def test_no_two_test_files_share_a_name():
+    """Without packages, pytest imports the tests of all rooms into one namespace."""
+    names = [path.name for path in (ROOT / "tests").rglob("*.py")]
+    assert sorted(names) == sorted(set(names))
