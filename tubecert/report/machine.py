@@ -26,6 +26,7 @@ _CAUSES: Mapping[str, str] = {
     "sampling": "feedback that is sampled and delayed",
 }
 _LEAST = 5e-5  # a smaller share is not told
+_NOTABLE = 0.01  # of the level: nearer starts are not told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,10 +106,20 @@ def lines(result: Result) -> Iterator[str]:
         else f"{exact(own.bandwidth)} rad/s"
     )
     yield f"filter: {omega}; the estimate is clipped to {clip(result, own)}"
+    if (start := start_share(result, own)) is not None:
+        yield f"the start alone is at {percent(start)} of the proven tube"
     if own.budget is not None:
         yield "what fills the tube: " + ", ".join(
             f"{each.cause} {percent(each.share)}" for each in shares(own.budget)
         )
+
+
+def start_share(result: Result, own: HardwareData) -> float | None:
+    """How far the start is from the plan, as a share of the level; None where that is next to nothing."""
+    d0 = result.constants.get("initial_distance")
+    if d0 is None or d0.above is None or not own.level or d0.above < _NOTABLE * float(own.level):
+        return None
+    return d0.above / float(own.level)
 
 
 def clip(result: Result, own: HardwareData) -> str:

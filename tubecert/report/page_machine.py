@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
-from tubecert.report.machine import clip, described, half_widths, inputs, section_of, shares
+from tubecert.report.machine import clip, described, half_widths, inputs, section_of, shares, start_share
 from tubecert.report.numbers import exact, percent, up
 from tubecert.report.page import Block, Cell, Facts, Table
 from tubecert.verdict import Verdict
@@ -25,6 +25,8 @@ def machine_blocks(result: Result) -> Iterator[Block]:
             ("filter", Cell(text=none if own.bandwidth is None else f"{exact(own.bandwidth)} rad/s")),
             ("the estimate is clipped to", Cell(text=clip(result, own))),
         ]
+        if (start := start_share(result, own)) is not None:
+            facts.append(("the start", Cell(text=f"{percent(start)} of the proven tube")))
     yield Facts(facts=tuple(facts))
     if own.budget is None:
         return

@@ -64,9 +64,7 @@ def _tiles(result: Result) -> Iterator[Tile]:
     """The numbers that a certified verdict is about; other verdicts have none to rely on."""
     if result.verdict is not Verdict.CERTIFIED:
         return
-    machine = proven_machine(result) if result.decided_by == (HARDWARE.key,) else None
-    narrowed = sections.radius(result) if machine is None else machine.radius
-    yield Tile(symbol="ρ", value=up(narrowed), unit="", words="radius of the tube")
+    yield from _sizes(result)
     chosen = deciding(result)
     for row in chosen:
         who = f", {NAMES[row.section]}" if len(chosen) > 1 else ""
@@ -80,6 +78,23 @@ def _tiles(result: Result) -> Iterator[Tile]:
             )
         if row.pair.sample_time is not None:
             yield Tile(symbol="Ts", value=exact(row.pair.sample_time), unit="s", words=f"sample time{who}")
+
+
+_MOST_TILES = 4  # half-widths that are shown first
+
+
+def _sizes(result: Result) -> Iterator[Tile]:
+    """How wide the tube is: its radius, or half-widths where that is a length in the metric."""
+    machine = proven_machine(result) if result.decided_by == (HARDWARE.key,) else None
+    tube, units = result.tube, result.spec.effective.system.units
+    if tube is None or tube.coordinates is None:
+        radius = sections.radius(result) if machine is None else machine.radius
+        yield Tile(symbol="ρ", value=up(radius), unit="", words="radius of the tube")
+        return
+    widths = (tube.half_widths or {}) if machine is None else machine.half_widths
+    for name in result.spec.effective.system.states[:_MOST_TILES]:
+        if name in widths:
+            yield Tile(symbol=name, value=up(widths[name]), unit=units.get(name, ""), words="half-width")
 
 
 def _sections(certificate: Certificate) -> Iterator[Section]:
