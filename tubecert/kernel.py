@@ -187,7 +187,7 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
 def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Proposal[R]:
     """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed.
 
-    A curve is about other loops: what the theorem is stated for.
+    A curve is about other loops like the decisive one: what the theorem is stated for.
     """
 
     def kept(recipe: R | None) -> R | None:
@@ -196,12 +196,13 @@ def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> 
     def those(recipes: Iterable[R]) -> tuple[R, ...]:
         return tuple(recipe for recipe in recipes if theorem.states(problem, recipe))
 
+    decisive = kept(proposal.decisive)
     return replace(
         proposal,
-        decisive=kept(proposal.decisive),
+        decisive=decisive,
         hopeless=kept(proposal.hopeless),
         beside={role: r for role, r in proposal.beside.items() if theorem.is_about(problem, r)},
-        curve=those(proposal.curve),
+        curve=tuple(r for r in those(proposal.curve) if theorem.alike(problem, decisive, r)),
         around=those(proposal.around),
     )
 

@@ -19,7 +19,8 @@ from tubecert.conditions import hardware
 from tubecert.conditions.hardware import HardwareRecipe, evaluated, loop_of, margins_hardware, plant
 from tubecert.conditions.obstacles import reach
 from tubecert.enclosure.constant import Constant
-from tubecert.kernel import Proof, check
+from tubecert.conditions.proposal import Proposal
+from tubecert.kernel import Proof, check, judge
 
 F = Fraction
 
@@ -481,3 +482,25 @@ def test_the_budget_adds_up():
     assert whole == pytest.approx(level, rel=1e-9)
     assert told.radius == pytest.approx(0.8 / 0.9**0.5)
     assert float(reach(x.plant.n).lo) == pytest.approx(0.9**0.5 * 0.9)
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"noise": F(0), "ripple": F("0.0001")},
+        {"delay": F(0)},
+        {"feedback_time": F(1, 10_000)},
+        {"clip_radius": F("0.38")},
+        {"noise": F(0), "ripple": F("0.0001"), "delay": F(0), "level": F("0.12"), "floor": F("0.03")},
+    ],
+)
+def test_a_curve_is_about_the_same_machine(lie: dict[str, F]) -> None:
+    """What a search puts on the curve may differ from the decisive machine in its sample time alone."""
+    problem, own = alive_machine(), recipe(level=F("0.21"))
+    shorter = {"sample_time": F(1, 2000), "feedback_time": F(1, 2000)}
+    honest, false = replace(own, **shorter), replace(own, **(shorter | lie))
+    assert all(
+        float(m.lo) > 0 for r in (honest, false) for m in hardware.margins_hardware(problem, r)
+    ), "each is a proof of its own machine"
+    judged = judge(problem, hardware.THEOREM, Proposal(decisive=own, role="machine", curve=(honest, false)))
+    assert judged.curve == (honest,)

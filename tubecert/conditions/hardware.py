@@ -537,6 +537,22 @@ def is_the_machine(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
     )
 
 
+def is_a_machine_like(problem: TubeProblem, own: HardwareRecipe | None, other: HardwareRecipe) -> bool:
+    """Whether another recipe is about the same machine but for its sample time, and what follows from that."""
+    if problem.machine is None or own is None:
+        return False
+    asked, Ts = problem.machine.asked, other.sample_time
+    same = (
+        (other.noise, own.noise),
+        (other.wind, own.wind),
+        (other.clip_radius, own.clip_radius),
+        (other.delay, Ts if asked.one_sample else own.delay),
+        (other.feedback_time, Ts if asked.feedback_time is None else asked.feedback_time),
+        (other.prediction is None, own.prediction is None),
+    )
+    return asked.bandwidth in (None, other.bandwidth) and all(a == b for a, b in same)
+
+
 def stands_in_the_way(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """What no machine can overcome, and constants of the machine without a bound."""
     if problem.machine is None:
@@ -584,6 +600,7 @@ THEOREM = Theorem(
     obstacles=stands_in_the_way,
     ultimate=ultimate_radius,
     about=is_the_machine,
+    alike=is_a_machine_like,
     sizes=("delay", "noise", "wind", "speed", "bias", "ripple", "prediction"),
     optional=("bandwidth", "prediction"),
 )

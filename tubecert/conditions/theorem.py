@@ -36,6 +36,11 @@ def _any(problem: TubeProblem, recipe: object) -> bool:
     return True
 
 
+def _all(problem: TubeProblem, decisive: object, other: object) -> bool:
+    del problem, decisive, other
+    return True
+
+
 def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
     del problem
     return ()
@@ -52,7 +57,8 @@ class Theorem(Generic[R]):
     this in the long run, for a recipe that is proven. `inputs`: what the loop adds to u* at most, for a recipe that is
     proven; without it inputs have no bound. `own_predictor`: where a general matrix A_m is asked for, the theorem is
     about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
-    what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any.
+    what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any;
+    `alike`: whether another one may stand on the curve of a decisive one, which is about loops like it.
     """
 
     recipe: type[R]
@@ -67,6 +73,7 @@ class Theorem(Generic[R]):
     sizes: tuple[str, ...] = ("speed", "prediction_error", "uncertainty")
     optional: tuple[str, ...] = ()
     about: Callable[[TubeProblem, R], bool] = _any
+    alike: Callable[[TubeProblem, R | None, R], bool] = _all
 
     def is_about(self, problem: TubeProblem, recipe: object) -> bool:
         """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its numbers."""
