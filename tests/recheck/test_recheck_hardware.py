@@ -7,10 +7,11 @@ from fractions import Fraction
 
 import pytest
 import tampers
-from rechecked import CONFIGS, certified, examine, failing, sealed, unconfirmed
+from rechecked import CONFIGS, case_of, certified, examine, failing, sealed, unconfirmed
 from systems import SMALL
 
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.recheck.claims import of_certified
 
 MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
 WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
@@ -332,3 +333,27 @@ def test_no_random_change_of_what_is_stated_of_a_machine_is_confirmed(monkeypatc
     refusals, _, wrong = tampers.campaign(made, 150, seed=5)
     assert wrong == []
     assert refusals > 90
+
+
+def test_outcomes_of_a_forged_certificate_are_not_those_of_another(honest):
+    """A half-width that only a forged bound of the metric allows is not confirmed with the bound that is true."""
+    document, memory = copy.deepcopy(honest[0]), dict(honest[1])
+    widths = document["result"]["hardware"]["half_widths"]
+    name = min(widths)
+    widths[name] = float(widths[name]) / 2
+    forged = copy.deepcopy(document)
+    forged["result"]["constants"]["lower"] |= {"below": 1e6, "above": 1e6}
+    examine(sealed(forged), memory=memory)
+    assert unconfirmed(document)
+    assert refused(document, memory)
+
+
+@pytest.mark.parametrize("name", ["lower", "h", "plan_defect"])
+def test_claims_of_h_depend_on_all_that_they_rest_on(honest, name):
+    case, other = case_of(honest[0]), copy.deepcopy(honest[0])
+    other["result"]["constants"][name] |= {"below": 7.0, "above": 7.0}
+    keys, others = ({c.name: c.key for c in of_certified(x)} for x in (case, case_of(sealed(other))))
+    resting = {"lower": "H: half-width", "h": "H: the estimate", "plan_defect": "H: d <"}[name]
+    found = [own for own in keys if own.startswith(resting)]
+    assert found
+    assert all(keys[own] != others[own] for own in found)

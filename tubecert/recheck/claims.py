@@ -199,7 +199,8 @@ class Case:
     @cached_property
     def numbers(self) -> tuple[object, ...]:
         """What every claim about gains depends on."""
-        used = (*USED, *(name for name in self.constants if name not in MEASURED))
+        # the defect in |.| is for certificate H alone
+        used = (*USED, "plan_defect", *(name for name in self.constants if name not in MEASURED))
         return *self.whole, self.place.rho, self.tube.rho_a, *(self.bound_if_any(name) for name in used)
 
 

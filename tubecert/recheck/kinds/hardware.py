@@ -127,7 +127,7 @@ class OfMachines(Kind[HardwareSection, Digital]):
         )
         yield ground.over_tube(
             "H: the estimate is clipped to a set that holds h",
-            (section.clip, recipe),
+            (section.clip, recipe, ground.constants["h"].above),
             lambda: _clipped(section, recipe, ground),
         )
         words = f"Ts = {float(recipe.sample_time):.6g}, tau = {float(recipe.delay):.6g}"
@@ -315,7 +315,7 @@ def _states(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterat
         if width is not None:
             yield ground.over_tube(
                 f"H: half-width of {name} <= {float(width):.6g}",
-                (width, recipe.level),
+                (width, recipe.level, ground.constants["lower"].below),
                 lambda i=i, width=width: _within(i, width, recipe.level, ground),  # type: ignore[misc]
             )
 
