@@ -18,8 +18,8 @@ from tubecert.bounds.constants import ResidualConstants
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import HardwareRecipe, evaluated, loop_of, margins_hardware, plant
 from tubecert.conditions.obstacles import reach
-from tubecert.enclosure.constant import Constant
 from tubecert.conditions.proposal import Proposal
+from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Proof, check, judge
 
 F = Fraction
@@ -499,8 +499,8 @@ def test_a_curve_is_about_the_same_machine(lie: dict[str, F]) -> None:
     problem, own = alive_machine(), recipe(level=F("0.21"))
     shorter = {"sample_time": F(1, 2000), "feedback_time": F(1, 2000)}
     honest, false = replace(own, **shorter), replace(own, **(shorter | lie))
-    assert all(
-        float(m.lo) > 0 for r in (honest, false) for m in hardware.margins_hardware(problem, r)
-    ), "each is a proof of its own machine"
+    assert all(float(m.lo) > 0 for r in (honest, false) for m in hardware.margins_hardware(problem, r)), (
+        "each is a proof of its own machine"
+    )
     judged = judge(problem, hardware.THEOREM, Proposal(decisive=own, role="machine", curve=(honest, false)))
     assert judged.curve == (honest,)

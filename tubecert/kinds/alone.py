@@ -17,7 +17,9 @@ from tubecert.kinds.kind import Kind, Section
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AloneData(SectionData):
-    """Certificate 0: `margin` of dbar; `distance` is sup D; it holds for every |h| below `uncertainty_limit`."""
+    """Certificate 0: `margin` of dbar; `distance` is sup D; it holds for every |h| below
+    `uncertainty_limit`, h with all that joins it (wind with a rate, what inputs can reach of unknown parameters).
+    """
 
     name = ALONE
     margin: Constant | None

@@ -48,7 +48,8 @@ class HardwareData(SectionData):
     """Certificate H: the machine, the level d(x*, x) < `level` that is proven for it, and what follows.
 
     `deadbeat`: the filter has no bandwidth of its own, the newest estimate is used as it is; `noise` is |n|, or in
-    units of what is given per state; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|,
+    units of what is given per state; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|
+    (a length in the coordinates of the tube, where it has some),
     `half_widths` |x_i - x_i*|, `inputs` every input; `margin` is that of (H.12), `level_margin` that of (H.10).
     """
 

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
+from tubecert.kinds.hardware import HardwareData
 from tubecert.report.machine import clip, described, half_widths, inputs, section_of, shares, start_share
 from tubecert.report.numbers import exact, percent, up
 from tubecert.report.page import Block, Cell, Facts, Table
 from tubecert.verdict import Verdict
+
+
+def _radius(result: Result, own: HardwareData) -> str:
+    """The radius in x; in coordinates of the tube it is a length there, which is no bound of |x - x*|."""
+    measured = result.tube is not None and result.tube.coordinates is not None
+    return "" if measured else f"; radius {up(own.radius)}"
 
 
 def machine_blocks(result: Result) -> Iterator[Block]:
@@ -20,7 +27,7 @@ def machine_blocks(result: Result) -> Iterator[Block]:
     if own.verdict is Verdict.CERTIFIED:
         none = "none: the newest estimate is used as it is"
         facts += [
-            ("proven tube", Cell(text=f"{half_widths(result, own)}; radius {up(own.radius)}")),
+            ("proven tube", Cell(text=half_widths(result, own) + _radius(result, own))),
             ("inputs", Cell(text=inputs(result, own))),
             ("filter", Cell(text=none if own.bandwidth is None else f"{exact(own.bandwidth)} rad/s")),
             ("the estimate is clipped to", Cell(text=clip(result, own))),

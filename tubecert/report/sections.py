@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -159,7 +159,18 @@ def without_adaptation(result: Result) -> Iterator[str]:
     limit = (
         "no |h|" if section.uncertainty_limit is None else f"every |h| < {down(section.uncertainty_limit)}"
     )
-    yield f"In this tube the feedback alone can take {limit}; the uncertainty has |h| <= {up(h.above)}."
+    joined = result.spec.effective.part("disturbance") or not all(map(_is_one, _parameters(result)))
+    whole = "|h| with what wind and parameters add to it" if joined else "|h|"
+    yield f"In this tube the feedback alone can take {limit}; the uncertainty has {whole} <= {up(h.above)}."
+
+
+def _parameters(result: Result) -> Iterable[object]:
+    """The values of parameters: texts, or ranges."""
+    return result.spec.effective.part("system").get("parameters", {}).values()
+
+
+def _is_one(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def gain_columns(row: Gains) -> tuple[Fraction | None, Fraction | None, Fraction | None]:
