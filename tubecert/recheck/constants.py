@@ -202,12 +202,17 @@ def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
 
 
 def _joined(place: Place, limit: Fraction, name: str, known: Matrix, added: list[Matrix]) -> Outcome:
-    """Of h + B^+ (f(x, theta) - f(x)), and of B^+ E w with it."""
-    s, room, entries = place.system, limit, known
+    """Of h + B^+ (f(x, theta) - f(x)), and of B^+ E w with it: with the declared bound of h, and with h as it is."""
+    s, outcomes = place.system, []
     if name in s.declared:
-        room = limit - _declared(place, name)
-    elif s.h is not None:
-        entries = plus(s.h, known)
+        outcomes.append(_with_known(place, limit - _declared(place, name), name, known, added))
+    if s.h is not None:
+        outcomes.append(_with_known(place, limit, name, plus(s.h, known), added))
+    return together(outcomes) if outcomes else stated(False, "it is neither declared nor derived")
+
+
+def _with_known(place: Place, room: Fraction, name: str, entries: Matrix, added: list[Matrix]) -> Outcome:
+    """Of the entries, and of what a disturbance adds to them."""
     if room < 0:
         return stated(False, "it is below what is declared")
     if name == "h":

@@ -16,7 +16,7 @@ from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitu
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.curve import Curve, Part
-from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, upper_bound
+from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, together, upper_bound
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
@@ -226,17 +226,21 @@ class _Speed:
 
 
 def uncertainty(place: Place, limit: Fraction) -> Outcome:
-    """|h(0, x(0))| <= limit; where a bound of |h| is declared, that bound."""
+    """|h(0, x(0))| <= limit, and where a bound of |h| is declared, that bound."""
     s, more, known = place.system, adapted(place), joins(place)
-    beside = [] if more is None else [more]
+    beside, outcomes = [] if more is None else [more], []
     if "h" in s.declared:
         room = limit - s.declared["h"]
-        beside += [] if known is None else [known]
-        found = stated(room >= 0, "it is below the declared bound of |h|")
-        return _norms(place, beside, room) if found.holds and beside else found
-    assert s.h is not None
-    at_start = matrix_replaced(s.h, {TIME: NOUGHT})
-    return _norms(place, [at_start if known is None else plus(at_start, known), *beside], limit)
+        parts = beside if known is None else [*beside, known]
+        outcomes.append(stated(room >= 0, "it is below the declared bound of |h|"))
+        if outcomes[-1].holds and parts:
+            outcomes.append(_norms(place, parts, room))
+    if s.h is not None:
+        at_start = matrix_replaced(s.h, {TIME: NOUGHT})
+        own = at_start if known is None else plus(at_start, known)
+        outcomes.append(_norms(place, [own, *beside], limit))
+    assert outcomes, "h is given, or a bound of it is declared"
+    return together(outcomes)
 
 
 def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:
