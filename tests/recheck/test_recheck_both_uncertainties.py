@@ -38,7 +38,9 @@ def test_declared_bounds_do_not_hide_an_expression_where_parameters_are_unknown(
 @pytest.mark.parametrize("text", [SMALL, UNKNOWN])
 def test_a_declared_bound_does_not_hide_what_an_expression_is_at_the_start(text):
     """h(0, x0) = 0.0225, and yet 0.0001 was confirmed of it, because |h| <= 0.0001 is declared."""
-    document = certified(both(text, "0.1*sin(t) + 0.05*x + 0.02", "{h: 0.15}") + MACHINE, conditions="hardware")
+    document = certified(
+        both(text, "0.1*sin(t) + 0.05*x + 0.02", "{h: 0.15}") + MACHINE, conditions="hardware"
+    )
     memory: dict = {}
     assert failing(examine(document, memory=memory)) == []
     forged = copy.deepcopy(document)

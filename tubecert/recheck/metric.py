@@ -31,6 +31,7 @@ from tubecert.recheck.terms import (
 )
 
 _MINORS = 200
+_MOST_MINORS = 5_000  # of one determinant: those of 12 dense rows
 CONFIRMED = Outcome(verdict="confirmed")
 
 
@@ -122,15 +123,25 @@ def null_space(s: System, domain: Domain, budget: int) -> Matrix | Outcome:
 
 
 def determinant(a: Rows) -> Term:
-    """det a, by its first row."""
-    if not a:
+    """det a, by its first row; minors of the same columns are made once, and `ValueError` if there are too many."""
+    return _minor(a, 0, tuple(range(len(a))), {})
+
+
+def _minor(a: Rows, top: int, columns: tuple[int, ...], known: dict[tuple[int, ...], Term]) -> Term:
+    """Of the rows from `top` on and as many columns."""
+    if not columns:
         return UNIT
-    total = NOUGHT
-    for j, e in enumerate(a[0]):
-        if e is not NOUGHT:
-            minor = determinant([[*row[:j], *row[j + 1 :]] for row in a[1:]])
-            total = total + (e * minor if j % 2 == 0 else -(e * minor))
-    return total
+    if columns not in known:
+        if len(known) >= _MOST_MINORS:
+            raise ValueError("the determinant of a matrix of terms is too long")
+        total = NOUGHT
+        for j, column in enumerate(columns):
+            e = a[top][column]
+            if e is not NOUGHT:
+                minor = _minor(a, top + 1, (*columns[:j], *columns[j + 1 :]), known)
+                total = total + (e * minor if j % 2 == 0 else -(e * minor))
+        known[columns] = total
+    return known[columns]
 
 
 def adjugate(a: Rows) -> Matrix:

@@ -40,6 +40,7 @@ SHARES = (
 _MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
 _PROOF = ("floor", "speed", "bias", "ripple")
 
+_MOST_POINTS = 100  # of the curve: for each a recipe is searched for
 _DUST = 1e-9  # of the level: a share that is printed as none
 
 
@@ -174,7 +175,7 @@ def _section(node: Node) -> HardwareSection:
         level_margin=own.known("level_margin", enclosure),
         ultimate_radius=own.known("ultimate_radius", Node.number),
         budget=own.known("budget", _budget),
-        curve=tuple(_point(item) for item in own["curve"].entries()),
+        curve=_points(own["curve"]),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
     )
 
@@ -187,6 +188,13 @@ def _range(node: Node) -> Range:
 def _budget(node: Node) -> dict[str, Fraction]:
     own = node.closed(*SHARES)
     return {key: own[key].number() for key in SHARES}
+
+
+def _points(node: Node) -> tuple[tuple[Fraction, Fraction], ...]:
+    items = node.entries()
+    if len(items) > _MOST_POINTS:
+        raise node.refused(f"has more than {_MOST_POINTS} points")
+    return tuple(map(_point, items))
 
 
 def _point(node: Node) -> tuple[Fraction, Fraction]:

@@ -1,0 +1,54 @@
+"""Small files that would keep the checker busy for hours."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+from rechecked import certified, sealed, unconfirmed
+from systems import SMALL
+
+from tubecert.recheck.metric import adjugate, determinant
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import number, variable
+
+
+@pytest.mark.slow
+def test_a_curve_of_h_is_short():
+    """For each of its points a recipe is searched for: 30 ms, and as many of them as a file holds."""
+    document = copy.deepcopy(certified(SMALL + "hardware: {rate: 500}\n", conditions="hardware"))
+    section = document["result"]["hardware"]
+    section["curve"] = [section["curve"][0]] * 3_000
+    assert unconfirmed(sealed(document))
+
+
+def test_determinants_are_not_made_minor_by_minor():
+    n = 9
+    rows = [
+        [variable(f"a{i}{j}") if i == j else number(1 + (i * j) % 3) * variable("b") for j in range(n)]
+        for i in range(n)
+    ]
+    names = (*(f"a{i}{i}" for i in range(n)), "b")
+    whole, inverse = determinant(rows), adjugate(rows)
+    values = [number(2 + i) for i in range(n)] + [number(1)]
+    at = [
+        Program([e], names).run([_ball(v) for v in values])[0] for e in (whole, inverse[0][0], inverse[1][2])
+    ]
+    by_row = sum(
+        (Program([rows[0][j] * inverse[j][0]], names).run([_ball(v) for v in values])[0] for j in range(n)),
+        start=_ball(number(0)),
+    )
+    assert by_row.overlaps(at[0])
+    assert at[0].is_finite()
+
+
+def test_a_determinant_that_is_too_long_is_refused():
+    rows = [[variable(f"a{i}_{j}") for j in range(14)] for i in range(14)]
+    with pytest.raises(ValueError, match="too long"):
+        determinant(rows)
+
+
+def _ball(term):
+    from flint import arb, fmpq
+
+    return arb(fmpq(term.value.numerator, term.value.denominator))
