@@ -197,7 +197,8 @@ class Certification:
     def half_widths(self) -> Mapping[str, float]:
         """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set."""
         tube = self.result.tube
-        return MappingProxyType({} if tube is None or tube.half_widths is None else dict(tube.half_widths))
+        widths = {} if tube is None or tube.half_widths is None else tube.half_widths
+        return MappingProxyType({name: widths[name] for name in self.states if name in widths})
 
     @property
     def constants(self) -> Mapping[str, Bound]:

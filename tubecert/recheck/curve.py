@@ -6,6 +6,7 @@ given by expressions of t, one cubic Hermite piece for every pair of knots. Segm
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,6 +23,7 @@ from tubecert.recheck.terms import Term, names, number, replaced, slopes, variab
 
 CLOCK = "s#"  # no state can have this name
 Ends = list[tuple[float, float]]
+_HALVINGS = 12  # of a part of the plan, until its ranges have bounds
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,9 @@ class Curve:
     @cached_property
     def root(self) -> Segment:
         """The whole curve."""
-        level: list[Segment] = [Piece(self, part, 0.0, ceiling(part.length)) for part in self.parts]
+        level: list[Segment] = [
+            piece for part in self.parts for piece in Piece(self, part, 0.0, ceiling(part.length)).bounded()
+        ]
         while len(level) > 1:
             level = [Bundle(level[i : i + 2]) for i in range(0, len(level), 2)]
         return level[0]
@@ -110,8 +114,15 @@ class Piece(Segment):
         self.x, self.u = ends[:n], ends[n:]
         self.when = floor(part.start + arb(lo)), ceiling(part.start + arb(hi))
 
+    def bounded(self, halvings: int = _HALVINGS) -> list[Piece]:
+        """Itself, or where it has no bounds (a root of a wide range) shorter ranges that have."""
+        known = all(math.isfinite(end) for side in (*self.x, *self.u) for end in side)
+        if known or not halvings or not self.halves:
+            return [self]
+        return [piece for half in self.halves for piece in half.bounded(halvings - 1)]
+
     @cached_property
-    def halves(self) -> Sequence[Segment]:
+    def halves(self) -> Sequence[Piece]:
         """Two ranges of s."""
         middle = 0.5 * self._lo + 0.5 * self._hi
         if not self._lo < middle < self._hi or not self._curve.moves:

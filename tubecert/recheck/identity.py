@@ -68,6 +68,7 @@ class _Field:
         self._atoms: dict[tuple[object, ...], Polynomial] = {}
         self._waves: list[tuple[tuple[str, str], Polynomial, Polynomial]] = []
         self._relations: list[Polynomial] = []
+        self._roots: list[Polynomial] = []
 
     def of(self, term: Term, args: list[_Quotient]) -> _Quotient:
         """A term, given its arguments."""
@@ -95,12 +96,25 @@ class _Field:
                 return self._whole(self._one)
             case "sqrt" if (known := _root(args[0])) is not None:
                 return self._whole(self._one * known)
+            case "sqrt" if (same := self._same_root(args[0])) is not None:
+                return self._whole(same)
         key = (term.op, str(term.value), *((str(a.top), str(a.bottom)) for a in args))
         if key not in self._atoms:
             self._atoms[key] = atom = self._free.pop(0)
             if term.op == "sqrt" and args[0].bottom != 0:
+                self._roots.append(atom)
                 self._relations.append(atom * atom * args[0].bottom - args[0].top)
         return self._whole(self._atoms[key])
+
+    def _same_root(self, argument: _Quotient) -> Polynomial | None:
+        """The root that is known already whose square is the argument: both are at least 0."""
+        for atom in self._roots:
+            if argument.bottom != 0 and self._square_of(atom, argument):
+                return atom
+        return None
+
+    def _square_of(self, atom: Polynomial, argument: _Quotient) -> bool:
+        return bool(self._reduced(atom * atom * argument.bottom - argument.top, self._one).top == 0)
 
     def _wave(self, argument: _Quotient) -> tuple[Polynomial, Polynomial]:
         """The sine and the cosine of an argument; both are the same for every term with that argument."""

@@ -99,7 +99,8 @@ class Names:
 
     def _ranges_refused(self) -> dict[str, str]:
         return {
-            name: f"{name} is known by a range only; such a parameter may be used in f alone"
+            name: f"{name} is known by a range only; such a parameter may be used in f alone (elsewhere use its "
+            "middle, by a name of its own)"
             for name, _ in self.ranges
         }
 
