@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from fractions import Fraction
 
 from tubecert.certificate.result import Result
 from tubecert.kinds import HARDWARE
@@ -49,7 +50,7 @@ def proven(result: Result) -> HardwareData | None:
     return found if found is not None and found.verdict is Verdict.CERTIFIED else None
 
 
-def described(own: HardwareData) -> str:
+def described(result: Result, own: HardwareData) -> str:
     """The machine in a sentence: `500 Hz (2 ms), 0.5 ms of delay, |n| <= 0.001, |w| <= 0.05`."""
     parts = []
     if own.sample_time is not None:
@@ -61,10 +62,19 @@ def described(own: HardwareData) -> str:
     if own.predict:
         parts.append("feedback from the predicted state")
     if own.noise:
-        parts.append(f"noise {exact(own.noise)}")
+        parts.append(f"noise {_noise(result, own.noise)}")
     if own.wind:
         parts.append(f"wind {exact(own.wind)}")
     return ", ".join(parts)
+
+
+def _noise(result: Result, length: Fraction) -> str:
+    """By state where it is given so: its length is then in no unit that anyone knows."""
+    given, units = result.spec.effective.part("hardware").get("noise"), result.spec.effective.system.units
+    if not isinstance(given, Mapping):
+        return exact(length)
+    names = [name for name in result.spec.effective.system.states if name in given]
+    return ", ".join(f"{name} {given[name]} {units.get(name, '')}".rstrip() for name in names)
 
 
 def half_widths(result: Result, own: HardwareData) -> str:
@@ -93,7 +103,7 @@ def lines(result: Result) -> Iterator[str]:
     own = section_of(result)
     if own is None or own.sample_time is None:
         return
-    yield described(own)
+    yield described(result, own)
     if own.verdict is not Verdict.CERTIFIED:
         return
     if own.level_margin is not None and own.level_margin.below is not None:

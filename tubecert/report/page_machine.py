@@ -23,7 +23,7 @@ def machine_blocks(result: Result) -> Iterator[Block]:
     own = section_of(result)
     if own is None or own.sample_time is None:
         return
-    facts = [("the machine", Cell(text=described(own)))]
+    facts = [("the machine", Cell(text=described(result, own)))]
     if own.verdict is Verdict.CERTIFIED:
         none = "none: the newest estimate is used as it is"
         facts += [
