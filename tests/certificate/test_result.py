@@ -17,6 +17,7 @@ from tubecert.claims import (
     Claim,
     Failure,
     HalveConstant,
+    HalveHardware,
     MendPlan,
     MetricContraction,
     Outcome,
@@ -166,7 +167,7 @@ def test_the_schema_knows_every_id_and_its_parameters(name):
 def test_every_id_has_words(kind):
     tables = {
         Claim: claim_words._MESSAGES,
-        Relax: {**advice_words._ACTIONS, HalveConstant: None, MendPlan: None},
+        Relax: {**advice_words._ACTIONS, HalveConstant: None, HalveHardware: None, MendPlan: None},
         Failure: claim_words._FAILURES,
     }
     assert set(kind.family.values()) <= set(tables[kind])

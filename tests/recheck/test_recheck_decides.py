@@ -13,9 +13,6 @@ SLOW_MACHINE = SMALL + "hardware: {rate: 8, delay: 0.1, noise: 0.05}\nconditions
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="decided_by is not compared with conditions.decides of the specification"
-)
 def test_a_certificate_for_an_ideal_machine_is_none_for_a_specification_that_h_decides():
     """H is undecided at 8 Hz; B, of an ideal machine, decides in its place: confirmed, with --spec too."""
     document = copy.deepcopy(proven.proven(SLOW_MACHINE))

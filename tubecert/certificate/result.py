@@ -87,6 +87,7 @@ class Overrides:
     epsilon: Fraction | None = None
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
+    conditions: str | None = None
     metric: str | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
 

@@ -26,6 +26,7 @@ from tubecert.recheck.orientation import elasticities, run, synthesis
 from tubecert.recheck.plans import Plan, read_plan
 from tubecert.recheck.reasons import Assumption, Reason, read_assumption, read_reason
 from tubecert.recheck.specification import Specification, read_specification
+from tubecert.recheck.specified.loop import DECIDES
 from tubecert.recheck.specified.metric import Wanted
 from tubecert.recheck.specified.numbers import Range, Rows
 from tubecert.recheck.specified.start import Start, read_start
@@ -105,6 +106,7 @@ class Overrides:
     rho_a: Fraction | None
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
+    conditions: str | None
     metric: str | None
     settings: dict[str, tuple[Fraction, Fraction]]
 
@@ -328,12 +330,14 @@ def _box(node: Node, states: tuple[str, ...], read: Callable[[Node], Fraction]) 
 
 
 def _overrides(node: Node, effective: Node) -> Overrides:
-    own = node.closed(optional=("epsilon", "rho_a", "bandwidth", "adaptation_rate", "metric", "settings"))
+    keys = ("epsilon", "rho_a", "bandwidth", "adaptation_rate", "conditions", "metric", "settings")
+    own = node.closed(optional=keys)
     return Overrides(
         epsilon=own.get("epsilon", Node.decimal),
         rho_a=own.get("rho_a", Node.decimal),
         bandwidth=own.get("bandwidth", Node.decimal),
         adaptation_rate=own.get("adaptation_rate", Node.decimal),
+        conditions=own.get("conditions", lambda item: item.word(*DECIDES)),
         metric=own.get("metric", Node.text),
         settings=own.get("settings", lambda item: _settings(item, effective)) or {},
     )

@@ -11,7 +11,7 @@ from tubecert.recheck import clearances, inputs
 from tubecert.recheck.certificate import Geodesics, Result, TubeSection
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
-from tubecert.recheck.kinds.table import KINDS
+from tubecert.recheck.kinds.table import KINDS, LETTERS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
 from tubecert.recheck.specification import Specification
@@ -157,6 +157,10 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     yield metric.verdict == "certified", f"{_CLAIMS_ONLY} metric.verdict is not"
     deciding = sections.decided_by
     yield bool(deciding) and len(set(deciding)) == len(deciding), "decided_by is not a list of sections"
+    yield (
+        _as_wanted(result, deciding),
+        "decided_by is not what the specification, or --conditions, wants to decide",
+    )
     for name in deciding:
         section = sections.by_key.get(name)
         if section is None:
@@ -176,6 +180,16 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
         own = next(kind.said(sections.by_key[kind.key]) for kind in KINDS if kind.key == named)
         same = all(value == own.get(key) for key, value in reason.parameters.items() if key != "section")
         yield same, f"a reason repeats {named} otherwise than it is"
+
+
+def _as_wanted(result: Result, deciding: tuple[str, ...]) -> bool:
+    """Where the specification says who decides, that is who decides, or what stands for it in the overrides."""
+    wanted, instead = result.specification.loop.decides, result.overrides.conditions
+    if wanted is None or result.sections is None:
+        return instead is None
+    letter = instead or wanted
+    adaptive = result.sections.by_key.keys() - {LETTERS["0"]}
+    return set(deciding) == (adaptive if letter == "all" else {LETTERS[letter]})
 
 
 def assumptions(result: Result, s: System) -> Outcome:

@@ -166,7 +166,8 @@ def without_adaptation(result: Result) -> Iterator[str]:
 
 def _parameters(result: Result) -> Iterable[object]:
     """The values of parameters: texts, or ranges."""
-    return result.spec.effective.part("system").get("parameters", {}).values()
+    known: Mapping[str, object] = result.spec.effective.part("system").get("parameters", {})
+    return known.values()
 
 
 def _is_one(value: object) -> bool:

@@ -38,6 +38,7 @@ from tubecert.certificate.sections import (
 from tubecert.claims import Reason
 from tubecert.conditions.inputs import JudgedInput
 from tubecert.expression import number_text
+from tubecert.letters import ALL, name_of
 from tubecert.metric.verify import MetricProof
 from tubecert.printable import visible
 from tubecert.spec import Spec, canonical
@@ -145,9 +146,17 @@ def _overrides(spec: Spec, options: Options) -> Overrides:
         epsilon=options.epsilon,
         bandwidth=options.bandwidth,
         adaptation_rate=options.adaptation_rate,
+        conditions=_decides_instead(spec, options),
         metric=None if options.metric is None else visible(options.metric.name),
         settings=dict(spec.settings),
     )
+
+
+def _decides_instead(spec: Spec, options: Options) -> str | None:
+    """The letter of the kind that was asked for in place of the one that the specification names."""
+    if options.conditions is None or spec.decides is None:
+        return None
+    return ALL if options.conditions == ALL else name_of(options.conditions).letter
 
 
 def _plan(reached: _Reached) -> PlanData:

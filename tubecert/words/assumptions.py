@@ -33,7 +33,8 @@ _FIXED: dict[type[Assumption], str] = {
     PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
     MachineAsGiven: "certificate H is about the machine of the section hardware: it samples on time, its inputs act "
     "after exactly that delay and are held, its measurements are as good as stated, and it computes the feedback "
-    "exactly, and the estimate with B^+ (in coordinates S of the tube: (S B)^+ S); what is said here of continuous time, of exact measurements and of the predictor is for 0, A, B and C",
+    "exactly, and the estimate with B^+ (in coordinates S of the tube: (S B)^+ S); what is said here of continuous "
+    "time, of exact measurements and of the predictor is for 0, A, B and C",
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
     ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "

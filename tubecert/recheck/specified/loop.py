@@ -8,16 +8,20 @@ from fractions import Fraction
 from tubecert.recheck.document import Node
 from tubecert.recheck.specified.numbers import Rows, positive, square
 
-_DECIDES = ("0", "A", "B", "C", "H", "all")
+DECIDES = ("0", "A", "B", "C", "H", "all")
 
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """The predictor (None: -g I for the g that each pair states), the smooth layer of the projection, the kernel."""
+    """The predictor (None: -g I for the g that each pair states), the smooth layer of the projection, the kernel.
+
+    `decides`: the letter of the kind that the specification wants to decide, None if it does not say.
+    """
 
     A_m: Rows | None
     smooth: Fraction | None
     kernel: str
+    decides: str | None
 
 
 def read_loop(adaptation: Node, conditions: Node, n: int) -> Loop:
@@ -25,11 +29,9 @@ def read_loop(adaptation: Node, conditions: Node, n: int) -> Loop:
     own, chosen = adaptation.closed("A_m", "projection"), conditions.closed(optional=("kernel", "decides"))
     A_m, projection = own["A_m"], own["projection"]
     kernel = chosen.get("kernel", lambda item: item.word("tight", "paper"))
-    chosen.get(
-        "decides", lambda item: item.word(*_DECIDES)
-    )  # the certificate says itself which sections decide
     return Loop(
         A_m=None if A_m.value == "auto" else square(A_m, n),
         smooth=None if projection.value == "hard" else positive(projection.closed("smooth")["smooth"]),
         kernel=kernel or "tight",  # the form of the certificate: both kernels are theorems
+        decides=chosen.get("decides", lambda item: item.word(*DECIDES)),
     )
