@@ -242,7 +242,7 @@ def test_auto_takes_the_best_predictor_gain_of_26():
 def least_rate_by_scan(problem: TubeProblem, omegas: np.ndarray, g: float | None) -> tuple[float, float]:
     """(omega, Gamma) by a scan over omega and e with an iterated fixed point and a time grid for sup D."""
     n = problem.floats()
-    v = {name: float(getattr(n, name)) for name in n.__slots__ if name != "horizon"}
+    v = {name: float(x) for name in n.__slots__ if name != "horizon" and (x := getattr(n, name)) is not None}
     dbar = np.sqrt(v["a"]) * v["rho"]
     t = np.concatenate([[0.0], np.geomspace(1e-4, 30, 500)])[:, None]
     best = (np.inf, np.inf)

@@ -247,14 +247,16 @@ def test_certification_neither_loads_kernels_nor_numba(tmp_path):
     assert done.stdout.strip() == "[]", done.stderr
 
 
-def test_only_the_command_uses_what_simulates():
+def test_only_the_command_and_the_library_use_what_simulates():
+    """Beside them the report of a simulation, which reads what one has summed up."""
     import tubecert
 
     package = Path(tubecert.__file__).parent
     users = {
-        path.relative_to(package).parts[0]
+        path.relative_to(package)
         for path in package.rglob("*.py")
         if "tubecert.simulate"
         in "".join(line for line in path.read_text("utf-8").splitlines() if "import" in line)
     }
-    assert users == {"simulate", "cli"}
+    rooms = {path.parts[0] for path in users if path != Path("report", "simulation.py")}
+    assert rooms == {"simulate", "cli", "library"}
