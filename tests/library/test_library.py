@@ -242,8 +242,9 @@ def test_certify_says_what_the_command_says(tmp_path, monkeypatch):
     assert ours["hash"] == theirs["hash"] == result.hash
     assert ours["run"].pop("command") == "tubecert.certify"
     for name in ("started", "seconds"):  # when it was made is no part of what is proven
-        assert f'  "{name}": {json.dumps(ours["run"][name])}' in library
-        library = library.replace(json.dumps(ours["run"][name]), json.dumps(theirs["run"][name]))
+        own, other = (f'  "{name}": {json.dumps(each["run"][name])}' for each in (ours, theirs))
+        assert own in library
+        library = library.replace(own, other)
     library = library.replace('"tubecert.certify"', json.dumps(theirs["run"]["command"]))
     assert library == command
 
