@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 
 from tubecert.conditions import hardware
-from tubecert.conditions.hardware import LEVEL, STAYS, HardwareRecipe, Told
+from tubecert.conditions.hardware import LEVEL, STAYS, Budget, HardwareRecipe, Told
 from tubecert.conditions.inputs import InputBound, InputShares, LimitedInput
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
@@ -18,21 +18,6 @@ from tubecert.kernel import Checked, judge
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import Pair, Role, SectionData, margin_data, missing_data
 from tubecert.kinds.kind import Kind, Section
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HardwareBudget:
-    """What fills the level: shares of lambda dhat, each rounded up; they do not reach 1 together."""
-
-    plan: float
-    feedforward: float
-    wind: float
-    wind_estimate: float
-    bias: float
-    noise_estimate: float
-    lag: float
-    noise_feedback: float
-    sampling: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +55,7 @@ class HardwareData(SectionData):
     inputs: Mapping[str, tuple[float, float]]
     margin: Constant | None
     level_margin: Constant | None
-    budget: HardwareBudget | None
+    budget: Budget | None
     curve: tuple[HardwarePoint, ...]
     largest: str | None = None
 
@@ -165,19 +150,9 @@ def _margin(found: Checked[HardwareRecipe] | None, condition: str) -> Constant |
     return None if found is None else margin_data(found.margins[condition])
 
 
-def _budget(known: Told) -> HardwareBudget:
-    b = known.budget
-    return HardwareBudget(
-        plan=printable_above(b.plan),
-        feedforward=printable_above(b.feedforward),
-        wind=printable_above(b.wind),
-        wind_estimate=printable_above(b.wind_estimate),
-        bias=printable_above(b.bias),
-        noise_estimate=printable_above(b.noise_estimate),
-        lag=printable_above(b.lag),
-        noise_feedback=printable_above(b.noise_feedback),
-        sampling=printable_above(b.sampling),
-    )
+def _budget(known: Told) -> Budget:
+    """The shares as they are printed."""
+    return Budget(**{item.name: printable_above(getattr(known.budget, item.name)) for item in fields(Budget)})
 
 
 class Hardware(Kind[HardwareRecipe]):

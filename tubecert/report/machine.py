@@ -10,8 +10,9 @@ from dataclasses import dataclass, fields
 from fractions import Fraction
 
 from tubecert.certificate.result import Result
+from tubecert.conditions.hardware import Budget
 from tubecert.kinds import HARDWARE
-from tubecert.kinds.hardware import HardwareBudget, HardwareData
+from tubecert.kinds.hardware import HardwareData
 from tubecert.report.numbers import down, exact, percent, up
 from tubecert.verdict import Verdict
 
@@ -92,7 +93,7 @@ def inputs(result: Result, own: HardwareData) -> str:
     )
 
 
-def shares(budget: HardwareBudget) -> list[Share]:
+def shares(budget: Budget) -> list[Share]:
     """What fills the tube, the largest share first; shares that are nothing are left out."""
     found = [Share(cause=_CAUSES[item.name], share=getattr(budget, item.name)) for item in fields(budget)]
     return sorted((each for each in found if each.share > _LEAST), key=lambda each: -each.share)
@@ -110,12 +111,7 @@ def lines(result: Result) -> Iterator[str]:
         used = 1 - own.level_margin.below
         yield f"proven tube: {half_widths(result, own)} ({percent(used)} of what the metric was bounded for)"
     yield f"inputs: {inputs(result, own)}"
-    omega = (
-        "none: the newest estimate is used as it is"
-        if own.bandwidth is None
-        else f"{exact(own.bandwidth)} rad/s"
-    )
-    yield f"filter: {omega}; the estimate is clipped to {clip(result, own)}"
+    yield f"filter: {bandwidth(own)}; the estimate is clipped to {clip(result, own)}"
     if (start := start_share(result, own)) is not None:
         yield f"the start alone is at {percent(start)} of the proven tube"
     if own.budget is not None:
@@ -130,6 +126,13 @@ def start_share(result: Result, own: HardwareData) -> float | None:
     if d0 is None or d0.above is None or not own.level or d0.above < _NOTABLE * float(own.level):
         return None
     return d0.above / float(own.level)
+
+
+def bandwidth(own: HardwareData) -> str:
+    """The filter of the estimate."""
+    if own.bandwidth is None:
+        return "none: the newest estimate is used as it is"
+    return f"{exact(own.bandwidth)} rad/s"
 
 
 def clip(result: Result, own: HardwareData) -> str:

@@ -6,8 +6,17 @@ from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
 from tubecert.kinds.hardware import HardwareData
-from tubecert.report.machine import clip, described, half_widths, inputs, section_of, shares, start_share
-from tubecert.report.numbers import exact, percent, up
+from tubecert.report.machine import (
+    bandwidth,
+    clip,
+    described,
+    half_widths,
+    inputs,
+    section_of,
+    shares,
+    start_share,
+)
+from tubecert.report.numbers import percent, up
 from tubecert.report.page import Block, Cell, Facts, Table
 from tubecert.verdict import Verdict
 
@@ -25,11 +34,10 @@ def machine_blocks(result: Result) -> Iterator[Block]:
         return
     facts = [("the machine", Cell(text=described(result, own)))]
     if own.verdict is Verdict.CERTIFIED:
-        none = "none: the newest estimate is used as it is"
         facts += [
             ("proven tube", Cell(text=half_widths(result, own) + _radius(result, own))),
             ("inputs", Cell(text=inputs(result, own))),
-            ("filter", Cell(text=none if own.bandwidth is None else f"{exact(own.bandwidth)} rad/s")),
+            ("filter", Cell(text=bandwidth(own))),
             ("the estimate is clipped to", Cell(text=clip(result, own))),
         ]
         if (start := start_share(result, own)) is not None:
