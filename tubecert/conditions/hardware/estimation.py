@@ -1,0 +1,137 @@
+"""What the estimate, the filter and the clip leave of h: (H.6), (H.7), (H.11), (H.17). Trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic
+
+from tubecert.conditions.arithmetic import (
+    T,
+    decay_mean,
+    exp,
+    expm1,
+    maximum,
+    minimum,
+    number,
+    quiet,
+    sqrt,
+)
+from tubecert.conditions.hardware.loop import Loop, Plant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate(Generic[T]):
+    """What the estimate, the filter and the clip leave of h, and what Y, S, N, np have to reach for that.
+
+    `n_fb`: what noise is to the feedback, |Theta n| at most; `e_fb` the same in |.|; kb bounds |kappa|, ups |u0 - u*|,
+    s1 the rate of h along the loop, H1 and X |h - q^| at first and always. `gust` is the part of S that wind causes.
+    """
+
+    n_fb: T
+    e_fb: T
+    kb: T
+    ups: T
+    s1: T
+    H1: T
+    X: T
+    gust: T
+    bias: T
+    ripple: T
+    speed: T
+    prediction: T | None
+
+
+@quiet
+def estimate(p: Plant[T], loop: Loop[T]) -> Estimate[T]:
+    """The estimate at Y, S, N (and np) of a recipe."""
+    n = p.n
+    n_fb, e_fb = noise_in_feedback(p, loop)
+    kb = n.du * (loop.dhat + n_fb)
+    ups = feedforward_error(p, loop)
+    s1 = n.Dht + n.Dhx * loop.Y
+    t1 = loop.Ts + loop.tau
+    H1 = minimum(n.Dh, n.H0 + s1 * t1)
+    # S + (H0 - S)_+ = max(S, H0)
+    X = minimum(n.Dh + n.R, maximum(H1, maximum(loop.S, n.H0) + loop.N + s1 * t1))
+    gust = wind_in_estimate(p, loop)
+    return Estimate(
+        n_fb=n_fb,
+        e_fb=e_fb,
+        kb=kb,
+        ups=ups,
+        s1=s1,
+        H1=H1,
+        X=X,
+        gust=gust,
+        bias=lag_of_filter(loop) * s1 + error_of_estimate(p, loop, s1, n.Dus + ups + kb) + gust,
+        ripple=noise_in_estimate(p, loop),
+        speed=n.phi + n.DB * (kb + ups + X) + p.D_E * loop.wbar,
+        prediction=prediction_error(p, loop, n.Dus + ups + kb, X),
+    )
+
+
+def noise_in_feedback(p: Plant[T], loop: Loop[T]) -> tuple[T, T]:
+    """n_M and nbar; with prediction n_P = sqrt(A) np and np."""
+    n_M = loop.nu * p.m.n_M
+    if loop.np is None:
+        return n_M, loop.nu * p.m.n_E
+    # n_P >= n_M by (H.17); both are bounds, each rounded for itself
+    return maximum(n_M, sqrt(p.n.A) * loop.np), loop.np
+
+
+def feedforward_error(p: Plant[T], loop: Loop[T]) -> T:
+    """ups >= |u0 - u*|: 0, or what u* does while it is held, (H.6a)."""
+    if not p.held:
+        return number(0, loop.Ts)
+    most = 2 * p.n.Dus
+    return most if p.m.Lus is None else minimum(most, p.m.Lus * (maximum(loop.Ts, loop.Tf) + loop.tau))
+
+
+def lag_of_filter(loop: Loop[T]) -> T:
+    """((1 - th)/th) Ts = Ts/(e^(omega Ts) - 1)."""
+    return number(0, loop.Ts) if loop.omega is None else loop.Ts / expm1(loop.omega * loop.Ts)
+
+
+def gain_of_filter(loop: Loop[T]) -> T:
+    """th/Ts = (1 - e^(-omega Ts))/Ts, at most omega."""
+    return 1 / loop.Ts if loop.omega is None else loop.omega * decay_mean(loop.omega * loop.Ts)
+
+
+def error_of_estimate(p: Plant[T], loop: Loop[T], s1: T, known: T) -> T:
+    """e_s of (H.6) without wind; `known` bounds |u0 + kappa|."""
+    n = p.n
+    b0 = minimum(n.DBp * n.DBx, n.DBpx * n.DB)
+    nbar = loop.nu * p.m.n_E
+    moved = loop.Y * loop.Ts / 2 + nbar
+    return (
+        s1 * loop.Ts / 2
+        + b0 * (known + n.R + n.Dh) * moved
+        + p.m.D_pf * (loop.Y * loop.Ts / 4 + nbar)
+        + n.DBpx * p.rest * moved
+    )
+
+
+def wind_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
+    """The part of e_s in (H.6) that wind causes."""
+    moved = loop.Y * loop.Ts / 2 + loop.nu * p.m.n_E
+    return (p.eps_w + p.n.DBpx * p.D_E * moved) * loop.wbar
+
+
+def noise_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
+    """N of (H.7), or what noise of a bounded rate does if that is less."""
+    nbar = loop.nu * p.m.n_E
+    summed = 2 * gain_of_filter(loop) * (loop.nu * p.m.n_B) + p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar
+    return summed if p.drift is None else minimum(summed, p.m.n_B * p.drift)
+
+
+def prediction_error(p: Plant[T], loop: Loop[T], known: T, X: T) -> T | None:
+    """What np has to reach, (H.17); `known` bounds |u0 + kappa|."""
+    if loop.np is None:
+        return None
+    n = p.n
+    y = (n.Dfx + n.Dbx * known) * loop.tau
+    # (e^y - 1)/D_p = tau e^y (1 - e^(-y))/y
+    grown = exp(y)
+    return loop.nu * p.m.n_E * grown + (n.DB * X + p.D_E * loop.wbar + p.rest) * (
+        loop.tau * grown * decay_mean(y)
+    )

@@ -1,0 +1,187 @@
+"""Theorem H as the kernel asks it: margins of a recipe. Trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Generic
+
+import numpy as np
+
+from tubecert.conditions import machine as machines
+from tubecert.conditions.arithmetic import (
+    Array,
+    T,
+    quiet,
+    sqrt,
+)
+from tubecert.conditions.hardware.course import Course, course
+from tubecert.conditions.hardware.estimation import Estimate, estimate
+from tubecert.conditions.hardware.feedback import Loss, loss
+from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
+from tubecert.conditions.obstacles import obstacles, reach
+from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.theorem import Margins, Theorem
+from tubecert.conditions.verdict import Shortfall, unbounded
+from tubecert.enclosure.interval import Interval
+
+LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluated(Generic[T]):
+    """A recipe put into every formula."""
+
+    plant: Plant[T]
+    loop: Loop[T]
+    estimate: Estimate[T]
+    loss: Loss[T]
+    course: Course[T]
+
+
+def evaluated(p: Plant[T], loop: Loop[T]) -> Evaluated[T]:
+    """Every formula of theorem H at a recipe."""
+    e = estimate(p, loop)
+    cost = loss(p, loop, e)
+    return Evaluated(plant=p, loop=loop, estimate=e, loss=cost, course=course(p, loop, e, cost))
+
+
+@quiet
+def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Interval, Interval]:
+    """The margins of (H.10) and (H.12), scalars; -inf below where a side condition is not proven."""
+    nothing = Interval(-np.inf, np.inf)
+    if problem.machine is None or not _describes_a_loop(recipe):
+        return nothing, nothing
+    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    if not (problem.machine.clips_within(problem.constants.h, recipe.clip_radius) and _side_conditions(x)):
+        return nothing, nothing
+    level = (1 - (x.loop.dhat + x.estimate.n_fb) / reach(x.plant.n)).sanitised()
+    stays = (1 - x.course.supremum() / x.loop.dhat).sanitised()
+    return tuple(Interval(m.lo, np.asarray(np.inf)) for m in (level, stays))  # type: ignore[return-value]
+
+
+def _describes_a_loop(r: HardwareRecipe) -> bool:
+    """What section 1 asks of the numbers: 0 <= delay <= Ts, and with prediction delay <= Tf."""
+    positive = (r.sample_time, r.feedback_time, r.clip_radius, r.level, r.floor, r.speed)
+    sizes = (r.delay, r.noise, r.wind, r.bias, r.ripple)
+    return (
+        all(x > 0 for x in positive)
+        and all(x >= 0 for x in sizes)
+        and (r.bandwidth is None or r.bandwidth > 0)
+        and r.delay <= r.sample_time
+        and (r.prediction is None or (r.prediction >= 0 and r.delay <= r.feedback_time))
+    )
+
+
+def _side_conditions(x: Evaluated[Interval]) -> bool:
+    """(5.1), (H.6), (H.7), (H.11) and (H.17)."""
+    e, loop = x.estimate, x.loop
+    predicted = e.prediction is None or loop.np is None or bool(e.prediction.sanitised().hi <= loop.np.lo)
+    return (
+        bool(x.loss.chi.sanitised().lo > 0)
+        and bool(e.bias.sanitised().hi <= loop.S.lo)
+        and bool(e.ripple.sanitised().hi <= loop.N.lo)
+        and bool(e.speed.sanitised().hi < loop.Y.lo)
+        and predicted
+    )
+
+
+def _margins(problem: TubeProblem, recipes: Sequence[HardwareRecipe]) -> Margins:
+    found = [margins_hardware(problem, recipe) for recipe in recipes]
+    return {
+        name: Interval(
+            np.array([float(pair[i].lo) for pair in found]), np.array([float(pair[i].hi) for pair in found])
+        )
+        for i, name in enumerate((LEVEL, STAYS))
+    }
+
+
+def is_the_machine(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
+    """Whether a recipe is about the machine, the noise and the wind of the problem, where they are given."""
+    if problem.machine is None:
+        return False
+    asked, wind = problem.machine.asked, problem.wind
+    feedback_time = recipe.sample_time if asked.feedback_time is None else asked.feedback_time
+    delay = recipe.sample_time if asked.one_sample else asked.delay
+    noise = Fraction(1) if isinstance(asked.noise, tuple) else asked.noise
+    given = (
+        (asked.sample_time, recipe.sample_time),
+        (delay, recipe.delay),
+        (feedback_time, recipe.feedback_time),
+        (noise, recipe.noise),
+        (Fraction(0) if wind is None else wind.bound, recipe.wind),
+        (asked.bandwidth, recipe.bandwidth),
+    )
+    return asked.predict == (recipe.prediction is not None) and all(
+        wanted is None or wanted == own for wanted, own in given
+    )
+
+
+def is_a_machine_like(problem: TubeProblem, own: HardwareRecipe | None, other: HardwareRecipe) -> bool:
+    """Whether another recipe is about the same machine but for its sample time, and what follows from that."""
+    if problem.machine is None or own is None:
+        return False
+    asked, Ts = problem.machine.asked, other.sample_time
+    same = (
+        (other.noise, own.noise),
+        (other.wind, own.wind),
+        (other.clip_radius, own.clip_radius),
+        (other.delay, Ts if asked.one_sample else own.delay),
+        (other.feedback_time, Ts if asked.feedback_time is None else asked.feedback_time),
+        (other.prediction is None, own.prediction is None),
+    )
+    return asked.bandwidth in (None, other.bandwidth) and all(a == b for a, b in same)
+
+
+def stands_in_the_way(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """What no machine can overcome, and constants of the machine without a bound."""
+    if problem.machine is None:
+        return ()
+    return unbounded(problem.machine.unbounded()) or obstacles(problem)
+
+
+def ultimate_radius(problem: TubeProblem, recipe: HardwareRecipe) -> float:
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven."""
+    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    return float((x.course.bound.ultimate() / sqrt(x.plant.n.a)).hi)
+
+
+def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
+    """Everything that theorem H compares, at some machine."""
+    del problem
+    one = np.asarray(1.0)
+    p = Plant(n=n, m=machines.ones(), beta_w=one, D_E=one, eps_w=one, rest=one, held=True)
+    loop = Loop(
+        Ts=one,
+        tau=one,
+        Tf=one,
+        omega=one,
+        nu=one,
+        wbar=one,
+        dhat=one,
+        f0=one,
+        Y=one,
+        S=one,
+        N=one,
+        np=one,
+        late=one,
+        off=one,
+    )
+    x = evaluated(p, loop)
+    return x.course.supremum() < reach(n), x.estimate.speed
+
+
+THEOREM = Theorem(
+    recipe=HardwareRecipe,
+    margins=_margins,
+    # a recipe that fails refutes nothing, nor do all of them
+    ceilings=lambda problem, recipe: {LEVEL: np.inf, STAYS: np.inf},
+    formula=_at_once,
+    obstacles=stands_in_the_way,
+    ultimate=ultimate_radius,
+    about=is_the_machine,
+    alike=is_a_machine_like,
+    sizes=("delay", "noise", "wind", "speed", "bias", "ripple", "prediction"),
+    optional=("bandwidth", "prediction"),
+)

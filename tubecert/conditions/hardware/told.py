@@ -1,0 +1,79 @@
+"""What is told of a machine that serves: bounds and the budget. Trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tubecert.conditions.arithmetic import (
+    quiet,
+    sqrt,
+)
+from tubecert.conditions.hardware.loop import HardwareRecipe, loop_of, plant
+from tubecert.conditions.hardware.theorem import Evaluated, evaluated
+from tubecert.conditions.problem import TubeProblem
+from tubecert.enclosure.interval import Interval
+
+_DUST = 1e-9  # a share that is as good as none
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What fills the level: shares of lambda dhat, each rounded up; 0 for less than 1e-9.
+
+    `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the
+    rest of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the
+    floor.
+    """
+
+    plan: float
+    feedforward: float
+    wind: float
+    wind_estimate: float
+    bias: float
+    noise_estimate: float
+    lag: float
+    noise_feedback: float
+    sampling: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """Bounds that follow from a recipe: `supremum` of d, `radius` of |x - x*|, `feedback` |u0 - u* + kappa|, |x'|."""
+
+    supremum: float
+    radius: float
+    feedback: float
+    budget: Budget
+
+
+@quiet
+def told(problem: TubeProblem, recipe: HardwareRecipe) -> Told:
+    """What a recipe that is proven says."""
+    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    return Told(
+        supremum=float(x.course.supremum().hi),
+        radius=float((x.loop.dhat / sqrt(x.plant.n.a)).hi),
+        feedback=float((x.estimate.ups + x.estimate.kb).hi),
+        budget=_budget(x),
+    )
+
+
+def _budget(x: Evaluated[Interval]) -> Budget:
+    n, e, loop, run = x.plant.n, x.estimate, x.loop, x.course
+    whole = n.lam * loop.dhat
+
+    def share(part: Interval) -> float:
+        most = float((part / whole).sanitised().hi)
+        return most if most > _DUST else 0.0
+
+    return Budget(
+        plan=share(n.delta),
+        feedforward=share(n.beta * e.ups),
+        wind=share(x.plant.beta_w * loop.wbar),
+        wind_estimate=share(n.beta * e.gust),
+        bias=share(n.beta * (loop.S - e.gust)),
+        noise_estimate=share(n.beta * loop.N),
+        lag=share(n.beta * run.lag),
+        noise_feedback=share(run.noisy),
+        sampling=share(run.bound.delta - run.base - run.noisy),
+    )
