@@ -172,6 +172,9 @@ def _tube(tube: Tube) -> dict[str, Any]:
         data["coordinates"] = "auto"
     if tube.half_widths:
         data["half_widths"] = _given(**dict(tube.half_widths))
+    if tube.windows is not None:
+        own = tube.windows
+        data["windows"] = str(own) if isinstance(own, int) else [number_text(t) for t in own]
     return data
 
 

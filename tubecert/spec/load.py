@@ -30,6 +30,7 @@ from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import nominal, read_dynamics, read_metric, read_uncertainty, wanted_metric
 from tubecert.spec.types import Metric, Places, Spec, Synthesis, Term, TermMatrix
+from tubecert.spec.windows import check_windows
 
 VERSION: Final = 1
 
@@ -196,6 +197,8 @@ def _read_named(
     simulation = read_simulation(entries.get("simulation"), plan, names)
     hardware = read_hardware(entries.get("hardware"), entries.get("disturbance"), names)
     disturbance = read_disturbance(entries.get("disturbance"), names)
+    if plan is not None and tube is not None and not reader.findings:
+        check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
     if plan is None or x0 is None or tube is None or adaptation is None:

@@ -14,6 +14,7 @@ from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader
 from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
+from tubecert.spec.windows import with_windows
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
 RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
@@ -34,7 +35,7 @@ def read_name(field: Field) -> str | None:
 
 def read_tube(field: Field | None, names: Names) -> Tube | None:
     """The two radii or the half-widths, as far as they are given, and the coordinates they are measured in."""
-    keys = ("epsilon", "rho_a", "coordinates", "half_widths")
+    keys = ("epsilon", "rho_a", "coordinates", "half_widths", "windows")
     entries = field.mapping(optional=keys, reserved=("weights",)) if field else {}
     if entries is None:
         return None
@@ -57,12 +58,13 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
             codes.RANGE, "half_widths with coordinates: identity", "write coordinates: auto, or leave it out"
         )
         return None
-    return Tube(
+    found = Tube(
         epsilon=radii.get("epsilon"),
         rho_a=radii.get("rho_a"),
         coordinates="auto" if chosen == "auto" else "identity" if chosen == "identity" else None,
         half_widths=widths,
     )
+    return with_windows(found, entries, names)
 
 
 def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fraction], ...] | None:

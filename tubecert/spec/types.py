@@ -166,13 +166,15 @@ class Synthesis:
 class Tube:
     """The tube's two radii, or half-widths (name, w) of some states; the radii may come from the command line instead.
 
-    `coordinates` None: what was not said, `identity` unless there are half-widths.
+    `coordinates` None: what was not said, `identity` unless there are half-widths. `windows`: how many of equal length
+    the plan is cut into, or the times between them in s; None for one.
     """
 
     epsilon: Fraction | None = None
     rho_a: Fraction | None = None
     coordinates: Literal["identity", "auto"] | None = None
     half_widths: tuple[tuple[str, Fraction], ...] = ()
+    windows: int | tuple[Fraction, ...] | None = None
 
     @property
     def auto(self) -> bool:
