@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import os
 import signal
 
 import pytest
@@ -16,10 +17,19 @@ def interruptible():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def cache_of_this_session(tmp_path_factory):
-    """Plans and checks that the user has kept have no part in tests; what a session keeps, its tests may share."""
+def cache_of_the_tests(request, tmp_path_factory):
+    """Plans and checks that the user has kept have no part in tests; what one process of a run keeps, all may read.
+
+    The key stays from run to run, beside pytest's own notes: machine code of the loops need not be compiled again.
+    """
+    folder = tmp_path_factory.getbasetemp()
+    run = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        patch.setenv("XDG_CACHE_HOME", str(run / "cache"))
+        patch.setenv("XDG_STATE_HOME", str(_notes(request.config, run)))
         patch.delenv("TUBECERT_CACHE_KEY", raising=False)
         yield
+
+
+def _notes(config, run):
+    return config.cache.mkdir("state") if hasattr(config, "cache") else run / "state"

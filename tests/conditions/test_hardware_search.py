@@ -219,3 +219,22 @@ def test_the_section_is_what_is_read_back():
 def test_a_ripple_that_is_nothing_but_rounding_is_none_of_the_budget():
     assert judged(orbit()).budget.noise_estimate == 0
     assert searching.DIGITS == 4
+
+
+def test_a_choice_is_looked_for_again_only_if_the_one_before_does_not_serve(monkeypatch):
+    problem = orbit()
+    search = Search(problem, problem.machine)
+    setting = setting_at(problem, problem.machine, F(1))
+    choice, asked, least = search.levels(setting.lanes()), [], Search.least
+
+    def counted(self, at, dhat=None):
+        asked.append(dhat)
+        return least(self, at, dhat)
+
+    monkeypatch.setattr(Search, "least", counted)
+    assert searching.served(search, setting, choice) is not None
+    assert len(asked) == 1
+    monkeypatch.setattr(searching, "serves", lambda problem, recipe: False)
+    assert searching.served(search, setting, choice) is not None
+    assert len(asked) == 1 + 5
+    assert asked[-1] is None

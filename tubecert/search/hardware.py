@@ -291,13 +291,15 @@ def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe |
 
 
 def _near(search: Search, setting: Setting, choice: Choice) -> Iterator[Printed]:
-    """The choice with more and more room, what is free chosen again for each level; then what has the most of it."""
+    """The choice with more and more room, what is free chosen again for each level; then what has the most of it.
+
+    Each is looked for only if none before it serves: nearly always the first does.
+    """
     at, tried = setting.lanes(), []
-    for room in (1e-7, 1e-5, 1e-4, 1e-3):
-        level = printed(setting, choice, room).level
-        tried.append(search.least(at, np.array([float(level)]))[1])
-    tried.append(search.least(at)[1])
-    yield from (printed(setting, each, 0.0) for each in tried)
+    for room in (1e-7, 1e-5, 1e-4, 1e-3, None):
+        level = None if room is None else np.array([float(printed(setting, choice, room).level)])
+        tried.append(search.least(at, level)[1])
+        yield printed(setting, tried[-1], 0.0)
     # without a filter the theorem knows of no horizon, and a short one may be what is needed
     yield from (printed(setting, each, 0.0, filtered=True) for each in tried)
 
