@@ -18,7 +18,6 @@ from functools import cached_property
 from itertools import combinations
 
 from tubecert.recheck.cover import Outcome, prove
-from tubecert.recheck.machine import along, bordered
 from tubecert.recheck.metric import adjugate, determinant, stated, together
 from tubecert.recheck.place import Place
 from tubecert.recheck.statements import PositiveDefinite
@@ -39,6 +38,7 @@ from tubecert.recheck.terms import (
     turned,
     variable,
 )
+from tubecert.recheck.turning import along, bordered
 
 NAMES = ("drift_slope", "form_slope", "input_slope", "input_gain", "drift_metric", "curvature")
 MOST_STATES = 3  # terms and directions multiply beyond that

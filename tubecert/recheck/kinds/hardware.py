@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.balls import exact, root
+from tubecert.recheck.clipping import clips
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.digital import Digital, Loop, Promise, loop, proposed
@@ -17,7 +18,6 @@ from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
 from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
-from tubecert.recheck.machine import clips
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Hardware
