@@ -74,10 +74,11 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Listing:
-    """Preformatted text: equations, commands."""
+    """Preformatted text: equations, commands; `math` is the same as MathML, to be shown in its place."""
 
     block: ClassVar[str] = "listing"
     text: str
+    math: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from tubecert.certificate.effective import Effective, Tree
 from tubecert.certificate.result import Certificate, Result
 from tubecert.records import to_json
+from tubecert.report.mathml import Equation, aligned
 from tubecert.report.numbers import end, exact
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
 from tubecert.report.sections import family_words, safe_set
@@ -16,20 +17,36 @@ from tubecert.report.sections import family_words, safe_set
 def system(result: Result) -> Iterator[Block]:
     """The effective specification in words and equations."""
     effective = result.spec.effective
-    yield Listing(text="\n".join(equations(effective)))
+    found = tuple(dynamics(effective))
+    yield Listing(text="\n".join(each.text for each in found), math=aligned(found))
     yield Facts(facts=tuple(_facts(result, effective)))
 
 
 def equations(effective: Effective) -> Iterator[str]:
     """The dynamics, one line per state, then h."""
+    yield from (each.text for each in dynamics(effective))
+
+
+def dynamics(effective: Effective) -> Iterator[Equation]:
+    """The dynamics, one equation per state, then h."""
     model = effective.system
-    several = len(model.inputs) > 1
-    told = [f"({u} + h{i + 1})" if several else f"({u} + h)" for i, u in enumerate(model.inputs)]
-    for state, f, row in zip(model.states, model.f, model.B, strict=False):
-        terms = [f"({b})*{u}" for b, u in zip(row, told, strict=True) if b != "0"]
-        yield f"{state}' = {' + '.join([f, *terms])}"
+    many = len(model.inputs) > 1
+    told = [f"{u} + h{i + 1}" if many else f"{u} + h" for i, u in enumerate(model.inputs)]
+    wind = effective.part("disturbance").get("E", ())
+    several = bool(wind) and len(wind[0]) > 1
+    for i, (state, f, row) in enumerate(zip(model.states, model.f, model.B, strict=False)):
+        terms = [_times(b, u) for b, u in zip(row, told, strict=True) if b != "0"]
+        blown = enumerate(wind[i] if wind else ())
+        terms += [_times(e, f"w{k + 1}" if several else "w") for k, e in blown if e != "0"]
+        yield Equation(left=state, right=(f, *terms), rate=True)
     for i, h in enumerate(effective.uncertainty.h):
-        yield f"h{i + 1 if several else ''} = {h}"
+        yield Equation(left=f"h{i + 1}" if many else "h", right=(h,))
+
+
+def _times(factor: str, other: str) -> str:
+    """A product; what is multiplied by one stays alone."""
+    whole = f"({other})" if " " in other else other
+    return whole if factor == "1" else f"({factor})*{whole}"
 
 
 def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:

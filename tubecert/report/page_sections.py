@@ -16,6 +16,7 @@ from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.machine import proven as proven_machine
+from tubecert.report.mathml import matrix, named
 from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.page import (
     Block,
@@ -23,6 +24,7 @@ from tubecert.report.page import (
     Facts,
     Figures,
     Items,
+    Listing,
     Page,
     Reason,
     Section,
@@ -281,11 +283,18 @@ def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
     if metric.largest_rate is not None:
         facts.append(("supports rates up to", Cell(text=f"{down(metric.largest_rate.below, 7)} 1/s")))
     facts += [(words, Cell(text=bounds)) for words, bounds in sections.metric_bounds(metric, tube)]
-    for i, row in enumerate(metric.dual_metric):
-        for j, entry in enumerate(row[i:], start=i):
-            facts.append((f"W[{i + 1},{j + 1}]", Cell(text=entry, kind="code")))
     yield Facts(facts=tuple(facts))
+    yield Listing(text=_entries(metric), math=named("W", matrix(metric.dual_metric)))
     yield Words(text="W is the dual metric, the inverse of M; it is symmetric.")
+
+
+def _entries(metric: MetricData) -> str:
+    """The upper triangle of W, an entry on a line."""
+    return "\n".join(
+        f"W[{i + 1},{j + 1}] = {entry}"
+        for i, row in enumerate(metric.dual_metric)
+        for j, entry in enumerate(row[i:], start=i)
+    )
 
 
 def _constants(result: Result) -> Iterator[Block]:
