@@ -53,6 +53,13 @@ class UncertaintyView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DisturbanceView:
+    """The expressions of E, a row per state; none without a wind."""
+
+    E: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrajectoryView:
     """The kind of plan and its end in s, None if it has none."""
 
@@ -83,10 +90,11 @@ class _View:
     system: SystemView
     trajectory: TrajectoryView
     uncertainty: UncertaintyView = field(default_factory=UncertaintyView)
+    disturbance: DisturbanceView = field(default_factory=DisturbanceView)
     obstacles: tuple[ObstacleView, ...] = ()
 
 
-for _kind in (_View, SystemView, UncertaintyView, TrajectoryView, ObstacleView, DiscView):
+for _kind in (_View, SystemView, UncertaintyView, DisturbanceView, TrajectoryView, ObstacleView, DiscView):
     OPEN.add(_kind)
 
 
@@ -99,6 +107,7 @@ class Effective:
     system: SystemView
     trajectory: TrajectoryView
     uncertainty: UncertaintyView
+    disturbance: DisturbanceView
     obstacles: tuple[ObstacleView, ...]
 
     def part(self, name: str) -> Mapping[str, Tree]:
@@ -120,6 +129,7 @@ class Effective:
             system=view.system,
             trajectory=view.trajectory,
             uncertainty=view.uncertainty,
+            disturbance=view.disturbance,
             obstacles=view.obstacles,
         )
 

@@ -29,24 +29,25 @@ def equations(effective: Effective) -> Iterator[str]:
 
 def dynamics(effective: Effective) -> Iterator[Equation]:
     """The dynamics, one equation per state, then h."""
-    model = effective.system
-    many = len(model.inputs) > 1
-    told = [f"{u} + h{i + 1}" if many else f"{u} + h" for i, u in enumerate(model.inputs)]
-    wind = effective.part("disturbance").get("E", ())
-    several = bool(wind) and len(wind[0]) > 1
+    model, wind = effective.system, effective.disturbance.E
+    told = [f"({u} + {h})" for u, h in zip(model.inputs, _named("h", model.inputs), strict=True)]
     for i, (state, f, row) in enumerate(zip(model.states, model.f, model.B, strict=False)):
         terms = [_times(b, u) for b, u in zip(row, told, strict=True) if b != "0"]
-        blown = enumerate(wind[i] if wind else ())
-        terms += [_times(e, f"w{k + 1}" if several else "w") for k, e in blown if e != "0"]
+        blows = wind[i] if wind else ()
+        terms += [_times(e, w) for e, w in zip(blows, _named("w", blows), strict=True) if e != "0"]
         yield Equation(left=state, right=(f, *terms), rate=True)
-    for i, h in enumerate(effective.uncertainty.h):
-        yield Equation(left=f"h{i + 1}" if many else "h", right=(h,))
+    for name, h in zip(_named("h", effective.uncertainty.h), effective.uncertainty.h, strict=True):
+        yield Equation(left=name, right=(h,))
+
+
+def _named(letter: str, items: Sequence[str]) -> list[str]:
+    """A name for each: the letter alone where there is one, else with its number."""
+    return [letter] if len(items) == 1 else [f"{letter}{i + 1}" for i in range(len(items))]
 
 
 def _times(factor: str, other: str) -> str:
     """A product; what is multiplied by one stays alone."""
-    whole = f"({other})" if " " in other else other
-    return whole if factor == "1" else f"({factor})*{whole}"
+    return other if factor == "1" else f"({factor})*{other}"
 
 
 def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
