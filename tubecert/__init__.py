@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tubecert.errors import SpecError, TargetError, TubecertError
     from tubecert.library.certification import Certification, Gains, read
     from tubecert.library.certifying import certify
+    from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.rechecking import Rechecked, recheck
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Certification",
+    "Exported",
     "Gains",
     "Rechecked",
     "Report",
@@ -39,6 +41,7 @@ __all__ = [
     "VerifiedMetric",
     "__version__",
     "certify",
+    "export",
     "load",
     "read",
     "recheck",
@@ -54,6 +57,7 @@ _HOMES = {
     "Gains": "library.certification",
     "read": "library.certification",
     "certify": "library.certifying",
+    "Exported": "library.exporting",
     "SynthesisedMetric": "library.metrics",
     "VerifiedMetric": "library.metrics",
     "synthesise": "library.metrics",
@@ -70,7 +74,12 @@ _HOMES = {
     "Step": "stages.options",
     "Verdict": "verdict",
 }
-_ROOMS = {"recheck": "library.rechecking", "report": "library.pages", "simulate": "library.simulating"}
+_ROOMS = {
+    "export": "library.exporting",
+    "recheck": "library.rechecking",
+    "report": "library.pages",
+    "simulate": "library.simulating",
+}
 
 
 class _Room(ModuleType):

@@ -46,6 +46,7 @@ ROOMS = [
     "stages",
     "words",
     "simulate",
+    "export",
     "pipeline",
     "checking",
     "sweep",

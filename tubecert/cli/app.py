@@ -14,6 +14,7 @@ from tubecert.cli import (
     comparing,
     designing,
     everyday,
+    exporting,
     rechecking,
     simulating,
     sweeping,
@@ -190,6 +191,7 @@ designing.register(app)
 verifying.register(app)
 simulating.register(app)
 rechecking.register(app)
+exporting.register(app)
 everyday.register(app)
 
 

@@ -1,0 +1,154 @@
+"""Controllers for tests of export, put together from recipes by hand: nothing is certified."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.export.controller import Controller, Machine, assembled
+from tubecert.model import build
+from tubecert.spec import Knots, load_text
+from tubecert.trajectory import Plan
+from tubecert.trajectory.pieces import piecewise_plan
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+HASH = "sha256:" + "0123456789abcdef" * 4
+
+# B(x): with W = I its columns are Killing fields if they turn
+TURNING = """
+tubecert: 1
+name: turning
+system:
+  states: [p, v, w]
+  inputs: [u, s]
+  f: ["-p + v/5", "p/2 - v/10 + tanh(w)/7", "-w + sin(p)*exp(-v)"]
+  B: [["-v/4", 0], ["1 + p/4", 0], [0, 1]]
+safe_set: {p: [-1, 1], v: [-1, 1], w: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t)", 0]}
+trajectory: {kind: equilibrium, at: [0, 0, 0]}
+metric: {rate: 0.5, dual_metric: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+"""
+PATH = """
+tubecert: 1
+name: path
+system: {states: [p, v], inputs: [u], f: [v, "p - v/2"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], v: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+"""
+KNOTS = Knots(
+    t=tuple(map(Fraction, ("0", "0.013", "0.02", "0.3", "0.31"))),
+    x=tuple(
+        tuple(map(Fraction, row))
+        for row in (("0", "0"), ("0", "0.001"), ("0", "0"), ("0.1", "0"), ("0.1", "0.1"))
+    ),
+    u=tuple((Fraction(q),) for q in ("0", "0.2", "-0.1", "0.3", "0")),
+    interpolation="linear",
+)
+
+
+def recipe(**values: Any) -> HardwareRecipe:
+    """A recipe of 500 Hz with numbers as they are on the orbit."""
+    given: dict[str, Any] = {
+        "sample_time": Fraction(1, 500),
+        "delay": Fraction(1, 2000),
+        "feedback_time": Fraction(1, 500),
+        "bandwidth": Fraction("75.96"),
+        "noise": Fraction(1, 1000),
+        "wind": Fraction(0),
+        "clip_radius": Fraction("2.15"),
+        "level": Fraction("0.18539"),
+        "floor": Fraction("0.05"),
+        "speed": Fraction("8.1"),
+        "bias": Fraction("0.1"),
+        "ripple": Fraction("0.07"),
+        "prediction": None,
+    }
+    return HardwareRecipe(**(given | values))
+
+
+def machine(text: str, plan: Plan | None = None, **values: Any) -> Machine:
+    """A machine for a specification."""
+    spec = load_text(text, "spec.yaml")
+    model, trajectory = build(spec), spec.trajectory
+    x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
+    given: dict[str, Any] = {
+        "name": spec.name,
+        "hash": HASH,
+        "model": model,
+        "plan": Plan(x, u, trajectory.horizon) if plan is None else plan,
+        "recipe": recipe(),
+        "reach": Fraction("0.19"),
+        "clip": (),
+        "coordinates": None,
+        "held": False,
+        "horizon": trajectory.horizon,
+        "ranges": ((-4.0, 4.0),) * len(spec.inputs),
+    }
+    return Machine(**(given | values))
+
+
+def orbit(**values: Any) -> Controller:
+    """A moving plan, u* in continuous time, a box as the clip."""
+    text = (CONFIGS / "hardware_orbit.yaml").read_text("utf-8")
+    return assembled(machine(text, **({"clip": ((Fraction(-2), Fraction("1.9")),)} | values)))
+
+
+def turning(**values: Any) -> Controller:
+    """B(x), two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube."""
+    own = {
+        "recipe": recipe(delay=Fraction(1, 500), prediction=Fraction("0.01"), clip_radius=Fraction("0.2")),
+        "coordinates": (("1", "0", "0"), ("0", "2", "0"), ("0", "1/3", "1")),
+    }
+    return assembled(machine(TURNING, **(own | values)))
+
+
+def path(**values: Any) -> Controller:
+    """A plan through knots, of which several meet one sample, and no filter."""
+    plan = piecewise_plan(build(load_text(PATH)), KNOTS)
+    own = {
+        "recipe": recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), bandwidth=None),
+        "horizon": Fraction("0.31"),
+    }
+    return assembled(machine(PATH, plan, **(own | values)))
+
+
+def predicting_path(**values: Any) -> Controller:
+    """The same, with a prediction in which u* moves."""
+    own = recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), prediction=Fraction("0.01"))
+    return path(recipe=own, **values)
+
+
+def held_orbit() -> Controller:
+    """u* held from sample to sample."""
+    return replace(orbit(held=True), name="held_orbit")
+
+
+CONTROLLERS = {
+    "orbit": orbit,
+    "turning": turning,
+    "path": path,
+    "predicting_path": predicting_path,
+    "held_orbit": held_orbit,
+}
+
+
+def wandering(controller: Controller, samples: int, lanes: int, seed: int) -> np.ndarray:
+    """Measurements (K, N, n) near the plan: they drift, jump, and shake."""
+    from tubecert.export.reference import Reference
+
+    generator, reference = np.random.default_rng(seed), Reference(controller=controller)
+    n = len(controller.states)
+    drift = np.cumsum(generator.normal(size=(samples, lanes, n)), axis=0) * 1e-3
+    drift[samples // 2 :] += 0.05 * generator.normal(size=(1, lanes, n))
+    plans = []
+    for k in range(samples):
+        reference.sample = k
+        plans.append(reference.plan(reference.time())[0])
+    return np.array(plans) + drift + 1e-4 * generator.normal(size=drift.shape)

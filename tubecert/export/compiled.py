@@ -1,0 +1,111 @@
+"""Exported C, compiled by the C compiler of this machine and called from here."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.errors import TubecertError
+from tubecert.export.controller import Controller, refused
+from tubecert.export.folder import Exported
+from tubecert.printable import visible
+
+COMPILERS: Final = ("cc", "gcc", "clang")
+FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
+_PATIENCE: Final = 120  # s
+_SHOWN: Final = 400  # characters of what a compiler says
+
+
+class Compiled:
+    """N controllers side by side, as `Reference`, but of the compiled code; `seconds` of every step."""
+
+    def __init__(self, library: ctypes.CDLL, controller: Controller, *, single: bool, lanes: int) -> None:
+        n, m = len(controller.states), len(controller.inputs)
+        self._real = ctypes.c_float if single else ctypes.c_double
+        self._type = np.float32 if single else np.float64
+        self._shape = (lanes, m)
+        fields = [("sample", ctypes.c_uint32), ("y", self._real * n), ("f", self._real * n)]
+        fields += [(name, self._real * m) for name in ("q", "feedback", "held", "before")]
+        kind = type("State", (ctypes.Structure,), {"_fields_": fields})
+        self._states = [kind() for _ in range(lanes)]
+        self._start = self._function(library, f"{controller.name}_start")
+        self._step = self._function(library, f"{controller.name}_step")
+        self.seconds: list[float] = []
+        self.status = np.zeros(lanes, dtype=np.intp)
+
+    def start(self, y: Array) -> Array:
+        """The inputs (N, m) that act from 0 on, for what is measured at 0, (N, n)."""
+        return self._run(self._start, y)
+
+    def step(self, y: Array) -> Array:
+        """The inputs (N, m) that act a delay from now on."""
+        begin = time.perf_counter()
+        found = self._run(self._step, y)
+        self.seconds.append((time.perf_counter() - begin) / len(y))
+        return found
+
+    def _function(self, library: ctypes.CDLL, name: str) -> Callable[..., int]:
+        function = getattr(library, name)
+        function.argtypes = (ctypes.c_void_p, ctypes.POINTER(self._real), ctypes.POINTER(self._real))
+        function.restype = ctypes.c_int
+        return function  # type: ignore[no-any-return]
+
+    def _run(self, function: Callable[..., int], y: Array) -> Array:
+        given = np.ascontiguousarray(y, dtype=self._type)
+        found = np.zeros(self._shape, dtype=self._type)
+        pointer = ctypes.POINTER(self._real)
+        for lane, (row, out) in enumerate(zip(given, found, strict=True)):
+            state = ctypes.byref(self._states[lane])
+            self.status[lane] = function(state, row.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+        return found.astype(float)
+
+
+def compiler() -> str | None:
+    """A C compiler on PATH."""
+    return next(filter(None, map(shutil.which, COMPILERS)), None)
+
+
+@contextmanager
+def compiled(exported: Exported, lanes: int = 1) -> Iterator[Compiled]:
+    """The compiled code; raises TC712 where there is no compiler, the code does not compile, or its hash is another."""
+    with tempfile.TemporaryDirectory() as folder:
+        exported.save(folder)
+        library = ctypes.CDLL(built(exported, folder))
+        own = ctypes.string_at(
+            ctypes.addressof(ctypes.c_char.in_dll(library, f"{exported.controller.name}_certificate"))
+        )
+        if own.decode(errors="replace") != exported.controller.hash:
+            raise _failed("the compiled code is that of another certificate")
+        yield Compiled(library, exported.controller, single=exported.precision == "single", lanes=lanes)
+
+
+def built(exported: Exported, folder: str) -> str:
+    """The shared object of the files in a folder; raises TC712."""
+    found, target = compiler(), str(Path(folder) / "controller.so")
+    if found is None:
+        raise _failed(f"there is no C compiler on PATH ({', '.join(COMPILERS)})")
+    source = str(Path(folder) / f"{exported.controller.name}.c")
+    command = [found, *FLAGS, "-shared", "-fPIC", source, "-o", target, "-lm"]
+    try:
+        done = subprocess.run(  # noqa: S603 - a compiler of PATH, and the bytes that export wrote
+            command, capture_output=True, text=True, timeout=_PATIENCE, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise _failed(f"{found} does not run: {error}") from error
+    if done.returncode:
+        raise _failed(f"{found} refuses the code: {visible(done.stderr.strip())[:_SHOWN]}")
+    return target
+
+
+def _failed(message: str) -> TubecertError:
+    return refused(message, "install gcc or clang; what export writes is C99", "TC712")

@@ -1,0 +1,79 @@
+"""The files of an exported controller: the same bytes for the same certificate, language and precision."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from tubecert.certificate.file import write_text
+from tubecert.errors import TargetError
+from tubecert.export import c as c99
+from tubecert.export.controller import Controller
+from tubecert.export.python import python
+from tubecert.export.vectors import vectors
+from tubecert.export.words import readme
+from tubecert.findings import Finding
+from tubecert.printable import visible
+
+Language = Literal["c", "python"]
+Precision = Literal["double", "single"]
+FORMAT: Final = "tubecert-controller/1"
+MANIFEST: Final = "controller.json"
+_REMEDY: Final = "choose another folder with -o FOLDER"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exported:
+    """A controller as files, by their names."""
+
+    controller: Controller
+    language: Language
+    precision: Precision
+    files: Mapping[str, str]
+
+    def save(self, folder: str) -> None:
+        """Write them into a folder, which is made if there is none; raises `TargetError`."""
+        target = Path(folder)
+        try:
+            target.mkdir(exist_ok=True)
+        except OSError as error:
+            message = f"cannot make the folder {visible(folder)}: {error.strerror or error}"
+            raise TargetError([Finding(code="TC120", message=message, help=_REMEDY)]) from error
+        for name, text in self.files.items():
+            write_text(str(target / name), text, _REMEDY)
+
+
+def exported(controller: Controller, language: Language = "c", precision: Precision = "double") -> Exported:
+    """A controller in a language; in Python everything is `double`."""
+    own = _c(controller, precision) if language == "c" else _python(controller)
+    manifest = {
+        "format": FORMAT,
+        "certificate": controller.hash,
+        "language": language,
+        "name": controller.name,
+        "precision": precision,
+    }
+    said = {name: what for name, (what, _) in own.items()} | {MANIFEST: "what these files are, for tubecert"}
+    files = {name: text for name, (_, text) in own.items()}
+    files[MANIFEST] = json.dumps(manifest, indent=1, sort_keys=True) + "\n"
+    files["README.md"] = readme(controller, said, precision=precision)
+    return Exported(controller=controller, language=language, precision=precision, files=files)
+
+
+def _c(controller: Controller, precision: Precision) -> dict[str, tuple[str, str]]:
+    single, name = precision == "single", controller.name
+    language = c99.C(single)
+    test = c99.self_test(controller, language, vectors(controller, single=single))
+    return {
+        f"{name}.h": ("the types, and what is called", c99.header(controller, language)),
+        f"{name}.c": ("the controller: C99, with math.h only", c99.source(controller, language)),
+        f"{name}_test.c": ("a program that tests it against numbers of the producer", test),
+    }
+
+
+def _python(controller: Controller) -> dict[str, tuple[str, str]]:
+    text = python(controller, vectors(controller))
+    return {f"{controller.name}.py": ("the controller, with numpy only; run it, and it tests itself", text)}

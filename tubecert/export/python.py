@@ -1,0 +1,259 @@
+"""The controller in Python: one file that needs numpy only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Final
+
+from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
+from tubecert.export.listing import decimal, lines
+from tubecert.export.program import GREATEST, LEAST, RATIO, Program
+from tubecert.export.vectors import Vectors
+from tubecert.export.words import NOT_COVERED, TIMING, heading
+
+_WIDTH: Final = 96
+
+
+class _Python:
+    """Expressions of Python."""
+
+    def number(self, value: Fraction) -> str:
+        """A constant."""
+        return decimal(value)
+
+    def entry(self, name: str, index: int) -> str:
+        """An entry of a vector that goes in."""
+        return f"{name}[{index}]"
+
+    def call(self, name: str, argument: str) -> str:
+        """A function."""
+        return f"math.{name}({argument})"
+
+    def choice(self, name: str, a: str, b: str) -> str:
+        """A choice between two."""
+        if name == LEAST:
+            return f"{a} if {a} < {b} else {b}"
+        if name == GREATEST:
+            return f"{a} if {a} > {b} else {b}"
+        if name == RATIO:
+            return f"{a} / {b} if {a} > 0.0 and {b} > 0.0 else 0.0"
+        return f"{b} / {a} if {a} > {b} else 1.0"
+
+
+def python(controller: Controller, vectors: Vectors) -> str:
+    """The text of the module."""
+    return "\n".join(_module(controller, vectors)) + "\n"
+
+
+def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
+    yield f'"""{heading(c)}'
+    yield ""
+    yield from (*NOT_COVERED, "", *TIMING)
+    yield '"""'
+    yield ""
+    yield "import math"
+    yield "import sys"
+    yield ""
+    yield "import numpy as np"
+    yield ""
+    yield f'CERTIFICATE = "{c.hash}"'
+    yield f"STATES = {_tuple([repr(name) for name in c.states])}"
+    yield f"INPUTS = {_tuple([repr(name) for name in c.inputs])}"
+    yield f"SAMPLE_TIME = {decimal(c.sample_time)}  # s"
+    yield f"DELAY = {decimal(c.delay)}  # s, from a sample to the input that is computed from it"
+    yield f"HORIZON = {'math.inf' if c.horizon is None else decimal(c.horizon)}  # s"
+    yield f"LEVEL = {decimal(c.level)}  # d(x*, x) stays below it"
+    yield f"REACH = {decimal(c.reach)}  # and d(x*, y) below this, y being what was measured, or predicted from it"
+    if c.pieces is not None:
+        yield f"MEETS = {c.pieces.most}  # so many pieces of the plan can meet one sample"
+    yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add feedforward(t) all the time"
+    if c.pieces is not None:
+        yield from _tables(c.pieces)
+    for program in c.programs:
+        yield from _function(program)
+    yield from _plan(c)
+    yield from _mean(c)
+    yield from _class(c)
+    yield from _test(c, vectors)
+
+
+def _tuple(texts: Sequence[str]) -> str:
+    return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
+
+
+def _tables(pieces: Pieces) -> Iterator[str]:
+    yield ""
+    yield "# The plan: every piece begins at START; x* and u* are polynomials of the time since then."
+    yield f"START = {_tuple([decimal(q) for q in pieces.start])}"
+    for name, table in (("X", pieces.x), ("U", pieces.u)):
+        yield f"{name} = ("
+        for piece in table:
+            yield f"    {_tuple([_tuple([decimal(q) for q in row]) for row in piece])},"
+        yield ")"
+
+
+def _function(program: Program) -> Iterator[str]:
+    found = lines(program, _Python())
+    yield ""
+    yield ""
+    yield f"def {program.name}({', '.join(port.name for port in program.inputs)}):"
+    yield f'    """{program.words}."""'
+    for name, text in found.named:
+        yield f"    {name} = {text}"
+    for port in program.outputs:
+        texts = [text for name, _, text in found.results if name == port.name]
+        yield f"    out_{port.name} = ("
+        for text in texts:
+            yield f"        {text},"
+        yield "    )"
+    yield f"    return {', '.join(f'out_{port.name}' for port in program.outputs)}"
+
+
+def _plan(c: Controller) -> Iterator[str]:
+    yield ""
+    yield ""
+    yield "def on_plan(t):"
+    yield '    """x*(t) and u*(t); beyond the horizon those at its end."""'
+    if c.horizon is not None:
+        yield "    t = t if t < HORIZON else HORIZON"
+    if c.pieces is None:
+        yield "    return plan((t,))"
+        return
+    yield "    k = piece(t)"
+    yield "    s = t - START[k]"
+    yield "    x = tuple(a[0] + s * (a[1] + s * (a[2] + s * a[3])) for a in X[k])"
+    yield "    return x, tuple(a[0] + s * a[1] for a in U[k])"
+    yield ""
+    yield ""
+    yield "def piece(t):"
+    yield '    """The piece that a time lies in."""'
+    yield "    low, high = 0, len(START) - 1"
+    yield "    while low < high:"
+    yield "        middle = (low + high + 1) // 2"
+    yield "        low, high = (middle, high) if t >= START[middle] else (low, middle - 1)"
+    yield "    return low"
+
+
+def _mean(c: Controller) -> Iterator[str]:
+    """The mean of u* over a sample, where it is not held."""
+    if c.adds_plan:
+        return
+    yield ""
+    yield ""
+    yield "def mean_of_plan(begin, end):"
+    yield '    """The mean of u* over a sample."""'
+    if c.gauss is not None:
+        nodes = [f"on_plan(begin + {decimal(q * c.sample_time)})[1]" for q in NODES]
+        yield f"    return gauss({', '.join(nodes)})"
+        return
+    yield "    k, length, total = piece(begin), end - begin, [0.0] * len(INPUTS)"
+    yield "    for _ in range(MEETS):"
+    yield "        until = START[k + 1] if k + 1 < len(START) and START[k + 1] < end else end"
+    yield "        middle = 0.5 * (begin + until) - START[k]"
+    yield "        share = (until - begin) / length"
+    yield "        total = [p + share * (a[0] + middle * a[1]) for p, a in zip(total, U[k])]"
+    yield "        begin = until"
+    yield "        k = k if begin == end or k + 1 == len(START) else k + 1"
+    yield "    return tuple(total)"
+
+
+def _class(c: Controller) -> Iterator[str]:
+    m = len(c.inputs)
+    yield ""
+    yield ""
+    yield "def feedforward(t):"
+    yield '    """u*(t), (m,), t in s since the start."""'
+    yield "    return np.array(on_plan(t)[1])"
+    yield ""
+    yield ""
+    yield "class Controller:"
+    yield '    """The controller: `start` at t = 0, then `step` at every sample, the first one at t = 0 as well.'
+    yield ""
+    yield "    `status` is 0, or a sum of: 1, the horizon is over; 2, what was measured is not in the tube;"
+    yield "    4, no feedback can contract there."
+    yield '    """'
+    yield ""
+    yield "    def __init__(self):"
+    yield "        self.sample = 0"
+    yield "        self.status = 0"
+    yield "        self.y = self.f = None"
+    yield f"        self.q = (0.0,) * {m}"
+    yield f"        self.feedback = self.held = self.before = (0.0,) * {m}"
+    yield ""
+    yield "    def start(self, y):"
+    yield '        """Forgets everything; the input (m,) that acts at once, for what is measured at t = 0, (n,)."""'
+    yield "        self.__init__()"
+    yield "        self.feedback = self._law(tuple(map(float, y)), 0.0)"
+    yield "        self.held = self.before = self.feedback"
+    yield "        return np.array(self.held)"
+    yield ""
+    yield "    def step(self, y):"
+    yield '        """The input (m,) that acts from DELAY s after this sample on, for what is measured now, (n,)."""'
+    yield "        y = tuple(map(float, y))"
+    yield "        self.status = 0"
+    yield "        t = self.sample * SAMPLE_TIME"
+    yield "        f = drift(y)"
+    yield "        estimate = self.q"
+    yield "        if self.sample > 0:"
+    mean = "" if c.adds_plan else ", mean_of_plan((self.sample - 1) * SAMPLE_TIME, t)"
+    yield f"            mean = applied(self.held, self.before{mean})"
+    yield "            self.q, estimate = estimator(y, f, self.y, self.f, self.q, mean)"
+    yield f"        self.feedback = self._law({'self._predicted(y, t), t + DELAY' if c.predicts else 'y, t'})"
+    yield "        self.before = self.held"
+    yield "        self.held = tuple(p - q for p, q in zip(self.feedback, estimate))"
+    yield "        self.y, self.f = y, f"
+    yield "        self.sample += 1"
+    yield "        return np.array(self.held)"
+    yield ""
+    yield "    def _law(self, y, t):"
+    yield "        x, u = on_plan(t)"
+    yield "        kappa, (square, excess, size) = law(y, drift(y), x, flow(x, u), u)"
+    yield "        self.status = 1 if t > HORIZON else 0"
+    yield "        self.status += 0 if square < REACH * REACH else 2"
+    yield "        self.status += 4 if excess > 0.0 and not size > 0.0 else 0"
+    yield f"        return {'tuple(p + q for p, q in zip(kappa, u))' if c.adds_plan else 'kappa'}"
+    if c.predicts:
+        yield ""
+        yield "    def _predicted(self, y, t):"
+        yield '        """The state when the input of this sample begins to act, theorem H-P."""'
+        yield f"        h = {decimal(c.delay / INTEGRATION)}"
+        yield f"        for k in range({INTEGRATION}):"
+        if c.adds_plan:
+            yield "            a = b = c = self.feedback"
+        else:
+            yield "            a, b, c = ("
+            yield "                tuple(p + q for p, q in zip(self.feedback, on_plan(t + (k + s) * h)[1]))"
+            yield "                for s in (0.0, 0.5, 1.0)"
+            yield "            )"
+        yield "            y = predictor(y, a, b, c)"
+        yield "        return y"
+
+
+def _test(c: Controller, vectors: Vectors) -> Iterator[str]:
+    yield ""
+    yield ""
+    yield "# What is measured, and what the producer of this file computed for it: the self-test."
+    yield "MEASURED = ("
+    for row in vectors.y:
+        yield f"    {_tuple([repr(value) for value in row])},"
+    yield ")"
+    yield "EXPECTED = ("
+    for row in vectors.u:
+        yield f"    {_tuple([repr(value) for value in row])},"
+    yield ")"
+    yield f"TOLERANCE = {vectors.tolerance!r}"
+    yield ""
+    yield ""
+    yield "def self_test():"
+    yield '    """The largest difference to what the producer computed; ValueError where it is too large."""'
+    yield "    controller = Controller()"
+    yield "    found = [controller.start(MEASURED[0]), *(controller.step(y) for y in MEASURED)]"
+    yield "    worst = float(np.max(np.abs(np.array(found) - np.array(EXPECTED))))"
+    yield "    if not worst <= TOLERANCE:"
+    yield '        raise ValueError(f"the self-test fails: the largest difference is {worst}")'
+    yield "    return worst"
+    yield ""
+    yield ""
+    yield 'if __name__ == "__main__":'
+    yield '    sys.stdout.write(f"the self-test passes: the largest difference is {self_test():.3g}\\n")'

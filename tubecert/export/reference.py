@@ -1,0 +1,185 @@
+"""The controller in numpy, many runs at once: what exported code is compared with.
+
+It runs the very programs that code is printed from, in `double` or with every operation rounded to `float`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
+from tubecert.export.program import GREATEST, LEAST, RATIO, Program, Step
+
+_NUMPY: Final = {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan}
+
+
+def execute(program: Program, *given: Array, real: type = np.float64) -> tuple[Array, ...]:
+    """What comes out, each (N, size), of what goes in, (N, size) or (1, size), in the order of the program."""
+    memory: list[Array] = []
+    inputs = {port.name: values for port, values in zip(program.inputs, given, strict=True)}
+    with np.errstate(all="ignore"):
+        for step in program.steps:
+            memory.append(_value(step, memory, inputs, real))
+    lanes = max(len(value) for value in given)
+    return tuple(
+        np.stack([np.broadcast_to(memory[p], (lanes,)) for p in port.places], axis=1)
+        for port in program.outputs
+    )
+
+
+def _value(step: Step, memory: list[Array], given: Mapping[str, Array], real: type) -> Array:
+    if step.operation == "input":
+        return np.asarray(given[step.name][:, step.index], dtype=real)
+    if step.operation == "constant":
+        return np.asarray(float(step.value), dtype=real)
+    args = [memory[place] for place in step.places]
+    if step.operation == "call":
+        function = _NUMPY.get(step.name) or getattr(np, step.name)
+        return np.asarray(function(np.asarray(args[0], dtype=np.float64)), dtype=real)
+    if step.operation == "choose":
+        return _chosen(step.name, args[0], args[1], real)
+    a, b = args[0], args[-1]
+    match step.operation:
+        case "add":
+            return a + b
+        case "sub":
+            return a - b
+        case "mul":
+            return a * b
+        case "div":
+            return a / b
+    return -a
+
+
+def _chosen(name: str, a: Array, b: Array, real: type) -> Array:
+    if name == LEAST:
+        return np.where(a < b, a, b)
+    if name == GREATEST:
+        return np.where(a > b, a, b)
+    if name == RATIO:
+        return np.where((a > 0) & (b > 0), a / b, real(0))
+    return np.where(a > b, b / a, real(1))
+
+
+@dataclass(slots=True, kw_only=True)
+class Reference:
+    """N controllers side by side; `start` and `step` are those of the exported code.
+
+    `feedback` is kappa, with u* where that is held; `held` acts now, `before` acted until it did.
+    """
+
+    controller: Controller
+    real: type = np.float64
+    sample: int = 0
+    y: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    f: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    q: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    feedback: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    held: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    before: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def start(self, y: Array) -> Array:
+        """Forgets everything; the inputs (N, m) that act from 0 on, for what is measured at 0, (N, n)."""
+        self.sample = 0
+        self.feedback, _ = self._law(y, self.real(0))
+        self.q = np.zeros_like(self.feedback)
+        self.held = self.before = self.feedback
+        return np.asarray(self.held)
+
+    def step(self, y: Array) -> tuple[Array, Array]:
+        """The inputs (N, m) that act a delay from now on, and d(x*, y)^2 (N,)."""
+        c, real = self.controller, self.real
+        (f,) = execute(c.drift, y, real=real)
+        estimate = self.q
+        if self.sample:
+            self.q, estimate = execute(c.estimator, y, f, self.y, self.f, self.q, self._mean(), real=real)
+        self.feedback, square = self._law(self._predicted(y), self.time(c.delay if c.predicts else 0))
+        self.before, self.held = self.held, self.feedback - estimate
+        self.y, self.f = y, f
+        self.sample += 1
+        return self.held, square
+
+    def time(self, after: Fraction | int = 0) -> Array:
+        """A time after the newest sample, in s."""
+        begin = self.real(self.sample) * self.real(float(self.controller.sample_time))
+        return np.asarray(begin + self.real(float(after)))
+
+    def plan(self, t: Array) -> tuple[Array, Array]:
+        """x* (1, n) and u* (1, m) at a time; beyond the horizon those at its end."""
+        c, real = self.controller, self.real
+        if c.horizon is not None:
+            t = min(t, real(float(c.horizon)))
+        if c.plan is not None:
+            x, u = execute(c.plan, np.array([[t]]), real=real)
+            return x, u
+        return _on_pieces(c.pieces, t, real) if c.pieces is not None else (t, t)
+
+    def _law(self, y: Array, t: Array) -> tuple[Array, Array]:
+        c, real = self.controller, self.real
+        x, u = self.plan(t)
+        (f,), (v,) = execute(c.drift, y, real=real), execute(c.flow, x, u, real=real)
+        kappa, told = execute(c.law, y, f, x, v, u, real=real)
+        return kappa + (u if c.adds_plan else real(0)), told[:, 0]
+
+    def _mean(self) -> Array:
+        """The mean of the inputs over the last sample, (N, m)."""
+        c, real = self.controller, self.real
+        given = [self.held, self.before]
+        begin = real(self.sample - 1) * real(float(c.sample_time))
+        if c.gauss is not None:
+            nodes = [self.plan(begin + real(float(share * c.sample_time)))[1] for share in NODES]
+            given += execute(c.gauss, *nodes, real=real)
+        elif c.pieces is not None and not c.held:
+            given.append(_mean_on_pieces(c.pieces, begin, self.time(), real))
+        (mean,) = execute(c.applied, *given, real=real)
+        return mean
+
+    def _predicted(self, y: Array) -> Array:
+        """Theorem H-P: yp' = f + B (u0 + kappa) over the delay, with the feedback that acts."""
+        c, real = self.controller, self.real
+        if c.predictor is None:
+            return y
+        h = c.delay / INTEGRATION
+        for k in range(INTEGRATION):
+            inputs = [
+                self.feedback + (real(0) if c.adds_plan else self.plan(self.time((k + share) * h))[1])
+                for share in (Fraction(0), Fraction(1, 2), Fraction(1))
+            ]
+            (y,) = execute(c.predictor, y, *inputs, real=real)
+        return y
+
+
+def _place(pieces: Pieces, t: Array, real: type) -> int:
+    """The piece that a time lies in."""
+    begins = [real(float(q)) for q in pieces.start]
+    return max(k for k, begin in enumerate(begins) if k == 0 or t >= begin)
+
+
+def _on_pieces(pieces: Pieces, t: Array, real: type) -> tuple[Array, Array]:
+    k = _place(pieces, t, real)
+    tau = t - real(float(pieces.start[k]))
+    x, u = (np.array([[real(float(q)) for q in row] for row in rows[k]]) for rows in (pieces.x, pieces.u))
+    return (
+        (x[:, 0] + tau * (x[:, 1] + tau * (x[:, 2] + tau * x[:, 3])))[None],
+        (u[:, 0] + tau * u[:, 1])[None],
+    )
+
+
+def _mean_on_pieces(pieces: Pieces, begin: Array, end: Array, real: type) -> Array:
+    """u* is linear on every piece: its mean there is its value in the middle."""
+    k, total, length = _place(pieces, begin, real), real(0), end - begin
+    for _ in range(pieces.most):
+        last = k + 1 == len(pieces.start)
+        until = end if last else min(end, real(float(pieces.start[k + 1])))
+        u = np.array([[real(float(q)) for q in row] for row in pieces.u[k]])
+        middle = real(0.5) * (begin + until) - real(float(pieces.start[k]))
+        total = total + (until - begin) / length * (u[:, 0] + middle * u[:, 1])[None]
+        begin = until
+        k = k if last or begin == end else k + 1
+    return np.asarray(total)

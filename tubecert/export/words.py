@@ -1,0 +1,136 @@
+"""What exported code says of itself: what it is about, what the proof covers, and who has to do what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from tubecert.export.controller import INTEGRATION, NODES, Controller
+
+NOT_COVERED: Final = (
+    "What the proof covers: the loop of theorem H in EXACT arithmetic. The rounding of this code is not",
+    "covered: exact arithmetic is assumed, and so are the exact mean of u* over a sample and, where the",
+    "feedback predicts, the exact solution of its model.",
+)
+TIMING: Final = (
+    "`start` with what is measured at t = 0 gives the input that acts at once. Then",
+    "`step` at t = 0, SAMPLE_TIME, 2 SAMPLE_TIME, ... gives the input that acts from DELAY after the",
+    "sample until the next one replaces it. The actuator holds it. `step` at t = 0 takes the measurement",
+    "that `start` has taken. Every sample is taken exactly once, at its time.",
+)
+
+
+def heading(controller: Controller) -> str:
+    """The first line of every file."""
+    return f"{controller.system}: the controller of certificate H. Written by tubecert export; do not edit."
+
+
+def readme(c: Controller, files: Mapping[str, str], *, precision: str) -> str:
+    """README.md of the folder."""
+    return "\n".join(_readme(c, files, precision)) + "\n"
+
+
+def _readme(c: Controller, files: Mapping[str, str], precision: str) -> Iterator[str]:
+    yield f"# The controller of {c.system}"
+    yield ""
+    yield "Written by `tubecert export` from the certificate"
+    yield f"`{c.hash}`."
+    yield "Do not edit: it is these very files that belong to it."
+    yield ""
+    for name, what in sorted(files.items()):
+        yield f"- `{name}`: {what}"
+    yield ""
+    yield "## What is proven of it"
+    yield ""
+    yield "The certificate proves that this loop keeps the state in its tube, for the noise, wind and uncertainty"
+    yield f"that it names, with this sample time and delay. Arithmetic: `{precision}`."
+    yield ""
+    yield from NOT_COVERED
+    yield ""
+    yield "Nor is a clock that jitters, an actuator that lags, or an input that is clipped somewhere else."
+    yield ""
+    yield "## How to call it"
+    yield ""
+    yield from TIMING
+    yield ""
+    if not c.adds_plan:
+        yield "u\\* is *not* in what `step` gives: the certificate is about a feedforward that acts in continuous time."
+        yield "What acts on the plant is, at every time t, `feedforward(t)` and what `step` gave. If your actuator can"
+        yield "only hold its input, certify that: `hardware: {feedforward: held}`."
+        yield ""
+    if c.predicts:
+        yield "The feedback is that of the state which is predicted to the instant at which it acts (theorem H-P)."
+        yield ""
+    yield "| | |"
+    yield "|---|---|"
+    yield f"| measured, in this order | {', '.join(c.states)} |"
+    yield f"| inputs, in this order | {', '.join(c.inputs)} |"
+    yield f"| sample time | {float(c.sample_time):.9g} s |"
+    yield f"| delay, from a sample to its input | {float(c.delay):.9g} s |"
+    yield f"| horizon | {'none' if c.horizon is None else f'{float(c.horizon):.9g} s'} |"
+    for name, (low, high) in zip(c.inputs, c.ranges, strict=True):
+        yield f"| proven range of {name} | [{low:.9g}, {high:.9g}] |"
+    yield ""
+    yield "`step` (in Python: `status`) returns 0, or a sum of 1 (the horizon is over), 2 (what was measured cannot be"
+    yield "the state of this loop: an assumption does not hold) and 4 (no input could contract here: the same)."
+    yield ""
+    yield "## What a step costs"
+    yield ""
+    yield "At most, whatever is measured (assignments and the tests of loops are not counted):"
+    yield ""
+    yield "| operation | times |"
+    yield "|---|---|"
+    for name, count in sorted(operations(c).items()):
+        yield f"| {_OPERATIONS.get(name, name)} | {count} |"
+    yield ""
+    yield "There is no allocation, no recursion, and no loop without a bound."
+
+
+_OPERATIONS: Final = {
+    "add": "addition",
+    "sub": "subtraction",
+    "mul": "multiplication",
+    "div": "division",
+    "neg": "change of sign",
+    "ratio": "division, or 0",
+    "shrink": "division, or 1",
+    "least": "smaller of two",
+    "greatest": "larger of two",
+}
+
+
+def operations(c: Controller) -> dict[str, int]:
+    """How often a step does each operation, at most."""
+    looks = 1 + (len(NODES) if c.gauss is not None else 0)
+    looks += 3 * INTEGRATION if c.predictor is not None and not c.adds_plan else 0
+    times = [
+        (c.plan, looks),
+        (c.drift, 2),
+        (c.flow, 1),
+        (c.law, 1),
+        (c.applied, 1),
+        (c.gauss, 1),
+        (c.predictor, INTEGRATION),
+        (c.estimator, 1),
+    ]
+    found: dict[str, int] = {}
+    for program, count in times:
+        for name, number in program.operations.items() if program is not None else ():
+            found[name] = found.get(name, 0) + count * number
+    n, m = len(c.states), len(c.inputs)
+    more = {"mul": 4, "add": 4, "sub": m}
+    if c.pieces is not None:
+        meets = 0 if c.adds_plan else c.pieces.most
+        more = {
+            "mul": 4 + looks * (3 * n + m) + meets * (1 + 2 * m),
+            "add": 4 + looks * (3 * n + m) + meets * (1 + 2 * m),
+            "sub": 1 + m + looks + 2 * meets,
+            "div": meets,
+        }
+    more["add"] += m if c.adds_plan else 0
+    if c.predictor is not None:
+        more["add"] += 3 * INTEGRATION * (m + 2)
+        more["mul"] += 3 * INTEGRATION
+    for name, number in more.items():
+        found[name] = found.get(name, 0) + number
+    return {name: number for name, number in found.items() if number}

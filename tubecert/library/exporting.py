@@ -1,0 +1,58 @@
+"""The controller of a certificate as code, from code and for the command."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, Literal
+
+from tubecert.library.asked import one_of
+from tubecert.library.certification import Certification, read
+from tubecert.library.specification import File
+
+if TYPE_CHECKING:
+    from tubecert.export.controller import Controller
+
+Language = Literal["c", "python"]
+Precision = Literal["double", "single"]
+_LANGUAGES: Final[tuple[Language, ...]] = ("c", "python")
+_PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exported:
+    """The controller of a certificate H: its `files` by their names, and as a value, all exact."""
+
+    files: Mapping[str, str] = field(repr=False)
+    controller: Controller = field(repr=False)
+
+    @property
+    def certificate(self) -> str:
+        """The hash of the certificate."""
+        return self.controller.hash
+
+
+def export(
+    result: Certification | File,
+    folder: File | None = None,
+    *,
+    language: Language = "c",
+    precision: Precision = "double",
+) -> Exported:
+    """The controller that a certificate is about, or that of the file of one, written into a folder if one is given.
+
+    `tubecert export`. In C everything is `double`, or `float` if the precision is `single`; in Python `double`.
+    Raises `TubecertError` where certificate H does not hold or cannot be exported, and `TargetError`.
+    """
+    from tubecert.export.controller import controller_of
+    from tubecert.export.folder import exported
+
+    one_of("language", language, _LANGUAGES)
+    one_of("precision", precision, _PRECISIONS)
+    found = result if isinstance(result, Certification) else read(result)
+    name = "the certificate" if isinstance(result, Certification) else os.fspath(result)
+    written = exported(controller_of(found.certificate, name), language, precision)
+    if folder is not None:
+        written.save(os.fspath(folder))
+    return Exported(files=written.files, controller=written.controller)
