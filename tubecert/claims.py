@@ -395,6 +395,28 @@ class EaseHardware(Relax):
     value: Fraction
 
 
+HardwareCause = Literal[
+    "plan",
+    "feedforward",
+    "wind",
+    "wind_estimate",
+    "bias",
+    "noise_estimate",
+    "lag",
+    "noise_feedback",
+    "sampling",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LessenCause(Relax):
+    """At the loop that comes nearest, this cause takes `share` of what contraction makes good; nothing is proven."""
+
+    tag: ClassVar[str] = "lessen_cause"
+    cause: HardwareCause
+    share: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MendPlan(Relax):
     """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""

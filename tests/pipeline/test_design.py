@@ -6,7 +6,9 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from rechecked import certified, examine, failing
 
+from tubecert.claims import EaseHardware, LessenCause
 from tubecert.pipeline import Options, certify
 from tubecert.pipeline.design import narrowest, needed_of, size_of
 from tubecert.spec import load_text
@@ -58,6 +60,22 @@ def test_a_machine_that_keeps_no_tube_has_no_design():
     found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), Options(), {})
     assert found.best is None
     assert all(each.result.verdict is not Verdict.CERTIFIED for each in found.attempts)
+
+
+@pytest.mark.slow
+def test_a_loop_that_does_not_serve_says_what_fills_it_and_which_machine_would():
+    """It used to be silent: a loop that comes near was taken for one that serves, and better ones were told of it."""
+    text = SCALAR.replace("rate: 200", "rate: 2")
+    found = certify(load_text(text), Options())
+    assert found.verdict is Verdict.UNDECIDED
+    advice = found.reason.relax
+    shares = {each.cause: each.share for each in advice if isinstance(each, LessenCause)}
+    assert sum(shares.values()) > 1
+    assert list(shares.values()) == sorted(shares.values(), reverse=True)
+    (easier,) = (each for each in advice if isinstance(each, EaseHardware))
+    serving = text.replace("rate: 2,", f"sample_time: {easier.value},")
+    assert certify(load_text(serving), Options()).verdict is Verdict.CERTIFIED
+    assert failing(examine(certified(text, conditions="H"))) == []
 
 
 @pytest.mark.slow

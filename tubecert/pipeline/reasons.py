@@ -20,6 +20,7 @@ from tubecert.claims import (
     HalveHardware,
     InputWithinLimits,
     LeavePlanRoom,
+    LessenCause,
     ObstacleCleared,
     RaiseBudget,
     Reason,
@@ -48,7 +49,8 @@ def reasons(section: Section[Any], explained: Explained) -> list[Reason]:
         return [_certified(section, explained)]
     easier = tuple(EaseHardware(part=part, value=value) for part, value in explained.eased.items())
     short = _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
-    return [replace(short[0], relax=(*short[0].relax, *easier)), *short[1:]]
+    fills = tuple(LessenCause(cause=cause, share=share) for cause, share in explained.filled.items())
+    return [replace(short[0], relax=(*short[0].relax, *easier, *fills)), *short[1:]]
 
 
 def obstacle_reasons(bounded: Bounded) -> list[Reason]:

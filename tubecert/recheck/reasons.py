@@ -102,6 +102,17 @@ def _texts(node: Node) -> object:
 
 _SIDE = _word("lower", "upper")
 _PART = _word("sample_time", "delay", "noise", "wind")
+_CAUSE = _word(
+    "plan",
+    "feedforward",
+    "wind",
+    "wind_estimate",
+    "bias",
+    "noise_estimate",
+    "lag",
+    "noise_feedback",
+    "sampling",
+)
 _NONE: Form = ({}, {})
 
 _CLAIMS: Mapping[str, Form] = {
@@ -202,6 +213,7 @@ _RELAX: Mapping[str, Form] = {
     "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
     "halve_hardware": ({"part": _PART, "factor": Node.number}, {}),
     "ease_hardware": ({"part": _PART, "value": Node.decimal}, {}),
+    "lessen_cause": ({"cause": _CAUSE, "share": Node.number}, {}),
     "mend_plan": (
         {
             "defect": Node.number,

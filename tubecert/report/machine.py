@@ -15,18 +15,8 @@ from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
 from tubecert.report.numbers import down, exact, percent, up
 from tubecert.verdict import Verdict
+from tubecert.words.machine import CAUSES
 
-_CAUSES: Mapping[str, str] = {
-    "plan": "the plan's own defect",
-    "feedforward": "the input of the plan, held between samples",
-    "wind": "wind that pushes",
-    "wind_estimate": "wind that the estimate takes for uncertainty",
-    "bias": "the filter's lag behind the uncertainty",
-    "noise_estimate": "noise in the estimate",
-    "lag": "the input's lag: delay, and holding between samples",
-    "noise_feedback": "noise in the feedback",
-    "sampling": "feedback that is sampled and delayed",
-}
 _LEAST = 5e-5  # a smaller share is not told
 _NOTABLE = 0.01  # of the level: nearer starts are not told
 
@@ -95,7 +85,7 @@ def inputs(result: Result, own: HardwareData) -> str:
 
 def shares(budget: Budget) -> list[Share]:
     """What fills the tube, the largest share first; shares that are nothing are left out."""
-    found = [Share(cause=_CAUSES[item.name], share=getattr(budget, item.name)) for item in fields(budget)]
+    found = [Share(cause=CAUSES[item.name], share=getattr(budget, item.name)) for item in fields(budget)]
     return sorted((each for each in found if each.share > _LEAST), key=lambda each: -each.share)
 
 

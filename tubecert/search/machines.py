@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Final
+from math import inf
+from typing import Final, get_args
 
 import numpy as np
 
-from tubecert.claims import HardwarePart
-from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.claims import HardwareCause, HardwarePart
+from tubecert.conditions.hardware import HardwareRecipe, told
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
@@ -22,6 +23,9 @@ from tubecert.search.hardware import Lanes, Search, Setting, propose_hardware, s
 
 PARTS: Final[tuple[HardwarePart, ...]] = ("sample_time", "delay", "noise", "wind")
 """A wind that is adapted to is a part of h, whose constants are those of its bound: it is none of these."""
+
+CAUSES: Final[tuple[HardwareCause, ...]] = get_args(HardwareCause)
+_NOTABLE: Final = 0.01
 
 
 def halved(
@@ -67,6 +71,19 @@ def _with_half(now: Setting, part: HardwarePart, machine: Machine) -> Setting | 
             feedback_time=other.feedback_time if asked.feedback_time is not None else size / 2,
         )
     return other if other.delay <= other.sample_time else None
+
+
+def filled(problem: TubeProblem, recipe: HardwareRecipe | None) -> dict[HardwareCause, float]:
+    """What fills the level of a loop that does not serve, the largest share first; small ones left out."""
+    if recipe is None:
+        return {}
+    budget = told(problem, recipe).budget
+    shares = {cause: float(getattr(budget, cause)) for cause in CAUSES}
+    return {
+        cause: share
+        for cause, share in sorted(shares.items(), key=lambda item: -item[1])
+        if _NOTABLE < share < inf
+    }
 
 
 def easier(problem: TubeProblem, parts: Sequence[HardwarePart] = PARTS) -> dict[HardwarePart, Fraction]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Final
 
-from tubecert.claims import HardwarePart
+from tubecert.claims import HardwareCause, HardwarePart
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.hardware import HardwareRecipe
@@ -18,9 +18,10 @@ from tubecert.conditions.sampled import SampledRecipe
 from tubecert.search.distance import propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.hardware import propose_hardware
-from tubecert.search.machines import PARTS, easier, halved
+from tubecert.search.machines import PARTS, easier, filled, halved
 from tubecert.search.rates import propose_rates
 from tubecert.search.sampled import propose_sampled
+from tubecert.search.scan import serves
 
 LEAST, MACHINE, LARGEST = "least_adaptation", "machine", "largest"
 
@@ -45,8 +46,8 @@ class Proposer:
         """
         if self.machine:
             found = at(MACHINE) or at(LARGEST)
-            if found is None:
-                return Explained(eased=easier(problem, parts))
+            if found is None or not serves(problem, found):
+                return Explained(eased=easier(problem, parts), filled=filled(problem, found))
             return Explained(halved_parts=halved(problem, found, parts))
         if self.slopes is None:
             return Explained()
@@ -62,13 +63,15 @@ class Proposer:
 class Explained:
     """`slopes`: d log(Gamma)/d log(constant); `halved`: what halving a constant makes of Gamma. None: no such rate.
 
-    `halved_parts`: what halving a part of the machine makes of the tube; `eased`: parts with which it would serve.
+    `halved_parts`: what halving a part of the machine makes of the tube; `eased`: parts with which it would serve;
+    `filled`: what fills the level of a loop that does not serve.
     """
 
     slopes: Mapping[str, float] | None = None
     halved: Mapping[str, float] = field(default_factory=dict)
     halved_parts: Mapping[HardwarePart, float] = field(default_factory=dict)
     eased: Mapping[HardwarePart, Fraction] = field(default_factory=dict)
+    filled: Mapping[HardwareCause, float] = field(default_factory=dict)
 
 
 PROPOSERS: Final[Mapping[type, Proposer]] = {

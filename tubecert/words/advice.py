@@ -21,9 +21,9 @@ from tubecert.claims import (
     GiveInput,
     HalveConstant,
     HalveHardware,
-    HardwarePart,
     HigherDegree,
     LeavePlanRoom,
+    LessenCause,
     LowerDegree,
     LowerRate,
     MendPlan,
@@ -41,6 +41,7 @@ from tubecert.claims import (
     ShrinkTube,
 )
 from tubecert.words.digits import ceiling_text, floor_text
+from tubecert.words.machine import CAUSES, PARTS
 
 
 def advice(items: Sequence[Relax]) -> str:
@@ -51,8 +52,9 @@ def advice(items: Sequence[Relax]) -> str:
         if isinstance(item, (HalveConstant, HalveHardware))
     )
     plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
-    others = [item for item in items if not isinstance(item, (HalveConstant, HalveHardware, MendPlan))]
-    return "; ".join(filter(None, (halvings, _alternatives(others), *plans)))
+    causes = _filled([item for item in items if isinstance(item, LessenCause)])
+    others = [item for item in items if not isinstance(item, _SAID_APART)]
+    return "; ".join(filter(None, (halvings, _alternatives(others), causes, *plans)))
 
 
 def _alternatives(items: Sequence[Relax]) -> str:
@@ -63,6 +65,7 @@ def _alternatives(items: Sequence[Relax]) -> str:
     return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
+_SAID_APART = (HalveConstant, HalveHardware, LessenCause, MendPlan)
 _TRIED = (HigherDegree, AskForRateUpTo, ShrinkSafeSet)
 
 
@@ -76,22 +79,23 @@ def _halving(item: HalveConstant) -> str:
     return f"halving {meaning.symbol} ({meaning.words}) would lower the least Gamma by {share:.0f} %"
 
 
-_PARTS: Mapping[HardwarePart, str] = {
-    "sample_time": "the sample time",
-    "delay": "the delay",
-    "noise": "the noise",
-    "wind": "the wind",
-}
-
-
 def _better(item: HalveHardware) -> str:
-    return f"half of {_PARTS[item.part]} would make the tube {100 * (1 - item.factor):.0f} % narrower"
+    return f"half of {PARTS[item.part]} would make the tube {100 * (1 - item.factor):.0f} % narrower"
 
 
 def _easier(item: EaseHardware) -> str:
     unit = " s" if item.part in ("sample_time", "delay") else ""
     rate = f" ({float(1 / item.value):.4g} Hz)" if item.part == "sample_time" else ""
-    return f"bring {_PARTS[item.part]} down to {float(item.value):.4g}{unit}{rate}, which is proven to serve"
+    return f"bring {PARTS[item.part]} down to {float(item.value):.4g}{unit}{rate}, which is proven to serve"
+
+
+def _filled(items: Sequence[LessenCause]) -> str:
+    """What takes too much, together with its sum; the start's distance is no cause of these."""
+    if not items:
+        return ""
+    shares = ", ".join(f"{CAUSES[item.cause]} {100 * item.share:.0f} %" for item in items)
+    whole = 100 * sum(item.share for item in items)
+    return f"what fills the level of the loop that comes nearest, to {whole:.0f} % (not proven): {shares}"
 
 
 def _plan(item: MendPlan) -> str:

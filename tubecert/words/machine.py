@@ -1,0 +1,26 @@
+"""What the parts of a machine are called, and what fills its tube."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tubecert.claims import HardwareCause, HardwarePart
+
+CAUSES: Mapping[HardwareCause | str, str] = {
+    "plan": "the plan's own defect",
+    "feedforward": "the input of the plan, held between samples",
+    "wind": "wind that pushes",
+    "wind_estimate": "wind that the estimate takes for uncertainty",
+    "bias": "the filter's lag behind the uncertainty",
+    "noise_estimate": "noise in the estimate",
+    "lag": "the input's lag: delay, and holding between samples",
+    "noise_feedback": "noise in the feedback",
+    "sampling": "feedback that is sampled and delayed",
+}
+
+PARTS: Mapping[HardwarePart, str] = {
+    "sample_time": "the sample time",
+    "delay": "the delay",
+    "noise": "the noise",
+    "wind": "the wind",
+}
