@@ -10,7 +10,8 @@ from rechecked import certified, examine, failing
 
 from tubecert.claims import EaseHardware, LessenCause
 from tubecert.pipeline import Options, certify
-from tubecert.pipeline.design import narrowest, needed_of, size_of
+from tubecert.pipeline.design import narrowest, needed_of
+from tubecert.pipeline.width import Measure, size_of
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
@@ -27,6 +28,8 @@ hardware: {rate: 200, noise: 0.001}
 conditions: {decides: H}
 """
 
+RADIUS = Measure(units={})
+
 
 def scaled(text=SCALAR):
     spec = load_text(text)
@@ -41,14 +44,14 @@ def scaled(text=SCALAR):
 @pytest.mark.slow
 def test_the_best_is_certified_and_no_size_beside_it_is_better():
     at = scaled()
-    found = narrowest(at, Options(), {})
+    found = narrowest(at, Options(), RADIUS)
     best = found.best
     assert best is not None
     again = certify(at(best.scale), Options())
     assert again.verdict is Verdict.CERTIFIED
-    assert size_of(again, {}) == best.size
+    assert size_of(again, RADIUS) == best.size
     for scale in (Fraction(1, 8), Fraction(1, 5), Fraction(1, 3), Fraction(2, 3), Fraction(3, 2)):
-        size = size_of(certify(at(scale), Options()), {})
+        size = size_of(certify(at(scale), Options()), RADIUS)
         assert size is None or size >= best.size * 0.995
     needed = needed_of(best.result)
     assert needed is not None
@@ -57,7 +60,7 @@ def test_the_best_is_certified_and_no_size_beside_it_is_better():
 
 @pytest.mark.slow
 def test_a_machine_that_keeps_no_tube_has_no_design():
-    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), Options(), {})
+    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), Options(), RADIUS)
     assert found.best is None
     assert all(each.result.verdict is not Verdict.CERTIFIED for each in found.attempts)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -21,6 +21,7 @@ from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
 from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
+from tubecert.pipeline.width import Measure, measure_of
 from tubecert.printable import printable_json, visible
 from tubecert.report import design as told
 from tubecert.report import progress
@@ -70,10 +71,10 @@ def run(given: Given, output: Output) -> ExitCode:
 
     default = pipeline.Options()
     options = pipeline.Options(metric=given.metric, gap=gap or default.gap, budget=budget or default.budget)
-    states = _minimised(first, given.minimise)
+    measure = _minimised(first, given.minimise)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        found = narrowest(lambda scale: at(_scaled(first, scale)), options, states, report)
+        found = narrowest(lambda scale: at(_scaled(first, scale)), options, measure, report)
     text = _sealed(found)
     if text is not None:
         certificate.write_text(target, text)
@@ -101,11 +102,10 @@ def _error(spec: Spec, path: str, message: str, help: str) -> SpecError:
     return SpecError([Finding(code="TC105", message=message, location=spec.location(path), help=help)])
 
 
-def _minimised(spec: Spec, words: str | None) -> Mapping[str, float]:
-    """The states that count, each with the unit that its half-width is compared in; raises `SpecError`."""
-    asked = {name: float(width) for name, width in spec.tube.half_widths}
+def _minimised(spec: Spec, words: str | None) -> Measure:
+    """What counts: the states that are named, each in its own unit or that of its half-width; raises `SpecError`."""
     if words is None:
-        return asked
+        return measure_of(spec)
     names = [name.strip() for name in words.split(",")]
     wrong = [name for name in names if name not in spec.states]
     if wrong:
@@ -113,7 +113,8 @@ def _minimised(spec: Spec, words: str | None) -> Mapping[str, float]:
         raise SpecError(
             [Finding(code="TC122", message=f"--minimise: {visible(wrong[0])} is no state", help=help)]
         )
-    return {name: asked.get(name, 1.0) for name in names}
+    asked = {name: float(width) for name, width in spec.tube.half_widths}
+    return Measure(units={name: asked.get(name, 1.0) for name in names})
 
 
 def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:

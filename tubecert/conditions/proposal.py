@@ -12,11 +12,12 @@ from tubecert.conditions.theorem import R
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """Gains that a user fixes, in rad/s, 1/s^2 and s; what is None is searched for."""
+    """Gains that a user fixes, in rad/s, 1/s^2 and s; what is None is searched for. `curve`: whether one is wanted."""
 
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     sample_time: Fraction | None = None
+    curve: bool = True
 
     def __bool__(self) -> bool:
         return not (self.bandwidth is None and self.adaptation_rate is None and self.sample_time is None)

@@ -6,6 +6,7 @@ fails. What only explains or describes a certificate is left out; what is certif
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 from typing import Any
@@ -16,11 +17,13 @@ from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
 from tubecert.kinds import DISTANCE, HARDWARE
 from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
+from tubecert.pipeline.width import measure_of, need_of
 from tubecert.search.proposers import LEAST, PROPOSERS, Explained
 from tubecert.stages.bounded import Enclosed, enclose, unmet, with_machine
 from tubecert.stages.judged import deciding
@@ -64,6 +67,7 @@ def judged_row(row: Row, question: Question) -> Row:
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
+    machine = _machine(question, end.sections)
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
@@ -73,7 +77,8 @@ def judged_row(row: Row, question: Question) -> Row:
         ultimate_radius=distance.judgement.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
-        demand=inf if decisive is None else _demand(decisive, problem),
+        demand=_demand(decisive, problem) if machine is None else need_of(machine, measure_of(question.spec)),
+        by_machine=machine is not None,
     )
 
 
@@ -91,7 +96,7 @@ def _stopped(end: Stopped) -> Ending:
 
 def _judged(question: Question, enclosed: Enclosed) -> Ending:
     options = question.options
-    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
+    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=False)
     keys = deciding(question)
     problem = with_machine(enclosed) if HARDWARE.key in keys else enclosed.problem
     sections = {
@@ -112,11 +117,21 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def _demand(pair: Pair, problem: TubeProblem) -> float:
+def _machine(question: Question, sections: Sequence[Section[Any]]) -> HardwareData | None:
+    """The section of certificate H, if that alone is what decides."""
+    if deciding(question) != (HARDWARE.key,):
+        return None
+    found = next(section for section in sections if section.name is HARDWARE).data()
+    return found if isinstance(found, HardwareData) else None
+
+
+def _demand(pair: Pair | None, problem: TubeProblem) -> float:
     """What a kind asks of the computer that adapts: Gamma |B|^2, or the sampling frequency; else the tube.
 
     In a tube of its own coordinates Gamma is of these, and they are of the metric: |B|^2 in them makes it comparable.
     """
+    if pair is None:
+        return inf
     if pair.adaptation_rate is not None:
         return float(pair.adaptation_rate) * problem.constants.B.above**2
     return float(problem.rho) if pair.sample_time is None else 1 / float(pair.sample_time)

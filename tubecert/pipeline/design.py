@@ -8,19 +8,17 @@ certification.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.result import Result
 from tubecert.conditions.decimals import round_up
-from tubecert.kinds import HARDWARE
-from tubecert.kinds.hardware import HardwareData
 from tubecert.pipeline import Options, Progress, certify
+from tubecert.pipeline.width import Measure, machine_of, size_of
 from tubecert.spec import Spec
 from tubecert.stages.memory import Memory
-from tubecert.verdict import Verdict
 
 _FARTHEST: Final = 6  # factors of two in one direction
 _NARROWINGS: Final = 8
@@ -53,17 +51,17 @@ class Design:
 def narrowest(
     at: Callable[[Fraction], Spec],
     options: Options,
-    minimise: Mapping[str, float],
+    measure: Measure,
     progress: Progress | None = None,
 ) -> Design:
-    """The narrowest tube, by the largest half-width of some states in the units given (empty: by the radius)."""
+    """The narrowest tube by a measure, among those of every size."""
     memory = Memory()
     attempts: dict[Fraction, Attempt] = {}
 
     def attempt(scale: Fraction) -> Attempt:
         if scale not in attempts:
             result = certify(at(scale), options, progress, memory)
-            attempts[scale] = Attempt(scale=scale, result=result, size=size_of(result, minimise))
+            attempts[scale] = Attempt(scale=scale, result=result, size=size_of(result, measure))
         return attempts[scale]
 
     first = attempt(Fraction(1))
@@ -94,26 +92,9 @@ def _is_wider(found: Attempt, others: Iterable[Attempt]) -> bool:
     return found.size is not None and bool(sizes) and min(sizes) < found.size
 
 
-def size_of(result: Result, minimise: Mapping[str, float]) -> float | None:
-    """How wide a tube is proven to be; None unless it is certified."""
-    if result.verdict is not Verdict.CERTIFIED or result.tube is None:
-        return None
-    own = _machine(result)
-    widths = (result.tube.half_widths or {}) if own is None else own.half_widths
-    if minimise:
-        return max(widths[name] / unit for name, unit in minimise.items())
-    return float(result.tube.rho) if own is None or own.radius is None else own.radius
-
-
 def needed_of(result: Result) -> Fraction | None:
     """What share of the tube is needed for what was proven; None where the theorem does not say."""
-    own = _machine(result)
+    own = machine_of(result)
     if own is None or own.level_margin is None:
         return None
     return 1 - Fraction(own.level_margin.below)
-
-
-def _machine(result: Result) -> HardwareData | None:
-    """The section of certificate H, if that is what decides."""
-    found = result.sections.get(HARDWARE.key)
-    return found if isinstance(found, HardwareData) and result.decided_by == (HARDWARE.key,) else None

@@ -46,6 +46,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
+from tubecert.letters import HARDWARE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
@@ -69,6 +70,7 @@ from tubecert.verdict import Verdict
 
 _RATES = 5  # of a table
 _GAP = Fraction(1, 5)  # to which constants are known where metrics are compared
+_GAP_OF_MACHINE = Fraction(1, 20)  # where they enter squared
 _BOXES = 100_000  # and what each claim may cost there
 
 Ask = Callable[[Spec, Options, Progress, Memory], Question]
@@ -248,11 +250,16 @@ class SynthesisRun:
         self._tell(f"rate {float(metric.rate):.4g}: certifying")
         options = replace(
             self.options,
-            gap=max(self.options.gap, _GAP),
+            gap=max(self.options.gap, _GAP_OF_MACHINE if self._by_machine else _GAP),
             budget=min(self.options.budget, _BOXES),
             metric=None,
         )
         return judged_row(row, self.ask(spec, options, self._watch, self.memory))
+
+    @property
+    def _by_machine(self) -> bool:
+        """Whether certificate H decides."""
+        return (self.options.conditions or self.spec.decides) in (HARDWARE.option, HARDWARE.key)
 
     def _watch(self, step: Step) -> None:
         self.deadline.check()

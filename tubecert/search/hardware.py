@@ -458,8 +458,10 @@ def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
 
 
 def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:
-    """The least level at the machine that is asked for, or at the largest one of what is searched for."""
-    del asked  # gains of the other loops; this one is the specification's
+    """The least level at the machine that is asked for, or at the largest one of what is searched for.
+
+    Gains that are asked for are those of other loops: this one is the specification's.
+    """
     machine = problem.machine
     if machine is None or obstacles(problem, theorem_h.THEOREM):
         return Proposal()
@@ -473,5 +475,5 @@ def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRec
             break
     if recipe is None:
         return Proposal()
-    curve = _curve(search, setting) if serves(problem, recipe) else ()
+    curve = _curve(search, setting) if asked.curve and serves(problem, recipe) else ()
     return Proposal(decisive=recipe, role="largest" if searched else "machine", curve=curve)
