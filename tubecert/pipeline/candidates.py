@@ -6,7 +6,6 @@ fails. What only explains or describes a certificate is left out; what is certif
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 from typing import Any
@@ -67,7 +66,7 @@ def judged_row(row: Row, question: Question) -> Row:
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
-    machine = _machine(question, end.sections)
+    machine = _machine(question, end)
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
@@ -117,11 +116,11 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def _machine(question: Question, sections: Sequence[Section[Any]]) -> HardwareData | None:
+def _machine(question: Question, end: Ending) -> HardwareData | None:
     """The section of certificate H, if that alone is what decides."""
     if deciding(question) != (HARDWARE.key,):
         return None
-    found = next(section for section in sections if section.name is HARDWARE).data()
+    found = next(section for section in end.sections if section.name is HARDWARE).data()
     return found if isinstance(found, HardwareData) else None
 
 
