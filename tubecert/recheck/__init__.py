@@ -21,7 +21,10 @@ formula or rounding in the producer must not pass both.
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `wind`, `machine` | claims about a disturbance, and about what certificate H needs to know |
+| `turning`, `relative`, `noise`, `clipping` | its parts |
+| `named` | any constant by its name, for a part of the plan |
 | `filtering`, `predictor`, `conditions`, `sampling`, `digital` | the theorems A, B, C and H at printed numbers |
+| `along` | theorem HW: H in windows of the plan |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |

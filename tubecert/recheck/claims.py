@@ -44,14 +44,13 @@ from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
+from tubecert.recheck.named import largest_push
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.terms import all_zero
 from tubecert.recheck.times import time_range
-
-_ROUND_UP = Fraction(1001, 1000)
 
 
 @dataclass(frozen=True)
@@ -354,7 +353,7 @@ def _constants(case: Case) -> Iterator[Claim]:
         yield Claim(
             f"{name} {relation} {float(limit):.6g}",
             (*over, limit, (B, upper) if name == "feedback_gain" else None),
-            lambda name=name, limit=limit: bounded(place, name, limit, _largest(B, upper)),  # type: ignore[misc]
+            lambda name=name, limit=limit: bounded(place, name, limit, largest_push(B, upper)),  # type: ignore[misc]
         )
     d0, H0 = case.bound_if_any("initial_distance"), case.bound_if_any("h_initial")
     if d0 is not None:
@@ -425,13 +424,6 @@ def _beside(case: Case) -> Iterator[Claim]:
                 (*over, limit),
                 lambda name=name, limit=limit: covariant.bounded(place, name, limit),  # type: ignore[misc]
             )
-
-
-def _largest(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
-    """smax(Theta B) <= |B| sqrt(A); None where one of them is not bounded."""
-    if B is None or upper is None:
-        return None
-    return Fraction(float(B) * float(upper) ** 0.5) * _ROUND_UP if upper > 0 else Fraction(0)
 
 
 def _gains(case: Case) -> Iterator[Claim]:

@@ -7,7 +7,7 @@ nothing is searched for here. What is no number serves nothing, because every co
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from math import exp, inf, isfinite, log
 
@@ -74,8 +74,28 @@ class Promise:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """The numbers of a proof in one window of the plan."""
+
+    level: Fraction
+    floor: Fraction
+    speed: Fraction
+    bias: Fraction
+    ripple: Fraction
+    prediction: Fraction | None
+
+    def of(self, whole: Digital) -> Digital:
+        """The recipe as if this window were all."""
+        own = {item.name: getattr(self, item.name) for item in fields(self)}
+        return replace(whole, windows=(), **own)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Digital:
-    """The numbers of a recipe; times in s. `bandwidth` None: the filter forgets at once (omega is infinite)."""
+    """The numbers of a recipe; times in s. `bandwidth` None: the filter forgets at once (omega is infinite).
+
+    With `windows` those of the proof are the largest of theirs.
+    """
 
     sample_time: Fraction
     delay: Fraction
@@ -90,6 +110,7 @@ class Digital:
     bias: Fraction
     ripple: Fraction
     prediction: Fraction | None
+    windows: tuple[Stretch, ...] = ()
 
     @property
     def sensible(self) -> bool:
@@ -108,7 +129,8 @@ class Loop:
     """What follows at a recipe.
 
     `error`: sup |h - q^| (X); `feedback`: sup |kappa| (kb); `feedforward`: ups; `noise`: n_M, or n_P of a predicted
-    state; `top`: max(d0, f0, d1, sup D); `ultimate`: A1. The last ones are the shares of lambda times the level.
+    state; `top`: max(d0, f0, d1, sup D); `ultimate`: A1. `shares` are those of lambda times the level. `bound` is D,
+    `steep` how fast the saw-teeth of the input and of the feedback rise in it.
     """
 
     error: Ball
@@ -118,13 +140,15 @@ class Loop:
     top: Ball
     ultimate: Ball
     shares: dict[str, Ball]
+    bound: Distance
+    steep: tuple[Ball, Ball]
 
 
 def loop(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> Loop | None:
     """What theorem H gives at a recipe; None where one of its conditions beside (H.10), (H.12) is not proven."""
     if not at.sensible or promise.predicts != (at.prediction is not None):
         return None
-    return _Evaluation(setting, machine, promise, at).found()
+    return Evaluation(setting, machine, promise, at).found()
 
 
 def proposed(
@@ -197,7 +221,7 @@ def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Di
     if promise.predicts:
         now = replace(now, prediction=Fraction(0))
     for step in range(_RISES):
-        found = _Evaluation(setting, machine, promise, now).needed()
+        found = Evaluation(setting, machine, promise, now).needed()
         values = [float(x.upper()) for x in found]
         if not all(isfinite(x) for x in values):
             return None
@@ -218,11 +242,11 @@ def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Di
 
 def _top(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> float:
     """max(d0, f0, d1, sup D) per level; infinite where that is no number."""
-    top = float(_Evaluation(setting, machine, promise, at).course().top.upper() / exact(at.level))
+    top = float(Evaluation(setting, machine, promise, at).course().top.upper() / exact(at.level))
     return top if isfinite(top) else inf
 
 
-class _Evaluation:
+class Evaluation:
     """(H.6)-(H.12), term by term."""
 
     def __init__(self, setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> None:
@@ -255,7 +279,11 @@ class _Evaluation:
         self.H1 = smaller(self.n.h, self.n.h_initial + self.rate * self.t1)
         later = self.S + larger(self.n.h_initial - self.S, nothing) + self.N + self.rate * self.t1
         self.X = smaller(self.n.h + self.R, larger(self.H1, later))
-        self.push = self.kb + self.ups + self.X  # |u + h - u*|
+
+    @property
+    def push(self) -> Ball:
+        """|u + h - u*|."""
+        return self.kb + self.ups + self.X
 
     def _feedforward(self) -> Ball:
         """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old."""
@@ -269,14 +297,14 @@ class _Evaluation:
         """What Y has to exceed (H.11), and what S, N and np have to reach."""
         Y = self.n.drift_on_plan + self.n.B * self.push + self.blown
         prediction = arb(0) if self.at.prediction is None else self._prediction()
-        return Y, self._bias(), self._ripple(), prediction
+        return Y, self._bias(), self.ripple(), prediction
 
     def found(self) -> Loop | None:
         """Everything, if the side conditions hold."""
         Y, S, N, seen = self.needed()
         if not (Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)):
             return None
-        return self.course() if self._bending() > 0 else None
+        return self.course() if self.bending() > 0 else None
 
     # -- the estimate
 
@@ -291,7 +319,7 @@ class _Evaluation:
         e = e + self._gust() + n.B_pinv_x * self.setting.rest * apart
         return (1 - self.th) / self.th * self.rate * Ts + e
 
-    def _ripple(self) -> Ball:
+    def ripple(self) -> Ball:
         """(H.7); where the noise drifts, each of its steps is small instead."""
         turning = self.n.B_pinv_x * (self.Y + 2 * self.nbar / self.Ts) * self.nbar
         found = 2 * self.th / self.Ts * self.explained + turning
@@ -309,7 +337,7 @@ class _Evaluation:
 
     # -- the feedback
 
-    def _bending(self) -> Ball:
+    def bending(self) -> Ball:
         """Chi."""
         rho = exact(self.setting.rho)
         return 1 - self.m.symbols * rho - self.m.symbols_slope * rho * rho / 8
@@ -318,7 +346,7 @@ class _Evaluation:
         """(H.8)-(H.12), whatever the side conditions say."""
         n, m, lam, nothing = self.n, self.m, self.lam, arb(0)
         rho = exact(self.setting.rho)
-        chi, top_A = self._bending(), root(n.upper)
+        chi, top_A = self.bending(), root(n.upper)
         flat = m.drift_difference_metric is not None and m.drift_slope_metric is not None
         curved = m.symbols_slope * rho * rho + 2 * m.symbols * rho
         j1, j0 = 1 + curved / (2 * chi), 1 + curved / (8 * chi)
@@ -384,15 +412,16 @@ class _Evaluation:
         """
         n, lam, beta, at = self.n, self.lam, self.n.metric_input_gain, self.at
         late = at.feedback_time > at.sample_time
-        start = larger(self.Ts, self.Tf) + self.tau
         early = self.X if late else self.H1  # a feedback that is slower meets the estimate in its first phase
-        share = -(-lam * start).expm1()
+        share = -(-lam * self.first_phase).expm1()
         d0 = larger(n.initial_distance, self.floor)
         d1 = d0 * (1 - share) + (beta * early + delta_1) * share / lam
-        waiting, lagging = ell * self._tooth(self.Tf), beta * self.rate * self._tooth(self.Ts)
+        steep = beta * self.rate, ell
+        lagging, waiting = steep[0] * self.tooth(self.Ts), steep[1] * self.tooth(self.Tf)
         ratio = at.feedback_time / at.sample_time
         if max(ratio, 1 / ratio).denominator != 1:
             d1 = d1 + (lagging if late else waiting) / lam
+        d0, d1 = self.begun(d0, d1, steep)
         bound = Distance(
             d0=d1,
             beta=beta,
@@ -404,7 +433,7 @@ class _Evaluation:
             omega=exact(at.bandwidth or 1),
             horizon=self.setting.horizon,
         )
-        peak = larger(d1, bound.ultimate()) if at.bandwidth is None else bound.supremum()
+        peak = self.peak(bound)
         gust = self._gust()
         parts = {
             "plan": n.plan_defect_metric,
@@ -425,12 +454,28 @@ class _Evaluation:
             top=larger(larger(d0, d1), peak),
             ultimate=bound.ultimate(),
             shares={name: part / (lam * self.level) for name, part in parts.items()},
+            bound=bound,
+            steep=steep,
         )
+
+    @property
+    def first_phase(self) -> Ball:
+        """How long the first samples act: t_a."""
+        return larger(self.Ts, self.Tf) + self.tau
+
+    def begun(self, d0: Ball, d1: Ball, steep: tuple[Ball, Ball]) -> tuple[Ball, Ball]:
+        """How far apart x and x* are before the bound begins, and where it begins; `steep` as in `Loop`."""
+        del steep
+        return d0, d1
+
+    def peak(self, bound: Distance) -> Ball:
+        """Sup D."""
+        return larger(bound.d0, bound.ultimate()) if self.at.bandwidth is None else bound.supremum()
 
     def _gust(self) -> Ball:
         """What wind adds to the bias of the estimate."""
         return self.matched + self.n.B_pinv_x * self.blown * (self.Y * self.Ts / 2 + self.nbar)
 
-    def _tooth(self, T: Ball) -> Ball:
+    def tooth(self, T: Ball) -> Ball:
         """Mu: the weighted mean of a saw-tooth of period T, T/(1 - e^(-lambda T)) - 1/lambda."""
         return smaller(larger(T / -(-self.lam * T).expm1() - 1 / self.lam, T / 2), T)

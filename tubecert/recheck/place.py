@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from flint import arb
 from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
-from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.cover import Boxed, Outcome, Range, prove
 from tubecert.recheck.curve import CLOCK, Curve, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
@@ -28,7 +28,8 @@ from tubecert.recheck.tube import Tube
 class Place:
     """A system with its plan and its tube; `budget` boxes for each claim.
 
-    With `coordinates` S the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, else the ball of radius rho.
+    With `coordinates` S the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, else the ball of radius rho. `when`:
+    the times that it is about, where these are not all.
     """
 
     system: System
@@ -37,6 +38,13 @@ class Place:
     budget: int
     coordinates: Coordinates | None = None
     sides: Numbers | None = None
+    when: Range | None = None
+
+    def during(self, begin: Fraction, end: Fraction, rho: Fraction) -> Place:
+        """The tube of another radius around a part of the plan; `ValueError` with coordinates of its own."""
+        if self.coordinates is not None or self.sides is not None:
+            raise ValueError("a part of a tube has no coordinates")
+        return replace(self, curve=self.curve.during(begin, end), rho=rho, when=(begin, end))
 
     @cached_property
     def fields(self) -> Fields:
@@ -54,6 +62,8 @@ class Place:
         """The tube, with the times that matter for h."""
         s = self.system
         time = time_range(s.uncertainty, s.horizon)
+        if time is not None and self.when is not None:
+            time = self.when
         free = {**self.curve.ranges, **s.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
         return Tube(self.curve, self.around, s.states, s.inputs, free)
 

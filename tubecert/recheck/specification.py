@@ -15,10 +15,12 @@ from tubecert.recheck.specified.hardware import MACHINE, Disturbance, Hardware, 
 from tubecert.recheck.specified.idle import IDLE, read_idle
 from tubecert.recheck.specified.loop import Loop, read_loop
 from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
-from tubecert.recheck.specified.numbers import Range, ends, positive
+from tubecert.recheck.specified.numbers import Numbers, Range, ends, positive
 from tubecert.recheck.specified.plant import Plant, Uncertainty, read_plant, read_uncertainty
 from tubecert.recheck.specified.start import Start, read_start
 from tubecert.recheck.specified.trajectory import AnyPlan, Trajectory, read_trajectory
+from tubecert.recheck.specified.windows import KEY as WINDOWS
+from tubecert.recheck.specified.windows import read_windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,7 @@ class Specification:
     loop: Loop
     obstacles: tuple[Obstacle, ...]
     limits: dict[str, Range]  # by input, of some of them
+    windows: Numbers  # where they begin and end, in s; empty without
     hardware: Hardware | None
     disturbance: Disturbance | None
     hash: str
@@ -65,10 +68,11 @@ def read_specification(node: Node) -> Specification:
     n = len(plant.states)
     tube = _tube(own["tube"], plant)
     hardware, disturbance = read_machine(own, plant.states)
+    trajectory = read_trajectory(own["trajectory"], plant)
     found = Specification(
         plant=plant,
         uncertainty=read_uncertainty(own["uncertainty"], plant),
-        trajectory=read_trajectory(own["trajectory"], plant),
+        trajectory=trajectory,
         start=read_start(own["initial_state"], plant.states),
         metric=read_metric(own["metric"], plant),
         epsilon=tube.get("epsilon", positive),
@@ -80,6 +84,7 @@ def read_specification(node: Node) -> Specification:
         if "obstacles" in own
         else (),
         limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
+        windows=tube.get(WINDOWS, lambda item: read_windows(item, trajectory, hardware, disturbance)) or (),
         hardware=hardware,
         disturbance=disturbance,
         hash=digest(node.value),
@@ -98,8 +103,10 @@ def _version(node: Node) -> None:
 
 def _tube(node: Node, plant: Plant) -> Members:
     """Radii in x, radii in coordinates that the certificate states, or half-widths, which have such coordinates."""
-    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths"))
+    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths", WINDOWS))
     own.get("coordinates", lambda item: item.word("auto"))
+    if WINDOWS in own and ("coordinates" in own or "half_widths" in own):
+        raise own[WINDOWS].refused("is there beside coordinates of the tube")
     if "half_widths" not in own:
         own.require("epsilon", "rho_a")
         return own

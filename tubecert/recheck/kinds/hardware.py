@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
 
+from tubecert.recheck.along import Passed
 from tubecert.recheck.balls import exact, root
 from tubecert.recheck.clipping import clips
 from tubecert.recheck.conditions import Setting
@@ -18,6 +19,17 @@ from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
 from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
+from tubecert.recheck.kinds.windows import (
+    Course,
+    WindowSection,
+    claims_of_constants,
+    claims_of_levels,
+    covers,
+    feedback,
+    read_range,
+    read_stretches,
+    read_windows,
+)
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Hardware
@@ -62,6 +74,7 @@ class HardwareSection(Section):
     ultimate_radius: Fraction | None
     budget: dict[str, Fraction] | None
     curve: tuple[tuple[Fraction, Fraction], ...]
+    windows: tuple[WindowSection, ...]
 
 
 class OfMachines(Kind[HardwareSection, Digital]):
@@ -81,12 +94,13 @@ class OfMachines(Kind[HardwareSection, Digital]):
 
     def read_recipe(self, node: Node) -> Digital:
         """The machine and the numbers of the proof."""
-        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction")
+        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction", optional=("windows",))
         found = {key: own[key].decimal() for key in (*_MACHINE, *_PROOF)}
         return Digital(
             **found,
             bandwidth=own.known("bandwidth", Node.decimal),
             prediction=own.known("prediction", Node.decimal),
+            windows=own.get("windows", read_stretches) or (),
         )
 
     def uncovered(self, setting: Setting) -> str | None:
@@ -102,11 +116,15 @@ class OfMachines(Kind[HardwareSection, Digital]):
 
     def shares(self, section: HardwareSection, recipe: Digital, ground: Ground) -> Shares | None:
         """Feedback with what u0 differs from u*, and the largest end of the clip."""
-        found = _loop(recipe, ground)
-        if found is None:
+        if section.windows:
+            added = feedback(_course(section, recipe, ground), recipe)
+        else:
+            found = _loop(recipe, ground)
+            added = None if found is None else found.feedback + found.feedforward
+        if added is None:
             return None
         adaptation = max((abs(end) for ends in section.clip for end in ends), default=recipe.clip_radius)
-        return Shares(found.feedback + found.feedforward, adaptation)
+        return Shares(added, adaptation)
 
     def ranges(self, section: HardwareSection) -> Mapping[str, Range]:
         """Those that it states: the clip need not be the same to both sides."""
@@ -114,6 +132,8 @@ class OfMachines(Kind[HardwareSection, Digital]):
 
     def claims(self, section: HardwareSection, recipe: Digital | None, ground: Ground) -> Iterator[Claim]:
         """The machine, its clip, the level by the recipe, what follows from it, the curve."""
+        if section.windows or ground.specification.windows:
+            yield from claims_of_constants(_course(section, recipe, ground))
         if section.verdict != "certified":
             yield ground.claim("H: what is told of it", (section,), lambda: _told(section))
             if section.curve:
@@ -131,6 +151,9 @@ class OfMachines(Kind[HardwareSection, Digital]):
             (section.clip, recipe, ground.constants["h"].above),
             lambda: _clipped(section, recipe, ground),
         )
+        if ground.specification.windows:
+            yield from _in_windows(section, recipe, ground)
+            return
         words = f"Ts = {float(recipe.sample_time):.6g}, tau = {float(recipe.delay):.6g}"
         yield ground.claim(
             f"H: d < {float(recipe.level):.6g} at {words}", parts, lambda: _holds(section, recipe, ground)
@@ -138,6 +161,61 @@ class OfMachines(Kind[HardwareSection, Digital]):
         yield from _states(section, recipe, ground)
         yield from _inputs(section, recipe, ground)
         yield ground.claim("H: the curve is feasible", parts, lambda: _curve_holds(section, recipe, ground))
+
+
+def _course(section: HardwareSection, recipe: Digital | None, ground: Ground) -> Course:
+    R = Fraction(0) if recipe is None else recipe.clip_radius
+    clip = section.clip or ((-R, R),) * len(ground.place.system.inputs)
+    return Course(windows=section.windows, ground=ground, promise=promise(ground.asked), clip=clip)
+
+
+def _in_windows(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterator[Claim]:
+    """Theorem HW in place of theorem H."""
+    course = _course(section, recipe, ground)
+    yield from claims_of_levels(
+        course, recipe, lambda found: _told_of_windows(section, recipe, found, ground)
+    )
+    yield ground.claim(
+        "H: what is told of the whole holds in every window", (section,), lambda: _covers(section, ground)
+    )
+
+
+def _covers(section: HardwareSection, ground: Ground) -> Outcome:
+    system = ground.place.system
+    named = section.half_widths.keys() == set(system.states) and section.inputs.keys() == set(system.inputs)
+    return all_of(
+        (
+            stated(named, "half-widths or inputs are of others"),
+            stated(not section.curve, "there is a curve beside windows"),
+            covers(section.windows, section.radius, section.half_widths, section.inputs),
+        )
+    )
+
+
+def _told_of_windows(
+    section: HardwareSection, recipe: Digital, found: tuple[Passed, ...], ground: Ground
+) -> Outcome:
+    """The least margins of all windows, the budget where the level is largest, and where D goes in the last one."""
+    if section.margin is None or section.level_margin is None or section.budget is None:
+        return stated(False, "what follows from the levels is missing")
+    levels = [own.level for own in recipe.windows]
+    outcomes = []
+    for level, own in zip(levels, found, strict=True):
+        room = 1 - (exact(own.level) + own.loop.noise) / own.reach
+        outcomes.append(margin_at_least(room, section.level_margin, "the level (H.10)"))
+        outcomes.append(
+            margin_at_least(1 - own.loop.top / exact(level), section.margin, "the distance (H.12)")
+        )
+    if section.ultimate_radius is not None:
+        last = found[-1].loop.ultimate / root(ground.setting.n.lower)
+        outcomes.append(at_most(last, section.ultimate_radius, "the ultimate radius"))
+    widest = found[levels.index(max(levels))].loop
+    outcomes += [_share(widest, key, share) for key, share in section.budget.items()]
+    return all_of(outcomes)
+
+
+def _share(found: Loop, key: str, share: Fraction) -> Outcome:
+    return at_most((found.shares[key] - _DUST).max(0), share, f"the share of {key}")
 
 
 # -- reading
@@ -155,7 +233,7 @@ def _section(node: Node) -> HardwareSection:
         "inputs",
     )
     rest = ("margin", "level_margin", "ultimate_radius", "budget", "curve", "shortfalls")
-    own = node.closed(*_MACHINE, *others, *rest, optional=("largest",))
+    own = node.closed(*_MACHINE, *others, *rest, optional=("largest", "windows"))
     verdict = own["verdict"].word(*VERDICTS)
     present = [own[key].value is not None for key in (*_MACHINE, "margin", "level_margin")]
     if any(present) != all(present) or (verdict == "certified" and not all(present)):
@@ -167,22 +245,18 @@ def _section(node: Node) -> HardwareSection:
         deadbeat=own["deadbeat"].flag(),
         predict=own["predict"].flag(),
         largest=own.get("largest", Node.text),
-        clip=tuple(_range(item) for item in own["clip"].entries()),
+        clip=tuple(read_range(item) for item in own["clip"].entries()),
         radius=own.known("radius", Node.number),
         half_widths={name: item.number() for name, item in own["half_widths"].items()},
-        inputs={name: _range(item) for name, item in own["inputs"].items()},
+        inputs={name: read_range(item) for name, item in own["inputs"].items()},
         margin=own.known("margin", enclosure),
         level_margin=own.known("level_margin", enclosure),
         ultimate_radius=own.known("ultimate_radius", Node.number),
         budget=own.known("budget", _budget),
         curve=_points(own["curve"]),
+        windows=own.get("windows", read_windows) or (),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
     )
-
-
-def _range(node: Node) -> Range:
-    low, high = node.pair()
-    return low.decimal(), high.decimal()
 
 
 def _budget(node: Node) -> dict[str, Fraction]:
@@ -208,7 +282,8 @@ def _point(node: Node) -> tuple[Fraction, Fraction]:
 def _told(section: HardwareSection) -> Outcome:
     """A section that is not certified: nothing follows from a level, and no margins say that it holds."""
     follows = (section.radius, section.ultimate_radius, section.budget)
-    if any(item is not None for item in follows) or section.half_widths or section.inputs:
+    whole = any(item is not None for item in follows) or section.half_widths or section.inputs
+    if whole or any(window.proves for window in section.windows):
         return stated(False, "something is stated that would follow from a level")
     margins = [margin for margin in (section.margin, section.level_margin) if margin is not None]
     return not_shown_to_hold(margins) if margins else CONFIRMED
@@ -230,6 +305,7 @@ def _agrees(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcom
             "the recipe predicts otherwise than the specification",
         ),
         (asked.bandwidth in (None, recipe.bandwidth), "the bandwidth is not that of the specification"),
+        (len(recipe.windows) == len(section.windows), "the recipe has other windows"),
         (section.largest == (searched[0] if searched else None), "`largest` is not what is searched for"),
     ]
     own = {
@@ -306,8 +382,7 @@ def _holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome
     outcomes.append(at_most(level / least, section.radius, "the radius"))
     if section.ultimate_radius is not None:
         outcomes.append(at_most(found.ultimate / least, section.ultimate_radius, "the ultimate radius"))
-    for key, share in section.budget.items():
-        outcomes.append(at_most((found.shares[key] - _DUST).max(0), share, f"the share of {key}"))
+    outcomes += [_share(found, key, share) for key, share in section.budget.items()]
     return all_of(outcomes)
 
 
