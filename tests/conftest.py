@@ -4,6 +4,7 @@ import os
 import signal
 
 import pytest
+import shared
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -28,7 +29,9 @@ def cache_of_the_tests(request, tmp_path_factory):
         patch.setenv("XDG_CACHE_HOME", str(run / "cache"))
         patch.setenv("XDG_STATE_HOME", str(_notes(request.config, run)))
         patch.delenv("TUBECERT_CACHE_KEY", raising=False)
+        shared.keep_in(run / "shared")
         yield
+        shared.keep_in(None)
 
 
 def _notes(config, run):

@@ -63,8 +63,16 @@ def respecified(document: Document, change: Any) -> Document:
     return sealed(document)
 
 
+OUTCOMES: dict[int, dict[str, Any]] = {}  # of claims that were examined, by the budget
+
+
 def examine(document: Document, budget: int = 20_000, memory: Any = None, **options: Any) -> Recheck:
-    return recheck(json.dumps(document), "certificate", budget, memory=memory, **options)
+    """The recheck of a certificate; equal claims of several are examined once.
+
+    Where something in the checker is replaced, and where what is remembered is the question, with a memory of its own.
+    """
+    remembered = OUTCOMES.setdefault(budget, {}) if memory is None else memory
+    return recheck(json.dumps(document), "certificate", budget, memory=remembered, **options)
 
 
 def failing(found: Recheck) -> list[tuple[str, str]]:
@@ -74,7 +82,7 @@ def failing(found: Recheck) -> list[tuple[str, str]]:
 def unconfirmed(document: Document) -> bool:
     """Whether a forged certificate, sealed again, is not confirmed: not of the form, or a claim that does not hold."""
     try:
-        return bool(failing(examine(sealed(document))))
+        return bool(failing(examine(sealed(document), to_first_failure=True)))
     except TubecertError:
         return True
 

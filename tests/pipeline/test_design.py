@@ -29,6 +29,7 @@ conditions: {decides: H}
 """
 
 RADIUS = Measure(units={})
+H = Options(conditions="hardware")  # where nothing rests on the other kinds
 
 
 def scaled(text=SCALAR):
@@ -44,14 +45,14 @@ def scaled(text=SCALAR):
 @pytest.mark.slow
 def test_the_best_is_certified_and_no_size_beside_it_is_better():
     at = scaled()
-    found = narrowest(at, Options(), RADIUS)
+    found = narrowest(at, H, RADIUS)
     best = found.best
     assert best is not None
-    again = certify(at(best.scale), Options())
+    again = certify(at(best.scale), H)
     assert again.verdict is Verdict.CERTIFIED
     assert size_of(again, RADIUS) == best.size
     for scale in (Fraction(1, 8), Fraction(1, 5), Fraction(1, 3), Fraction(2, 3), Fraction(3, 2)):
-        size = size_of(certify(at(scale), Options()), RADIUS)
+        size = size_of(certify(at(scale), H), RADIUS)
         assert size is None or size >= best.size * 0.995
     needed = needed_of(best.result)
     assert needed is not None
@@ -60,7 +61,7 @@ def test_the_best_is_certified_and_no_size_beside_it_is_better():
 
 @pytest.mark.slow
 def test_a_machine_that_keeps_no_tube_has_no_design():
-    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), Options(), RADIUS)
+    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), H, RADIUS)
     assert found.best is None
     assert all(each.result.verdict is not Verdict.CERTIFIED for each in found.attempts)
 

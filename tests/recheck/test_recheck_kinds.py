@@ -369,7 +369,7 @@ def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     """No more is concluded where the addition theorems do not reach."""
     document = wiggling()
     monkeypatch.setattr("tubecert.recheck.angles._MULTIPLE", 0)
-    found = examine(document)
+    found = examine(document, memory={})
     verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
     assert verdicts == {"undecided"}
     assert found.verdict == "undecided"

@@ -13,11 +13,12 @@ from typing import Any
 
 import certificates
 import jsonschema
+import proven
 import pytest
 import yaml
 
 import tubecert
-from tubecert import certificate, pipeline, spec
+from tubecert import certificate, spec
 from tubecert.bounds.constants import DERIVED, TABLE, WIND
 from tubecert.bounds.covariant import TABLE as COVARIANT
 from tubecert.bounds.hardware import TABLE as HARDWARE
@@ -290,9 +291,7 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     path, old, new, options = VARIANTS[name]
     text = path.read_text("utf-8")
     assert old in text
-    result = pipeline.certify(
-        load_text(text.replace(old, new) if old else text), pipeline.Options(**options)
-    ).to_json()
+    result = proven.result(text.replace(old, new) if old else text, **options).to_json()
     sealed = json.loads(
         certificate.dump(
             certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})

@@ -25,7 +25,7 @@ class Tape:
         names = {name: index for index, name in enumerate(inputs)}
         last_use = {arg: place for place, node in enumerate(order) for arg in node.args}
         last_use.update(dict.fromkeys(outputs, len(order)))
-        self._constants: list[tuple[int, Expression]] = []
+        constants: list[tuple[int, Interval]] = []
         self._symbols: list[tuple[int, int]] = []
         self._steps: list[Step] = []
         slot: dict[Expression, int] = {}
@@ -34,7 +34,7 @@ class Tape:
         for place, node in enumerate(order):
             slot[node] = target = size
             if node.op in ("const", "pi"):
-                self._constants.append((target, node))
+                constants.append((target, _constant(node)))
                 size += 1
             elif node.op == "symbol":
                 if str(node.value) not in names:
@@ -53,14 +53,15 @@ class Tape:
                     if last_use[arg] == place and arg.op not in ("const", "pi", "symbol")
                 )
         self._outputs = tuple(slot[node] for node in outputs)
-        self._size = size
         self.inputs = tuple(inputs)
+        self._memory = [_NOTHING] * size
+        for target, value in constants:
+            self._memory[target] = value
+        self._floats = [value.lo for value in self._memory]
 
     def run_floats(self, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
         """Float values of the outputs, shape (outputs, *shape); rounded, hence for proposals only."""
-        memory: list[Array] = [np.empty(0)] * self._size
-        for target, node in self._constants:
-            memory[target] = _constant(node).lo
+        memory = self._floats.copy()
         for target, index in self._symbols:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
@@ -73,9 +74,7 @@ class Tape:
 
     def run(self, values: Sequence[Interval], shape: tuple[int, ...]) -> Interval:
         """Enclosures of the outputs, shape (outputs, *shape); unknown values are unbounded."""
-        memory: list[Interval] = [_NOTHING] * self._size
-        for target, node in self._constants:
-            memory[target] = _constant(node)
+        memory = self._memory.copy()
         for target, index in self._symbols:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
