@@ -96,6 +96,11 @@ class DistanceBound(Generic[T]):
         return (self.beta * (self.S + self.e) + self.delta) / self.lam
 
     @quiet
+    def at(self, t: T) -> T:
+        """D(t); nondecreasing in d0, beta, H0, S, e and delta."""
+        return _at(self, t)
+
+    @quiet
     def supremum(self) -> T:
         """The largest D(t) over the horizon; nondecreasing in d0, beta, H0, S, e and delta."""
         if isinstance(self.d0, Interval):

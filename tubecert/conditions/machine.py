@@ -13,6 +13,7 @@ from typing import Generic
 
 import numpy as np
 
+from tubecert.bounds.constants import BoundConstants, ResidualConstants, WindConstants
 from tubecert.bounds.covariant import CovariantConstants
 from tubecert.bounds.hardware import HardwareConstants
 from tubecert.conditions.arithmetic import Array, T
@@ -28,12 +29,32 @@ Range = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """A part of the plan, from `begin` to `end` in s, and every constant in it that theorem HW takes for its own.
+
+    They hold for t in [since, end] and |x - x*| <= radius. `inputs`: the range of u* there.
+    """
+
+    begin: Fraction
+    end: Fraction
+    since: Fraction
+    radius: Fraction
+    constants: BoundConstants
+    machine: HardwareConstants
+    covariant: CovariantConstants | None
+    wind: WindConstants | None
+    residual: ResidualConstants | None
+    inputs: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
     """What the specification says of the hardware, with the constants that theorem H needs beside those of B.
 
     `clip`: per input a range that contains 0 and h over the tube; empty where only |h| <= Dh is known, and the estimate
     is clipped to a ball. `covariant`: where the metric is not constant, if they are known. `widths`: sup sqrt(W_ii) by
-    state: |x_i - x_i*| <= widths[i] d; `inputs`: the range of u* on the plan, by input; both may be empty.
+    state: |x_i - x_i*| <= widths[i] d; `inputs`: the range of u* on the plan, by input; both may be empty. `windows`:
+    where theorem HW is asked for.
     """
 
     constants: HardwareConstants
@@ -42,6 +63,7 @@ class Machine:
     covariant: CovariantConstants | None = None
     widths: Mapping[str, float] = field(default_factory=dict)
     inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    windows: tuple[Window, ...] = ()
 
     def __post_init__(self) -> None:
         if not all(low <= 0 <= high for low, high in self.clip):

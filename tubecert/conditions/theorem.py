@@ -58,7 +58,8 @@ class Theorem(Generic[R]):
     proven; without it inputs have no bound. `own_predictor`: where a general matrix A_m is asked for, the theorem is
     about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
     what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any;
-    `alike`: whether another one may stand on the curve of a decisive one, which is about loops like it.
+    `alike`: whether another one may stand on the curve of a decisive one, which is about loops like it; `parts`: what
+    of a recipe are tuples of records, whose numbers are of the same signs.
     """
 
     recipe: type[R]
@@ -74,6 +75,7 @@ class Theorem(Generic[R]):
     optional: tuple[str, ...] = ()
     about: Callable[[TubeProblem, R], bool] = _any
     alike: Callable[[TubeProblem, R | None, R], bool] = _all
+    parts: tuple[str, ...] = ()
 
     def is_about(self, problem: TubeProblem, recipe: object) -> bool:
         """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its numbers."""
@@ -87,15 +89,20 @@ class Theorem(Generic[R]):
         """
         if type(recipe) is not self.recipe:
             return False
-        numbers = {item.name: getattr(recipe, item.name) for item in fields(self.recipe)}
+        numbers = _numbers(recipe)
+        parts = [_numbers(part) for name in self.parts for part in numbers.pop(name)]
         predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
-        known = {name: x for name, x in numbers.items() if not (x is None and name in self.optional)}
-        gains = [*(x for name, x in known.items() if name not in self.sizes), *([] if g is None else [g])]
-        sizes = [x for name, x in known.items() if name in self.sizes]
-        signed = all(isinstance(x, Fraction) and x > 0 for x in gains) and all(
-            isinstance(x, Fraction) and x >= 0 for x in sizes
+        if g is not None:
+            numbers["predictor_gain"] = g
+        return all(map(self._signed, (numbers, *parts))) and (not predicts or self._fits(problem, g))
+
+    def _signed(self, numbers: Mapping[str, object]) -> bool:
+        """Whether gains are positive, and sizes are not negative."""
+        return all(
+            (x is None and name in self.optional)
+            or (isinstance(x, Fraction) and (x >= 0 if name in self.sizes else x > 0))
+            for name, x in numbers.items()
         )
-        return signed and (not predicts or self._fits(problem, g))
 
     def _fits(self, problem: TubeProblem, g: Fraction | None) -> bool:
         """Whether -g I (None: the matrix A_m) is the predictor of the problem, or free to be chosen."""
@@ -119,6 +126,11 @@ class Theorem(Generic[R]):
             return beside
         own = sorted(x for x in self.needs(problem) if not np.isfinite(getattr(constants, x).above))
         return (*own, *beside)
+
+
+def _numbers(record: Any) -> dict[str, Any]:
+    """The fields of a recipe, or of a part of one."""
+    return {item.name: getattr(record, item.name) for item in fields(record)}
 
 
 class _Recorder:

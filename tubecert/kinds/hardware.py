@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 
+from tubecert.bounds.constants import Meaning
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import LEVEL, STAYS, Budget, HardwareRecipe, Told
+from tubecert.conditions.hardware.windows import over
 from tubecert.conditions.inputs import InputBound, InputShares, LimitedInput
-from tubecert.conditions.machine import Machine
+from tubecert.conditions.machine import Machine, Window
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant, printable_above, printable_below
@@ -29,6 +31,25 @@ class HardwarePoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WindowData:
+    """A window of time from `begin` to `end`, in s: its level, and what follows there (theorem HW).
+
+    `tube` is the radius of the tube that its `constants` hold in, by name the safe side of each that is sharper than
+    over the whole tube; d(x*, x) <= `supremum` < `level`, `radius` bounds |x - x*|.
+    """
+
+    begin: Fraction
+    end: Fraction
+    tube: Fraction
+    level: Fraction | None
+    radius: float | None
+    supremum: float | None
+    half_widths: Mapping[str, float]
+    inputs: Mapping[str, tuple[float, float]]
+    constants: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareData(SectionData):
     """Certificate H: the machine, the level d(x*, x) < `level` that is proven for it, and what follows.
 
@@ -36,6 +57,7 @@ class HardwareData(SectionData):
     units of what is given per state; `clip` by input, empty for a ball of `clip_radius`; `radius` bounds |x - x*|
     (a length in the coordinates of the tube, where it has some),
     `half_widths` |x_i - x_i*|, `inputs` every input; `margin` is that of (H.12), `level_margin` that of (H.10).
+    With `windows` these are the largest of them, and margins the least.
     """
 
     name = HARDWARE
@@ -58,6 +80,7 @@ class HardwareData(SectionData):
     budget: Budget | None
     curve: tuple[HardwarePoint, ...]
     largest: str | None = None
+    windows: tuple[WindowData, ...] = ()
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """The one machine."""
@@ -78,8 +101,10 @@ class HardwareSection(Section[HardwareRecipe]):
     """The machine that was asked for, or the largest that serves, with the least level found for it."""
 
     name = HARDWARE
+    problem: TubeProblem
     machine: Machine
     told: Told | None
+    told_in_windows: tuple[Told, ...] = ()
 
     def data(self) -> HardwareData:
         """The section `hardware` of the certificate."""
@@ -100,7 +125,7 @@ class HardwareSection(Section[HardwareRecipe]):
             clip_radius=None if r is None else r.clip_radius,
             level=None if r is None else r.level,
             radius=None if known is None else printable_above(known.radius),
-            half_widths={} if r is None or known is None else self._half_widths(r),
+            half_widths={} if r is None or known is None else self._half_widths(r.level),
             inputs={} if r is None or known is None else self._inputs(r, known),
             margin=_margin(found, STAYS),
             level_margin=_margin(found, LEVEL),
@@ -109,11 +134,35 @@ class HardwareSection(Section[HardwareRecipe]):
             curve=tuple(HardwarePoint(sample_time=r.sample_time, level=r.level) for r in self.curve),
             largest=self.machine.asked.largest,
             shortfalls=missing_data(self.shortfalls),
+            windows=self._windows(),
         )
 
-    def _half_widths(self, recipe: HardwareRecipe) -> Mapping[str, float]:
+    def _windows(self) -> tuple[WindowData, ...]:
+        """Each window, with what is proven in it if anything is."""
+        known = self.told_in_windows or (None,) * len(self.machine.windows)
+        return tuple(
+            self._window(j, window, own)
+            for j, (window, own) in enumerate(zip(self.machine.windows, known, strict=True))
+        )
+
+    def _window(self, j: int, window: Window, known: Told | None) -> WindowData:
+        recipe = None if self.proof is None else self.proof.recipe
+        own = None if recipe is None or known is None else recipe.windows[j]
+        return WindowData(
+            begin=window.begin,
+            end=window.end,
+            tube=window.radius,
+            level=None if own is None else own.level,
+            radius=None if known is None else printable_above(known.radius),
+            supremum=None if known is None else printable_above(known.supremum),
+            half_widths={} if own is None else self._half_widths(own.level),
+            inputs={} if recipe is None or known is None else self._range_of(recipe, known, window.inputs),
+            constants=own_constants(self.problem, window),
+        )
+
+    def _half_widths(self, dhat: Fraction) -> Mapping[str, float]:
         """|x_i - x_i*| < dhat sup sqrt(W_ii)."""
-        level = Interval.of(recipe.level)
+        level = Interval.of(dhat)
         return {
             name: printable_above(float((Interval.exact(width) * level).hi))
             for name, width in self.machine.widths.items()
@@ -133,9 +182,21 @@ class HardwareSection(Section[HardwareRecipe]):
         return InputBound(least=found[0], greatest=found[1], shares=shares)
 
     def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
+        """What every input does, in any window."""
+        windows = zip(self.machine.windows, self.told_in_windows, strict=False)
+        found = [self._range_of(recipe, own, window.inputs) for window, own in windows]
+        if not found:
+            return self._range_of(recipe, known, self.machine.inputs)
+        return {
+            name: (min(each[name][0] for each in found), max(each[name][1] for each in found))
+            for name in found[0]
+        }
+
+    def _range_of(
+        self, recipe: HardwareRecipe, known: Told, ranges: Mapping[str, tuple[float, float]]
+    ) -> Mapping[str, tuple[float, float]]:
         """What every input does, (H.16): u*, the feedback, and the clip with its other sign."""
         R, feedback = recipe.clip_radius, Fraction(known.feedback)
-        ranges = self.machine.inputs
         clip = self.machine.clip if self.machine.clip and ranges else tuple((-R, R) for _ in ranges)
         return {
             name: (
@@ -153,6 +214,27 @@ def _margin(found: Checked[HardwareRecipe] | None, condition: str) -> Constant |
 def _budget(known: Told) -> Budget:
     """The shares as they are printed."""
     return Budget(**{item.name: printable_above(getattr(known.budget, item.name)) for item in fields(Budget)})
+
+
+def own_constants(problem: TubeProblem, window: Window) -> Mapping[str, float]:
+    """The constants of a window that are sharper than those of the whole tube, by name, each on its safe side."""
+    whole, part = problem, over(problem, window)
+    found: dict[str, float] = {}
+    for name, value, meaning in _of(part):
+        old = next(each for known, each, _ in _of(whole) if known == name)
+        if meaning.side == "below" and value.below > old.below:
+            found[name] = value.below
+        elif meaning.side == "above" and value.above < old.above:
+            found[name] = value.above
+    return found
+
+
+def _of(problem: TubeProblem) -> list[tuple[str, Constant, Meaning]]:
+    """Every constant that theorem H may use, by its name in a certificate."""
+    machine = problem.machine
+    own = [] if machine is None else machine.constants.items()
+    bent = [] if machine is None or machine.covariant is None else machine.covariant.items()
+    return [*problem.constants.items(), *problem.beside(), *own, *bent]
 
 
 class Hardware(Kind[HardwareRecipe]):
@@ -174,6 +256,10 @@ class Hardware(Kind[HardwareRecipe]):
         proof = judgement.proof
         return HardwareSection(
             judgement=judgement,
+            problem=problem,
             machine=problem.machine,
             told=None if proof is None else hardware.told(problem, proof.recipe),
+            told_in_windows=()
+            if proof is None or not proof.recipe.windows
+            else hardware.told_in_windows(problem, proof.recipe),
         )

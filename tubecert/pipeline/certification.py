@@ -17,6 +17,7 @@ from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
 from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
+from tubecert.pipeline.windows import windowed
 from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
 from tubecert.search.machines import PARTS
@@ -43,6 +44,7 @@ def answer(question: Question) -> Stage | Stopped:
         tube,
         enclose,
         bound,
+        windowed,
         judge,
     )
     stage: Stage | Stopped = question

@@ -27,7 +27,7 @@ from tubecert.search.scan import boundary_log, largest, serves
 
 DIGITS = 4
 _ROOM = 9  # digits of what only the proof needs
-_DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
+DEADBEAT = 40.0  # omega Ts of a filter that might as well not be there
 _PREDICTIONS = 4  # steps of the fixed point of np; what is printed is verified
 _LEVELS = 24
 _ZOOMS = 26
@@ -64,6 +64,28 @@ class Choice:
     f0: Array
 
 
+def in_lanes(at: Lanes, dhat: Array, *, predicts: bool) -> Loop[Array]:
+    """The loops of machines at levels, with nothing proven of Y, S, N and np, and the level for a floor."""
+    zero = np.zeros(np.broadcast_shapes(at.Ts.shape, dhat.shape))
+    ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
+    return Loop(
+        Ts=at.Ts + zero,
+        tau=at.tau + zero,
+        Tf=at.Tf + zero,
+        omega=at.omega + zero,
+        nu=at.nu + zero,
+        wbar=at.wbar + zero,
+        dhat=dhat + zero,
+        f0=dhat + zero,
+        Y=zero,
+        S=zero,
+        N=zero,
+        np=zero if predicts else None,
+        late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
+        off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
+    )
+
+
 class Search:
     """Theorem H in floats, over one problem."""
 
@@ -90,24 +112,8 @@ class Search:
     @quiet
     def settled(self, at: Lanes, chosen: Choice) -> Loop[Array]:
         """The loop with the least Y, S, N and np; but for rounding, what the theorem asks for."""
-        zero = np.zeros(np.broadcast_shapes(at.Ts.shape, chosen.dhat.shape))
-        ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
-        loop = Loop(
-            Ts=at.Ts + zero,
-            tau=at.tau + zero,
-            Tf=at.Tf + zero,
-            omega=chosen.omega + zero,
-            nu=at.nu + zero,
-            wbar=at.wbar + zero,
-            dhat=chosen.dhat + zero,
-            f0=chosen.f0 + zero,
-            Y=zero,
-            S=zero,
-            N=zero,
-            np=zero if self.machine.asked.predict else None,
-            late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
-            off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
-        )
+        loop = in_lanes(replace(at, omega=chosen.omega), chosen.dhat, predicts=self.machine.asked.predict)
+        loop = replace(loop, f0=chosen.f0 + 0 * loop.Ts)
         for _ in range(1 if loop.np is None else _PREDICTIONS):
             Y = self._least_speed(loop)
             e = theorem_h.estimate(self.plant, replace(loop, Y=Y))
@@ -150,7 +156,7 @@ class Search:
 
     def _omegas(self, at: Lanes, share: Array) -> Array:
         """From lambda/4 to no filter, in logarithms of omega, at a share in [0, 1]; what is asked for where it is."""
-        low, high = np.log(self.rate / 4), np.log(_DEADBEAT / at.Ts)
+        low, high = np.log(self.rate / 4), np.log(DEADBEAT / at.Ts)
         return np.where(np.isnan(at.omega), np.exp(low + (high - low) * share), at.omega)
 
     def least(self, at: Lanes, dhat: Array | None = None) -> tuple[Array, Choice]:
@@ -316,7 +322,7 @@ class Printed:
 def printed(setting: Setting, choice: Choice, room: float, *, filtered: bool = False) -> Printed:
     """A choice of one lane as decimals, the level with `room`; `filtered`: with a bandwidth in any case."""
     omega, bandwidth = float(choice.omega[0]), setting.bandwidth
-    if bandwidth is None and (filtered or omega * float(setting.sample_time) < 0.9 * _DEADBEAT):
+    if bandwidth is None and (filtered or omega * float(setting.sample_time) < 0.9 * DEADBEAT):
         bandwidth = round_up(omega, DIGITS)
     return Printed(
         bandwidth=bandwidth,
@@ -328,7 +334,7 @@ def printed(setting: Setting, choice: Choice, room: float, *, filtered: bool = F
 def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -> HardwareRecipe | None:
     """The recipe at printed numbers: Y, S, N and np in floats, inflated, as decimals; None where they have no bound."""
     at = setting.lanes()
-    omega = 2 * _DEADBEAT / at.Ts if own.bandwidth is None else np.array([float(own.bandwidth)])
+    omega = 2 * DEADBEAT / at.Ts if own.bandwidth is None else np.array([float(own.bandwidth)])
     chosen = Choice(dhat=np.array([float(own.level)]), omega=omega, f0=np.array([float(own.floor)]))
     loop = search.settled(at, chosen)
     sizes = [max(float(x[0]) * (1 + inflation), _LEAST) for x in (loop.Y, loop.S, loop.N)]

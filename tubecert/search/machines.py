@@ -33,7 +33,7 @@ def halved(
 ) -> dict[HardwarePart, float]:
     """The least level with a part of the machine halved over the least level, for each part that it has."""
     machine = problem.machine
-    if machine is None:
+    if machine is None or machine.windows:  # levels of several windows are not compared with one
         return {}
     now = _setting(recipe, machine)
     others = {part: other for part in parts if (other := _with_half(now, part, machine)) is not None}
@@ -91,6 +91,7 @@ def easier(problem: TubeProblem, parts: Sequence[HardwarePart] = PARTS) -> dict[
     machine = problem.machine
     if machine is None or machine.asked.largest is not None:
         return {}
+    problem, machine = _at_once(problem, machine)
     own = setting_at(problem, machine, Fraction(1))
     found: dict[HardwarePart, Fraction] = {}
     for part in parts:
@@ -99,6 +100,12 @@ def easier(problem: TubeProblem, parts: Sequence[HardwarePart] = PARTS) -> dict[
         if sought is not None and recipe is not None and isinstance(check(sought, recipe), Proof):
             found[part] = getattr(recipe, part)
     return found
+
+
+def _at_once(problem: TubeProblem, machine: Machine) -> tuple[TubeProblem, Machine]:
+    """The same with one window: a machine that serves there serves all the more in several."""
+    machine = replace(machine, windows=())
+    return replace(problem, machine=machine), machine
 
 
 def _sought(problem: TubeProblem, machine: Machine, part: HardwarePart) -> TubeProblem | None:

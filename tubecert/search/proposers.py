@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any, Final
 
 from tubecert.claims import HardwareCause, HardwarePart
+from tubecert.conditions import hardware as theorem_h
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.hardware import HardwareRecipe
@@ -15,6 +16,8 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe
 from tubecert.conditions.sampled import SampledRecipe
+from tubecert.kernel import obstacles
+from tubecert.search.along import propose_in_windows
 from tubecert.search.distance import propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.hardware import propose_hardware
@@ -74,10 +77,19 @@ class Explained:
     filled: Mapping[HardwareCause, float] = field(default_factory=dict)
 
 
+def _propose_on_machine(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:
+    """Of one window, or of several."""
+    machine = problem.machine
+    if machine is None or not machine.windows:
+        return propose_hardware(problem, asked)
+    blocked = obstacles(problem, theorem_h.THEOREM)
+    return Proposal() if blocked else propose_in_windows(problem, machine)
+
+
 PROPOSERS: Final[Mapping[type, Proposer]] = {
     NoGains: Proposer(propose=lambda problem, asked: Proposal(decisive=NoGains(), role="feedback")),
     RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
     DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
     SampledRecipe: Proposer(propose=propose_sampled),
-    HardwareRecipe: Proposer(propose=propose_hardware, machine=True),
+    HardwareRecipe: Proposer(propose=_propose_on_machine, machine=True),
 }

@@ -47,12 +47,16 @@ class Values(dict[str, float]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Own:
-    """What certificate H proves, and its tube; `clip` is low and high, per input, None for a ball."""
+    """What certificate H proves, and its tube; `clip` is low and high, per input, None for a ball.
+
+    `levels`: of windows, until when in s, and the level there; empty for one level.
+    """
 
     recipe: HardwareRecipe
     radius: float
     half_widths: tuple[float, ...]
     clip: tuple[tuple[float, float], ...] | None
+    levels: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +125,8 @@ def adopted(spec: Spec, result: Result) -> Spec:
     """
     compared(spec, result).require(spec, "the certificate")
     other = _without_plan(result.spec.effective.data)
-    spec = replace(as_set(spec, result.overrides), tube=other.tube)
+    spec = as_set(spec, result.overrides)
+    spec = replace(spec, tube=replace(other.tube, windows=spec.tube.windows))
     if result.overrides.metric is None and spec.metric is not None:
         return spec
     return replace(spec, metric=other.metric, synthesis=other.synthesis)
@@ -131,7 +136,8 @@ def _without_plan(effective: Mapping[str, Any]) -> Spec:
     """The specification in a certificate, at rest at 0: its plan may be in a file that is elsewhere."""
     rest = {"kind": "equilibrium", "at": ["0"] * len(effective["system"]["states"])}
     kept = {key: value for key, value in effective.items() if key not in _UNUSED}
-    return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
+    tube = {key: value for key, value in effective.get("tube", {}).items() if key != "windows"}  # of a plan
+    return load_text(json.dumps(kept | {"tube": tube, "trajectory": rest}), "certificate")
 
 
 def require_plan(spec: Spec) -> None:
@@ -222,7 +228,7 @@ def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Secti
     certified = found is not None and found.verdict is Verdict.CERTIFIED
     return Section(
         certified=certified and result.formulas == "corrected",
-        recipe=Values({name: float(value) for name, value in numbers.items() if value is not None}),
+        recipe=Values({name: float(x) for name, x in numbers.items() if isinstance(x, Fraction)}),
         ultimate=None if found is None else found.ultimate_radius,
         own=_own(result, found, recipe)
         if isinstance(found, HardwareData) and isinstance(recipe, HardwareRecipe)
@@ -239,4 +245,5 @@ def _own(result: Result, found: HardwareData, recipe: HardwareRecipe) -> Own | N
         radius=found.radius,
         half_widths=tuple(found.half_widths[name] for name in result.spec.effective.system.states),
         clip=tuple((float(low), float(high)) for low, high in found.clip) or None,
+        levels=tuple((float(w.end), float(w.level)) for w in found.windows if w.level is not None),
     )

@@ -51,6 +51,19 @@ class Decay:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Levels:
+    """The levels of theorem HW: d(x*, x) is below the one of each window, at its ends too."""
+
+    ends: tuple[float, ...]
+    levels: tuple[float, ...]
+
+    def __call__(self, t: Array) -> Array:
+        """The level at times t (K,), the last one afterwards."""
+        window = np.minimum(np.searchsorted(np.array(self.ends), t, side="left"), len(self.ends) - 1)
+        return np.asarray(np.array(self.levels)[window])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Promise:
     """Bounds of one loop: `rho`, `reach` = dbar, per-state `half_widths` (n,), and others by the names of peaks.
 
@@ -64,7 +77,7 @@ class Promise:
     half_widths: tuple[float, ...]
     bounds: Mapping[str, float]
     ultimate: float | None
-    decay: Decay | None
+    decay: Decay | Levels | None
     ranges: tuple[InputRange, ...] = ()
 
 
@@ -141,6 +154,7 @@ def _promise_of_machine(certified: Certified, kind: Kind, section: Section, own:
         "estimate": settled,
         "speed": float(r.speed),
     }
+    ends, levels = (tuple(column) for column in zip(*own.levels, strict=True)) if own.levels else ((), ())
     return Promise(
         title=str(kind.name),
         rho=certified.rho,
@@ -148,7 +162,7 @@ def _promise_of_machine(certified: Certified, kind: Kind, section: Section, own:
         half_widths=own.half_widths,
         bounds=bounds,
         ultimate=section.ultimate,
-        decay=None,
+        decay=Levels(ends=ends, levels=levels) if own.levels else None,
         ranges=section.ranges,
     )
 

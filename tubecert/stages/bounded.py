@@ -117,7 +117,7 @@ def enclose(tube: TubeFound) -> Enclosed:
     question = tube.question
     fresh = replace(question.suprema(tube.plan), coordinates=tube.coordinates)
     suprema = fresh.with_radius(tube.rho, tube.sides)
-    declared = _declared_in(tube.coordinates, question.declared_uncertainty)
+    declared = declared_in(tube.coordinates, question.declared_uncertainty)
     constants = question.memory.recall(
         "constants",
         tube.ground,
@@ -126,7 +126,7 @@ def enclose(tube: TubeFound) -> Enclosed:
     return Enclosed(tube=tube, suprema=suprema, problem=_problem(tube, suprema, constants))
 
 
-def _declared_in(coordinates: Coordinates | None, declared: Mapping[str, Constant]) -> Mapping[str, Constant]:
+def declared_in(coordinates: Coordinates | None, declared: Mapping[str, Constant]) -> Mapping[str, Constant]:
     """Declared bounds in the coordinates of the tube: a Lipschitz constant in x is one in z, times |S^-1|."""
     if coordinates is None:
         return declared
@@ -171,13 +171,20 @@ def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
     if asked is None:
         return None
     noise = asked.noise if isinstance(asked.noise, tuple) else ()
-    any_such = Hardware(sample_time=Fraction(1), noise=noise or Fraction(0), held=asked.held)
     machine = question.memory.recall(
         "machine",
         enclosed.tube.ground | {"noise": [*map(number_text, noise)], "held": asked.held},
-        lambda: machine_of(replace(spec, hardware=any_such), enclosed.problem, enclosed.suprema, geodesics),
+        lambda: machine_of(
+            replace(spec, hardware=any_such(asked)), enclosed.problem, enclosed.suprema, geodesics
+        ),
     )
     return None if machine is None else replace(machine, asked=asked)
+
+
+def any_such(asked: Hardware) -> Hardware:
+    """A machine of which no more is said than the suprema depend on."""
+    noise = asked.noise if isinstance(asked.noise, tuple) else Fraction(0)
+    return Hardware(sample_time=Fraction(1), noise=noise, held=asked.held)
 
 
 def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -> LimitedInput:

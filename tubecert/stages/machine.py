@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import isinf
 
+from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.covariant import CovariantConstants, covariant_constants
 from tubecert.bounds.hardware import Box, clip_box, hardware_constants
 from tubecert.bounds.suprema import Suprema
@@ -24,8 +25,6 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
     """The machine of a specification; None if it has none."""
     if spec.hardware is None:
         return None
-    sharp = _SHARP * max(problem.constants.u_star.above, _SHARP)
-    ranges = {name: suprema.input_range(i, sharp) for i, name in enumerate(spec.inputs)}
     return Machine(
         constants=hardware_constants(suprema, spec.hardware, geodesics, problem.constants),
         covariant=_covariant(problem, suprema),
@@ -34,11 +33,18 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
         widths={
             name: printable_above(w.above) for name, w in zip(spec.states, suprema.half_widths(), strict=True)
         },
-        inputs={
-            name: (printable_below(least.below), printable_above(greatest.above))
-            for name, (least, greatest) in ranges.items()
-        },
+        inputs=ranges_of(spec, problem.constants, suprema),
     )
+
+
+def ranges_of(spec: Spec, known: BoundConstants, suprema: Suprema) -> dict[str, tuple[float, float]]:
+    """The range of u* on the plan, by input."""
+    sharp = _SHARP * max(known.u_star.above, _SHARP)
+    ranges = {name: suprema.input_range(i, sharp) for i, name in enumerate(spec.inputs)}
+    return {
+        name: (printable_below(least.below), printable_above(greatest.above))
+        for name, (least, greatest) in ranges.items()
+    }
 
 
 def _covariant(problem: TubeProblem, suprema: Suprema) -> CovariantConstants | None:

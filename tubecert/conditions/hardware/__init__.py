@@ -10,10 +10,11 @@ that fails refutes nothing. Implements: theory section 8.
 from __future__ import annotations
 
 from tubecert.conditions.hardware.estimation import estimate
+from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.feedback import metric_gust
-from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
-from tubecert.conditions.hardware.theorem import LEVEL, STAYS, THEOREM, Evaluated, evaluated, margins_hardware
-from tubecert.conditions.hardware.told import Budget, Told, told
+from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, WindowProof, loop_of, plant
+from tubecert.conditions.hardware.theorem import LEVEL, STAYS, THEOREM, margins_hardware
+from tubecert.conditions.hardware.told import Budget, Told, told, told_in_windows
 
 __all__ = [
     "LEVEL",
@@ -25,6 +26,7 @@ __all__ = [
     "Loop",
     "Plant",
     "Told",
+    "WindowProof",
     "estimate",
     "evaluated",
     "loop_of",
@@ -32,4 +34,5 @@ __all__ = [
     "metric_gust",
     "plant",
     "told",
+    "told_in_windows",
 ]

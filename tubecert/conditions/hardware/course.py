@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic
 
 from tubecert.conditions.arithmetic import (
@@ -66,15 +66,11 @@ def _supremum(D: DistanceBound[T], omega: T | None) -> T:
 def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[T]:
     """delta_1, delta_H, d1 and the bound of (H.12)."""
     n, age = p.n, ages_of_feedback(loop)
-    mu, mu_fb = mean_wait(n.lam, loop.Ts), mean_wait(n.lam, loop.Tf)
+    mu = mean_wait(n.lam, loop.Ts)
     t_a = maximum(loop.Ts, loop.Tf) + loop.tau
-    base = n.delta + n.beta * e.ups + p.beta_w * loop.wbar
-    resting = n.lam * loop.f0
     early = (cost.V_d * age.first + e.n_fb) / loop.f0
-    later = (cost.V_d * age.oldest + e.n_fb) / loop.f0
-    delta_1 = maximum(resting, base + cost.at(age.first) * (1 + early))
-    waiting = cost.ell1 * mu_fb
-    delta_H = maximum(resting, base + cost.at(age.youngest) + cost.at(age.oldest) * later) + waiting
+    delta_1 = maximum(n.lam * loop.f0, base_of(p, loop, e) + cost.at(age.first) * (1 + early))
+    waiting = cost.ell1 * mean_wait(n.lam, loop.Tf)
     start = maximum(n.d0, loop.f0)
     # before t_a nothing is compensated; where the feedback is the slower one, the estimate acts already
     xi = e.H1 + loop.late * (e.X - e.H1)
@@ -82,17 +78,27 @@ def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[
     # where the saw-tooth of the faster clock does not begin at t_a, it adds its periodic solution at most: theory 8.4
     faster = loop.late * (n.beta * e.s1 * mu) + (1 - loop.late) * waiting
     d1 = d1 + loop.off * faster / n.lam
-    lag = e.s1 * (loop.tau + mu)
+    return replace(resumed(p, loop, e, cost, d1), start=start)
+
+
+@quiet
+def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) -> Course[T]:
+    """The bound of (H.12) from d = `at` >= f0 on, once the feedback and the estimate act: D stays above f0."""
+    n, age = p.n, ages_of_feedback(loop)
+    base = base_of(p, loop, e)
+    later = (cost.V_d * age.oldest + e.n_fb) / loop.f0
+    acting = base + cost.at(age.youngest) + cost.at(age.oldest) * later
+    lag = e.s1 * (loop.tau + mean_wait(n.lam, loop.Ts))
     return Course(
-        start=start,
-        d1=d1,
+        start=at,
+        d1=at,
         bound=DistanceBound(
-            d0=d1,
+            d0=at,
             beta=n.beta,
             H0=maximum(n.H0, loop.S),
             S=loop.S,
             e=loop.N + lag,
-            delta=delta_H,
+            delta=maximum(n.lam * loop.f0, acting) + cost.ell1 * mean_wait(n.lam, loop.Tf),
             lam=n.lam,
             omega=n.lam if loop.omega is None else loop.omega,
             horizon=n.horizon,
@@ -102,6 +108,11 @@ def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[
         lag=lag,
         noisy=cost.ell0 * (1 + later),
     )
+
+
+def base_of(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> T:
+    """What pushes whatever the feedback knows: the plan's defect, the input of the plan that is held, the wind."""
+    return p.n.delta + p.n.beta * e.ups + p.beta_w * loop.wbar
 
 
 def mean_wait(rate: T, period: T) -> T:

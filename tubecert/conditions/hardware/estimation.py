@@ -20,11 +20,52 @@ from tubecert.conditions.hardware.loop import Loop, Plant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Acts(Generic[T]):
+    """What acts in a window of time: bounds of |kappa|, |u0 - u*| and |h - q^|."""
+
+    kb: T
+    ups: T
+    X: T
+
+    def with_those(self, before: Acts[T]) -> Acts[T]:
+        """The larger of each: what acts in a window or in the one before it."""
+        return Acts(
+            kb=maximum(self.kb, before.kb), ups=maximum(self.ups, before.ups), X=maximum(self.X, before.X)
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensed(Generic[T]):
+    """The two parts of N, and the largest so far: the filter remembers the noise of earlier windows.
+
+    `explained` is n_B, `turned` the part that a B^+ depending on x adds.
+    """
+
+    explained: T
+    turned: T
+
+    def with_those(self, before: Sensed[T]) -> Sensed[T]:
+        """The larger of each part."""
+        return Sensed(
+            explained=maximum(self.explained, before.explained), turned=maximum(self.turned, before.turned)
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Past(Generic[T]):
+    """What the window before has to do with the next one (theorem HW)."""
+
+    acts: Acts[T]
+    sensed: Sensed[T]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate(Generic[T]):
     """What the estimate, the filter and the clip leave of h, and what Y, S, N, np have to reach for that.
 
     `n_fb`: what noise is to the feedback, |Theta n| at most; `e_fb` the same in |.|; kb bounds |kappa|, ups |u0 - u*|,
     s1 the rate of h along the loop, H1 and X |h - q^| at first and always. `gust` is the part of S that wind causes.
+    After other windows kb, ups and X hold in the window before too; `acts` are those of its own.
     """
 
     n_fb: T
@@ -39,34 +80,41 @@ class Estimate(Generic[T]):
     ripple: T
     speed: T
     prediction: T | None
+    acts: Acts[T]
+    sensed: Sensed[T]
 
 
 @quiet
-def estimate(p: Plant[T], loop: Loop[T]) -> Estimate[T]:
-    """The estimate at Y, S, N (and np) of a recipe."""
+def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimate[T]:
+    """The estimate at Y, S, N (and np) of a recipe; `past` is that of the window before, if there is one."""
     n = p.n
     n_fb, e_fb = noise_in_feedback(p, loop)
-    kb = n.du * (loop.dhat + n_fb)
-    ups = feedforward_error(p, loop)
     s1 = n.Dht + n.Dhx * loop.Y
     t1 = loop.Ts + loop.tau
     H1 = minimum(n.Dh, n.H0 + s1 * t1)
     # S + (H0 - S)_+ = max(S, H0)
     X = minimum(n.Dh + n.R, maximum(H1, maximum(loop.S, n.H0) + loop.N + s1 * t1))
+    own = Acts(kb=n.du * (loop.dhat + n_fb), ups=feedforward_error(p, loop), X=X)
+    acts = own if past is None else own.with_those(past.acts)
+    known = n.Dus + acts.ups + acts.kb
+    felt = noise_felt(p, loop)
+    sensed = felt if past is None else felt.with_those(past.sensed)
     gust = wind_in_estimate(p, loop)
     return Estimate(
         n_fb=n_fb,
         e_fb=e_fb,
-        kb=kb,
-        ups=ups,
+        kb=acts.kb,
+        ups=acts.ups,
         s1=s1,
         H1=H1,
-        X=X,
+        X=acts.X,
         gust=gust,
-        bias=lag_of_filter(loop) * s1 + error_of_estimate(p, loop, s1, n.Dus + ups + kb) + gust,
-        ripple=noise_in_estimate(p, loop),
-        speed=n.phi + n.DB * (kb + ups + X) + p.D_E * loop.wbar,
-        prediction=prediction_error(p, loop, n.Dus + ups + kb, X),
+        bias=lag_of_filter(loop) * s1 + error_of_estimate(p, loop, s1, known) + gust,
+        ripple=noise_in_estimate(p, loop, sensed),
+        speed=n.phi + n.DB * (acts.kb + acts.ups + acts.X) + p.D_E * loop.wbar,
+        prediction=prediction_error(p, loop, known, acts.X),
+        acts=own,
+        sensed=sensed,
     )
 
 
@@ -117,11 +165,16 @@ def wind_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
     return (p.eps_w + p.n.DBpx * p.D_E * moved) * loop.wbar
 
 
-def noise_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
-    """N of (H.7), or what noise of a bounded rate does if that is less."""
+def noise_felt(p: Plant[T], loop: Loop[T]) -> Sensed[T]:
+    """The two parts of N with the constants of one window."""
     nbar = loop.nu * p.m.n_E
-    summed = 2 * gain_of_filter(loop) * (loop.nu * p.m.n_B) + p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar
-    return summed if p.drift is None else minimum(summed, p.m.n_B * p.drift)
+    return Sensed(explained=p.m.n_B, turned=p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar)
+
+
+def noise_in_estimate(p: Plant[T], loop: Loop[T], sensed: Sensed[T]) -> T:
+    """N of (H.7), or what noise of a bounded rate does if that is less."""
+    summed = 2 * gain_of_filter(loop) * (loop.nu * sensed.explained) + sensed.turned
+    return summed if p.drift is None else minimum(summed, sensed.explained * p.drift)
 
 
 def prediction_error(p: Plant[T], loop: Loop[T], known: T, X: T) -> T | None:

@@ -16,12 +16,25 @@ from tubecert.enclosure.interval import Interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WindowProof:
+    """What theorem HW asks for in a window: the numbers of a recipe that are its own."""
+
+    level: Fraction
+    floor: Fraction
+    speed: Fraction
+    bias: Fraction
+    ripple: Fraction
+    prediction: Fraction | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareRecipe:
     """The proof of theorem H: the loop, and the numbers that the theorem asks for.
 
     The loop: `sample_time` Ts, `delay` tau, `feedback_time` Tf (Ts where the feedback has no rate of its own),
     `bandwidth` omega (None: no filter), `noise` nu in units of noise, `wind` |w|, `clip_radius` R. The proof: `level`
     dhat, `floor` f0, `speed` Y, `bias` S, `ripple` N, and `prediction` np of theorem H-P (None without prediction).
+    With `windows` (theorem HW) they are the largest of the windows.
     """
 
     sample_time: Fraction
@@ -37,6 +50,7 @@ class HardwareRecipe:
     bias: Fraction
     ripple: Fraction
     prediction: Fraction | None
+    windows: tuple[WindowProof, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Generic
 
 import numpy as np
 
 from tubecert.conditions import machine as machines
 from tubecert.conditions.arithmetic import (
     Array,
-    T,
+    minimum,
     quiet,
     sqrt,
 )
-from tubecert.conditions.hardware.course import Course, course
-from tubecert.conditions.hardware.estimation import Estimate, estimate
-from tubecert.conditions.hardware.feedback import Loss, loss
+from tubecert.conditions.hardware import windows
+from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
@@ -29,36 +26,46 @@ from tubecert.enclosure.interval import Interval
 LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Evaluated(Generic[T]):
-    """A recipe put into every formula."""
-
-    plant: Plant[T]
-    loop: Loop[T]
-    estimate: Estimate[T]
-    loss: Loss[T]
-    course: Course[T]
-
-
-def evaluated(p: Plant[T], loop: Loop[T]) -> Evaluated[T]:
-    """Every formula of theorem H at a recipe."""
-    e = estimate(p, loop)
-    cost = loss(p, loop, e)
-    return Evaluated(plant=p, loop=loop, estimate=e, loss=cost, course=course(p, loop, e, cost))
-
-
 @quiet
 def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Interval, Interval]:
     """The margins of (H.10) and (H.12), scalars; -inf below where a side condition is not proven."""
     nothing = Interval(-np.inf, np.inf)
     if problem.machine is None or not _describes_a_loop(recipe):
         return nothing, nothing
-    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
-    if not (problem.machine.clips_within(problem.constants.h, recipe.clip_radius) and _side_conditions(x)):
+    if not problem.machine.clips_within(problem.constants.h, recipe.clip_radius):
         return nothing, nothing
-    level = (1 - (x.loop.dhat + x.estimate.n_fb) / reach(x.plant.n)).sanitised()
-    stays = (1 - x.course.supremum() / x.loop.dhat).sanitised()
-    return tuple(Interval(m.lo, np.asarray(np.inf)) for m in (level, stays))  # type: ignore[return-value]
+    if problem.machine.windows or recipe.windows:
+        return _margins_in_windows(problem, recipe)
+    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    if not _side_conditions(x):
+        return nothing, nothing
+    return _from_below(_level(x)), _from_below(1 - x.course.supremum() / x.loop.dhat)
+
+
+def _margins_in_windows(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Interval, Interval]:
+    """The least margins over the windows of theorem HW."""
+    nothing = Interval(-np.inf, np.inf)
+    if not (windows.cover(problem, recipe) and windows.is_the_widest(recipe)):
+        return nothing, nothing
+    if not all(_describes_a_loop(own) for own in windows.within(recipe)):
+        return nothing, nothing
+    found = windows.course_of(problem, recipe)
+    if not all(_side_conditions(w.at) for w in found):
+        return nothing, nothing
+    level, stays = _level(found[0].at), 1 - found[0].supremum / Interval.of(recipe.windows[0].level)
+    for w, own in zip(found[1:], recipe.windows[1:], strict=True):
+        level, stays = minimum(level, _level(w.at)), minimum(stays, 1 - w.supremum / Interval.of(own.level))
+    return _from_below(level), _from_below(stays)
+
+
+def _level(x: Evaluated[Interval]) -> Interval:
+    """The margin of (H.10)."""
+    return 1 - (x.loop.dhat + x.estimate.n_fb) / reach(x.plant.n)
+
+
+def _from_below(margin: Interval) -> Interval:
+    """What is proven of a margin: a recipe that fails refutes nothing."""
+    return Interval(margin.sanitised().lo, np.asarray(np.inf))
 
 
 def _describes_a_loop(r: HardwareRecipe) -> bool:
@@ -138,13 +145,21 @@ def stands_in_the_way(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """What no machine can overcome, and constants of the machine without a bound."""
     if problem.machine is None:
         return ()
-    return unbounded(problem.machine.unbounded()) or obstacles(problem)
+    # what fills the tube in the long run need not fill a window
+    return unbounded(problem.machine.unbounded()) or (() if problem.machine.windows else obstacles(problem))
 
 
 def ultimate_radius(problem: TubeProblem, recipe: HardwareRecipe) -> float:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven."""
-    x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; that of the last window."""
+    x = last(problem, recipe)
     return float((x.course.bound.ultimate() / sqrt(x.plant.n.a)).hi)
+
+
+def last(problem: TubeProblem, recipe: HardwareRecipe) -> Evaluated[Interval]:
+    """The formulas of the last window, or of the only one."""
+    if recipe.windows:
+        return windows.course_of(problem, recipe)[-1].at
+    return evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
 
 
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
@@ -184,4 +199,5 @@ THEOREM = Theorem(
     alike=is_a_machine_like,
     sizes=("delay", "noise", "wind", "speed", "bias", "ripple", "prediction"),
     optional=("bandwidth", "prediction"),
+    parts=("windows",),
 )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from tubecert.conditions.arithmetic import (
     quiet,
     sqrt,
 )
+from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.loop import HardwareRecipe, loop_of, plant
-from tubecert.conditions.hardware.theorem import Evaluated, evaluated
+from tubecert.conditions.hardware.windows import course_of
 from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.interval import Interval
 
@@ -49,18 +52,43 @@ class Told:
 @quiet
 def told(problem: TubeProblem, recipe: HardwareRecipe) -> Told:
     """What a recipe that is proven says."""
+    if recipe.windows:
+        return _widest(recipe, told_in_windows(problem, recipe))
     x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
+    return _told(x, x.course.supremum(), recipe.level)
+
+
+@quiet
+def told_in_windows(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Told, ...]:
+    """What a recipe that is proven says of each window."""
+    found = course_of(problem, recipe)
+    return tuple(_told(w.at, w.supremum, own.level) for w, own in zip(found, recipe.windows, strict=True))
+
+
+def _told(x: Evaluated[Interval], supremum: Interval, level: Fraction) -> Told:
+    dhat = Interval.of(level)
     return Told(
-        supremum=float(x.course.supremum().hi),
-        radius=float((x.loop.dhat / sqrt(x.plant.n.a)).hi),
+        supremum=float(supremum.hi),
+        radius=float((dhat / sqrt(x.plant.n.a)).hi),
         feedback=float((x.estimate.ups + x.estimate.kb).hi),
-        budget=_budget(x),
+        budget=_budget(x, dhat),
     )
 
 
-def _budget(x: Evaluated[Interval]) -> Budget:
+def _widest(recipe: HardwareRecipe, found: Sequence[Told]) -> Told:
+    """The largest of each bound; the budget is that of the first window with the largest level."""
+    at = [w.level for w in recipe.windows].index(recipe.level)
+    return Told(
+        supremum=max(own.supremum for own in found),
+        radius=max(own.radius for own in found),
+        feedback=max(own.feedback for own in found),
+        budget=found[at].budget,
+    )
+
+
+def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
     n, e, loop, run = x.plant.n, x.estimate, x.loop, x.course
-    whole = n.lam * loop.dhat
+    whole = n.lam * dhat
 
     def share(part: Interval) -> float:
         most = float((part / whole).sanitised().hi)
