@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.bounds.start import InitialState
@@ -67,7 +67,7 @@ def _of_uncertainty(
 
 def less(whole: R, part: R) -> R:
     """Of two records of constants, the sharper bound of each: from above, but for infima from below."""
-    changed: dict[str, Any] = {}
+    changed: dict[str, Constant] = {}
     for item in fields(part):  # type: ignore[arg-type]
         old, new = getattr(whole, item.name), getattr(part, item.name)
         if old is None or new is None:

@@ -90,11 +90,15 @@ class Theorem(Generic[R]):
         if type(recipe) is not self.recipe:
             return False
         numbers = _numbers(recipe)
-        parts = [_numbers(part) for name in self.parts for part in numbers.pop(name)]
+        parts = [
+            _numbers(part) for name in self.parts for part in cast("tuple[Recipe, ...]", numbers.pop(name))
+        ]
         predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
         if g is not None:
             numbers["predictor_gain"] = g
-        return all(map(self._signed, (numbers, *parts))) and (not predicts or self._fits(problem, g))
+        return all(map(self._signed, (numbers, *parts))) and (
+            not predicts or self._fits(problem, g if isinstance(g, Fraction) else None)
+        )
 
     def _signed(self, numbers: Mapping[str, object]) -> bool:
         """Whether gains are positive, and sizes are not negative."""
@@ -128,7 +132,7 @@ class Theorem(Generic[R]):
         return (*own, *beside)
 
 
-def _numbers(record: Any) -> dict[str, Any]:
+def _numbers(record: Recipe) -> dict[str, object]:
     """The fields of a recipe, or of a part of one."""
     return {item.name: getattr(record, item.name) for item in fields(record)}
 

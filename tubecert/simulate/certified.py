@@ -27,6 +27,7 @@ from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import SectionData
 from tubecert.kinds.hardware import HardwareData
 from tubecert.model import ControlAffineModel
+from tubecert.records import Json
 from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
@@ -135,9 +136,13 @@ def adopted(spec: Spec, result: Result) -> Spec:
 def _without_plan(effective: Mapping[str, Any]) -> Spec:
     """The specification in a certificate, at rest at 0: its plan may be in a file that is elsewhere."""
     rest = {"kind": "equilibrium", "at": ["0"] * len(effective["system"]["states"])}
-    kept = {key: value for key, value in effective.items() if key not in _UNUSED}
-    tube = {key: value for key, value in effective.get("tube", {}).items() if key != "windows"}  # of a plan
-    return load_text(json.dumps(kept | {"tube": tube, "trajectory": rest}), "certificate")
+    kept = {key: _timeless(key, value) for key, value in effective.items() if key not in _UNUSED}
+    return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
+
+
+def _timeless(key: str, section: Json) -> Json:
+    """A section of a specification; that of the tube without its windows, which are those of a plan."""
+    return {name: value for name, value in section.items() if name != "windows"} if key == "tube" else section
 
 
 def require_plan(spec: Spec) -> None:
