@@ -417,6 +417,50 @@ class LessenCause(Relax):
     share: float
 
 
+Knob = Literal[
+    "epsilon",
+    "rho_a",
+    "half_widths",
+    "rate",
+    "start",
+    "uncertainty",
+    "wind",
+    "knots",
+    "defect",
+    "gap",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TurnKnob(Relax):
+    """With `value` in place of `now` for this knob, all else as it is, the specification is certified.
+
+    For half_widths, start (its distance from the plan) and uncertainty it is a factor. `input` and `term`: only this
+    input's h, or only this term of it, as an expression; without them all of h.
+    """
+
+    tag: ClassVar[str] = "turn_knob"
+    knob: Knob
+    now: Fraction
+    value: Fraction
+    input: str | None = None
+    term: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoKnobAlone(Relax):
+    """None of the knobs `tried` was found to serve alone; these values together are proven to, if any were found.
+
+    `half_widths` and `uncertainty` are factors.
+    """
+
+    tag: ClassVar[str] = "no_knob_alone"
+    tried: tuple[Knob, ...]
+    epsilon: Fraction | None = None
+    half_widths: Fraction | None = None
+    uncertainty: Fraction | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MendPlan(Relax):
     """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""

@@ -108,15 +108,7 @@ def bound_constants(
     `metric` is (a, A) over the tube; `declared` may hold h, h_x, h_t, which then take the place of derived bounds.
     """
     fields = suprema.fields
-    if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
-        declared = {**declared, "h_initial": declared["h"]}
-    derived: dict[str, Constant] = {}
-    if Beside(suprema.fields).joins_uncertainty:
-        derived = uncertainty_constants(suprema, start, declared)
-        declared = {}
-    elif suprema.model.h is not None:
-        derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
-        derived["h_initial"] = start.uncertainty(suprema)
+    declared, derived = uncertainty_bounds(suprema, start, declared)
     delta_p, delta = suprema.plan_defect()
     constants = BoundConstants(
         lower=metric[0],
@@ -142,6 +134,21 @@ def bound_constants(
     )
     # what is declared is an exact decimal already
     return replace(constants.printable(), **declared)
+
+
+def uncertainty_bounds(
+    suprema: Suprema, start: InitialState, declared: Mapping[str, Constant]
+) -> tuple[Mapping[str, Constant], Mapping[str, Constant]]:
+    """h, h_x, h_t and h_initial over the tube: those that stand as they were declared, and those that are derived."""
+    if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
+        declared = {**declared, "h_initial": declared["h"]}
+    if Beside(suprema.fields).joins_uncertainty:
+        return {}, uncertainty_constants(suprema, start, declared)
+    derived: dict[str, Constant] = {}
+    if suprema.model.h is not None:
+        derived = dict(zip(("h", "h_x", "h_t"), suprema.uncertainty(), strict=True))
+        derived["h_initial"] = start.uncertainty(suprema)
+    return declared, derived
 
 
 def time_range(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,13 +54,32 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        found = certified(system, options, report, seconds=deadline, command=command)
+        found = certified(
+            system,
+            options,
+            report,
+            seconds=deadline,
+            command=command,
+            told=None if output.quiet or _is_data(target, output) else _told_by(terminal),
+        )
     if target != certificate.STDOUT:
         certificate.write_text(target, found.text)
     metric = _kept_metric(found.result, kept)
     write_pages(pages, found.certificate)
     _report(found, target, {"metric": metric, "pages": pages}, output)
     return found.verdict.exit_code
+
+
+def _told_by(terminal: Terminal) -> Callable[[Result], None]:
+    """The verdict, before it is looked for what would certify."""
+    from tubecert.report import console
+
+    return lambda result: terminal.show(console.verdict_line(result))
+
+
+def _is_data(target: str, output: Output) -> bool:
+    """Whether the certificate goes to stdout."""
+    return output.json or target == certificate.STDOUT
 
 
 def _target(given: Mapping[str, Any]) -> str:
@@ -139,5 +158,5 @@ def _report(found: Certification, target: str, files: Mapping[str, Any], output:
         output,
         console.verdict_line(found.result),
         lambda: console.report(found.certificate, target=target, verbose=output.verbose, **files),
-        found.text if output.json or target == certificate.STDOUT else None,
+        found.text if _is_data(target, output) else None,
     )

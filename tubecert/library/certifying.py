@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
@@ -18,7 +18,7 @@ from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
-from tubecert.pipeline import Options, Progress
+from tubecert.pipeline import Options, Progress, Result
 from tubecert.spec import Spec
 from tubecert.stages.options import overridden
 
@@ -67,12 +67,21 @@ def certify(
 
 
 def certified(
-    spec: Spec, options: Options, progress: Progress | None, *, seconds: Fraction | None, command: str
+    spec: Spec,
+    options: Options,
+    progress: Progress | None,
+    *,
+    seconds: Fraction | None,
+    command: str,
+    told: Callable[[Result], None] | None = None,
 ) -> Certification:
-    """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric."""
+    """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric.
+
+    `told` hears a verdict that is not `certified` before it is looked for what would be.
+    """
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
-    result = pipeline.certify(spec, options, progress, deadline=deadline)
+    result = pipeline.certify(spec, options, progress, deadline=deadline, advise=True, told=told)
     run = {
         "command": command,
         "started": started.isoformat(timespec="seconds"),

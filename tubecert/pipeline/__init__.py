@@ -7,6 +7,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | stage after stage, with what planners and searches propose |
 | `reasons` | why a verdict about gains is what it is |
+| `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
 | `design` | the narrowest tube for a machine |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
@@ -20,6 +21,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.findings import Severity
 from tubecert.model import domain_findings
+from tubecert.pipeline.advice import Ledger, advised
 from tubecert.pipeline.certification import answer, result
 from tubecert.pipeline.checks import inspect, missing_parts
 from tubecert.pipeline.deadline import Deadline
@@ -29,6 +31,7 @@ from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options, Progress, Step, overridden
 from tubecert.stages.question import Question, Stopped
+from tubecert.stages.result import Stage
 from tubecert.stages.time import time_of
 from tubecert.synthesis.bridge import required
 
@@ -53,20 +56,33 @@ def certify(
     memory: Memory | None = None,
     *,
     deadline: Deadline | None = None,
+    advise: bool = False,
+    told: Callable[[Result], None] | None = None,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
     With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
-    a metric that is looked for is by then the best that was found.
+    a metric that is looked for is by then the best that was found. With `advise`, what would certify is looked for
+    where the verdict is another; `told` hears the verdict before.
     """
+    ledger = Ledger(progress)
+    end = _end(spec, options, ledger, memory, deadline)
+    found = result(end)
+    return advised(found, end, ledger, question_of, told) if advise else found
+
+
+def _end(
+    spec: Spec, options: Options, progress: Progress, memory: Memory | None, deadline: Deadline | None
+) -> Stage | Stopped:
+    """How the certification ends."""
     question = question_of(spec, options, progress, memory)
     if question.spec.metric is not None or spec.synthesis is None:
-        return result(answer(question))
+        return answer(question)
     found = synthesise(spec, spec.synthesis, options, progress, deadline=deadline)
     if found.cut == "interrupted":
         raise KeyboardInterrupt
     question = replace(question, spec=found.spec or question.spec, synthesis=found.data())
-    return result(answer(question) if found.reason is None else Stopped(at=question, reason=found.reason))
+    return answer(question) if found.reason is None else Stopped(at=question, reason=found.reason)
 
 
 def question_of(

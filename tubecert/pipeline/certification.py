@@ -33,7 +33,7 @@ from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tub
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
 
-_NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
+NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
 
 
 def answer(question: Question) -> Stage | Stopped:
@@ -151,10 +151,10 @@ def _asked(question: Question) -> Asked:
 
 def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:
     """Where gains are missing and the plan's defect takes a part of the tube that matters, that is said too."""
-    share = _defect_share(judged.bounded.problem)
+    share = defect_share(judged.bounded.problem)
     if judged.bounded.enclosed.tube.plan.allowance is not None:
         return told  # nobody's plan: the specification allows its defect
-    if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < _NOTABLE:
+    if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < NOTABLE:
         return told
     tube, defect = judged.bounded.enclosed.tube, judged.bounded.problem.constants.plan_defect
     mend = MendPlan(
@@ -169,7 +169,7 @@ def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:
     ]
 
 
-def _defect_share(problem: TubeProblem) -> float:
+def defect_share(problem: TubeProblem) -> float:
     """How much of the tube the plan's defect alone takes in the long run: delta/(lambda dbar)."""
     constants = problem.constants
     reach = float(problem.rate) * sqrt(constants.lower.below) * float(problem.rho)

@@ -113,6 +113,18 @@ _CAUSE = _word(
     "noise_feedback",
     "sampling",
 )
+_KNOB = _word(
+    "epsilon",
+    "rho_a",
+    "half_widths",
+    "rate",
+    "start",
+    "uncertainty",
+    "wind",
+    "knots",
+    "defect",
+    "gap",
+)
 _NONE: Form = ({}, {})
 
 _CLAIMS: Mapping[str, Form] = {
@@ -214,6 +226,14 @@ _RELAX: Mapping[str, Form] = {
     "halve_hardware": ({"part": _PART, "factor": Node.number}, {}),
     "ease_hardware": ({"part": _PART, "value": Node.decimal}, {}),
     "lessen_cause": ({"cause": _CAUSE, "share": Node.number}, {}),
+    "turn_knob": (
+        {"knob": _KNOB, "now": Node.decimal, "value": Node.decimal},
+        {"input": Node.text, "term": Node.text},
+    ),
+    "no_knob_alone": (
+        {"tried": lambda node: [_KNOB(item) for item in node.entries()]},
+        {"epsilon": Node.decimal, "half_widths": Node.decimal, "uncertainty": Node.decimal},
+    ),
     "mend_plan": (
         {
             "defect": Node.number,

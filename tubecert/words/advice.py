@@ -22,12 +22,14 @@ from tubecert.claims import (
     HalveConstant,
     HalveHardware,
     HigherDegree,
+    Knob,
     LeavePlanRoom,
     LessenCause,
     LowerDegree,
     LowerRate,
     MendPlan,
     MoreKnots,
+    NoKnobAlone,
     OtherInterpolation,
     OtherMetric,
     OtherVariables,
@@ -39,6 +41,7 @@ from tubecert.claims import (
     Relax,
     ShrinkSafeSet,
     ShrinkTube,
+    TurnKnob,
 )
 from tubecert.words.digits import ceiling_text, floor_text
 from tubecert.words.machine import CAUSES, PARTS
@@ -51,10 +54,11 @@ def advice(items: Sequence[Relax]) -> str:
         for item in items
         if isinstance(item, (HalveConstant, HalveHardware))
     )
+    turns = _turns([item for item in items if isinstance(item, TurnKnob)])
     plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
     causes = _filled([item for item in items if isinstance(item, LessenCause)])
     others = [item for item in items if not isinstance(item, _SAID_APART)]
-    return "; ".join(filter(None, (halvings, _alternatives(others), causes, *plans)))
+    return "; ".join(filter(None, (halvings, turns, _alternatives(others), causes, *plans)))
 
 
 def _alternatives(items: Sequence[Relax]) -> str:
@@ -65,7 +69,7 @@ def _alternatives(items: Sequence[Relax]) -> str:
     return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
-_SAID_APART = (HalveConstant, HalveHardware, LessenCause, MendPlan)
+_SAID_APART = (HalveConstant, HalveHardware, LessenCause, TurnKnob, MendPlan)
 _TRIED = (HigherDegree, AskForRateUpTo, ShrinkSafeSet)
 
 
@@ -96,6 +100,54 @@ def _filled(items: Sequence[LessenCause]) -> str:
     shares = ", ".join(f"{CAUSES[item.cause]} {100 * item.share:.0f} %" for item in items)
     whole = 100 * sum(item.share for item in items)
     return f"what fills the level of the loop that comes nearest, to {whole:.0f} % (not proven): {shares}"
+
+
+def _turns(items: Sequence[TurnKnob]) -> str:
+    """What certifies, one thing at a time."""
+    if not items:
+        return ""
+    lead = "each of these alone is proven to serve: " if len(items) > 1 else "this is proven to serve: "
+    return lead + "; or ".join(map(_turn, items))
+
+
+def _turn(item: TurnKnob) -> str:
+    share = f"{float(100 * item.value):.3g} %"
+    match item.knob:
+        case "start":
+            whole = "start where the plan starts"
+            return f"start at {share} of the distance from the plan" if item.value else whole
+        case "half_widths":
+            return f"all half-widths at {share}"
+        case "uncertainty" if item.term is not None:
+            return f"{item.term} in the h of {item.input} at {share} of its size"
+        case "uncertainty":
+            return f"all of h at {share} of its size"
+    return f"{_KNOBS[item.knob]} {float(item.value):.4g} in place of {float(item.now):.4g}"
+
+
+_KNOBS: Mapping[Knob, str] = {
+    "epsilon": "epsilon",
+    "rho_a": "rho_a",
+    "half_widths": "the half-widths",
+    "rate": "metric.rate",
+    "start": "the start",
+    "uncertainty": "h",
+    "wind": "disturbance.bound",
+    "knots": "trajectory.knots",
+    "defect": "trajectory.defect",
+    "gap": "--gap",
+}
+
+
+def _none_alone(item: NoKnobAlone) -> str:
+    """That nothing serves by itself, and what does together."""
+    tried = f"nothing that was tried serves alone ({', '.join(_KNOBS[knob] for knob in item.tried)})"
+    if item.uncertainty is None:
+        return tried
+    tube = [] if item.epsilon is None else [f"epsilon {float(item.epsilon):.4g}"]
+    tube += [] if item.half_widths is None else [f"all half-widths at {float(100 * item.half_widths):.3g} %"]
+    share = f"all of h at {float(100 * item.uncertainty):.3g} % of its size"
+    return f"{tried}; together these are proven to serve: {' and '.join([*tube, share])}"
 
 
 def _plan(item: MendPlan) -> str:
@@ -146,6 +198,7 @@ def _smaller_set(item: ShrinkSafeSet) -> str:
 _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
     RaiseBudget: lambda item: "raise --budget" + (": a proof ran out of boxes" if item.proof else ""),
     EaseHardware: _easier,
+    NoKnobAlone: _none_alone,
     ShrinkTube: lambda item: "shrink the tube",
     ReduceRadii: lambda item: "reduce epsilon, rho_a or the initial error",
     LeavePlanRoom: lambda item: "plan with more room to the limits",
