@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ safe_set: {p: [-1, 1], v: [-1, 1], w: [-1, 1]}
 uncertainty: {h: ["0.1*sin(t)", 0]}
 trajectory: {kind: equilibrium, at: [0, 0, 0]}
 metric: {rate: 0.5, dual_metric: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+tube: {epsilon: 0.1, rho_a: 0.1}
 """
 PATH = """
 tubecert: 1
@@ -41,6 +42,7 @@ safe_set: {p: [-2, 2], v: [-2, 2]}
 uncertainty: {h: ["0.2*sin(t)"]}
 trajectory: {kind: equilibrium, at: [0, 0]}
 metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.1, rho_a: 0.1}
 """
 KNOTS = Knots(
     t=tuple(map(Fraction, ("0", "0.013", "0.02", "0.3", "0.31"))),
@@ -94,49 +96,35 @@ def machine(text: str, plan: Plan | None = None, **values: Any) -> Machine:
     return Machine(**(given | values))
 
 
-def orbit(**values: Any) -> Controller:
-    """A moving plan, u* in continuous time, a box as the clip."""
+def _orbit(**values: Any) -> Machine:
     text = (CONFIGS / "hardware_orbit.yaml").read_text("utf-8")
-    return assembled(machine(text, **({"clip": ((Fraction(-2), Fraction("1.9")),)} | values)))
+    return machine(text, **({"clip": ((Fraction(-2), Fraction("1.9")),)} | values))
 
 
-def turning(**values: Any) -> Controller:
-    """B(x), two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube."""
-    own = {
-        "recipe": recipe(delay=Fraction(1, 500), prediction=Fraction("0.01"), clip_radius=Fraction("0.2")),
-        "coordinates": (("1", "0", "0"), ("0", "2", "0"), ("0", "1/3", "1")),
-    }
-    return assembled(machine(TURNING, **(own | values)))
-
-
-def path(**values: Any) -> Controller:
-    """A plan through knots, of which several meet one sample, and no filter."""
+def _path(**values: Any) -> Machine:
     plan = piecewise_plan(build(load_text(PATH)), KNOTS)
-    own = {
-        "recipe": recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), bandwidth=None),
-        "horizon": Fraction("0.31"),
-    }
-    return assembled(machine(PATH, plan, **(own | values)))
+    own = recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), **values)
+    return machine(PATH, plan, recipe=own, horizon=Fraction("0.31"))
 
 
-def predicting_path(**values: Any) -> Controller:
-    """The same, with a prediction in which u* moves."""
-    own = recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), prediction=Fraction("0.01"))
-    return path(recipe=own, **values)
-
-
-def held_orbit() -> Controller:
-    """u* held from sample to sample."""
-    return replace(orbit(held=True), name="held_orbit")
-
-
-CONTROLLERS = {
-    "orbit": orbit,
-    "turning": turning,
-    "path": path,
-    "predicting_path": predicting_path,
-    "held_orbit": held_orbit,
+GIVEN = {
+    # a moving plan, u* in continuous time, a box as the clip
+    "orbit": _orbit(),
+    # u* held from sample to sample
+    "held_orbit": _orbit(held=True),
+    # B(x), two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube
+    "turning": machine(
+        TURNING,
+        recipe=recipe(delay=Fraction(1, 500), prediction=Fraction("0.01"), clip_radius=Fraction("0.2")),
+        coordinates=(("1", "0", "0"), ("0", "2", "0"), ("0", "1/3", "1")),
+    ),
+    # a plan through knots, of which several meet one sample, and no filter
+    "path": _path(bandwidth=None),
+    # the same, with a prediction in which u* moves
+    "predicting_path": _path(prediction=Fraction("0.01")),
 }
+CONTROLLERS = {name: partial(assembled, given) for name, given in GIVEN.items()}
+orbit, turning = CONTROLLERS["orbit"], CONTROLLERS["turning"]
 
 
 def wandering(controller: Controller, samples: int, lanes: int, seed: int) -> np.ndarray:

@@ -55,6 +55,7 @@ def test_python_computes_what_the_reference_computes(controller, tmp_path):
     assert controller.hash == module.CERTIFICATE
 
 
+@pytest.mark.slow
 @needs_cc
 def test_c_computes_what_python_computes(controller, tmp_path):
     module = loaded(controller, tmp_path)
@@ -65,6 +66,7 @@ def test_c_computes_what_python_computes(controller, tmp_path):
     assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 @needs_cc
 def test_single_precision_is_close(controller):
     y = wandering(controller, 40, 1, 5)
@@ -86,6 +88,7 @@ def self_tested(folder):
     return subprocess.run([str(folder / "test")], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @needs_cc
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_strict_compilers_and_sanitizers_have_nothing_to_say(controller, precision, tmp_path):
@@ -175,6 +178,7 @@ print(hashlib.sha256("".join(exported(controllers.turning()).files.values()).enc
 """
 
 
+@pytest.mark.slow
 def test_the_bytes_are_the_same_in_another_process():
     here = Path(controllers.__file__).parent
     environment = {**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{here.parent}"}

@@ -16,6 +16,7 @@ from tubecert.library.numbers import Numbers
 from tubecert.library.rechecking import text_of, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
+from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
 
 
@@ -27,14 +28,26 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     name = str(given["certificate"])
     text = text_of(name)
     note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
+    code = "" if given["controller"] is None else _controller(str(given["controller"]), text, name)
     with _progress(output) as report:
         found = recheck(text, name, BUDGET if budget is None else budget, report)
-    shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
+    notes = {"specification": note, "controller": code}
+    shown = _as_json(found, name, notes) if output.json else _as_text(found, name, notes, output)
     write_stdout(shown)
     return found.exit_code
 
 
-def _as_json(found: Recheck, name: str, note: str) -> str:
+def _controller(folder: str, text: str, name: str) -> str:
+    """A sentence that says that the code in a folder is that of the certificate; raises TC711 if it is not."""
+    from tubecert.certificate.file import parse
+    from tubecert.export.examined import examined
+    from tubecert.library.certification import certification_of
+
+    read_certificate(document.read(text, name))
+    return str(examined(folder, certification_of(parse(text.encode(), name)).certificate, text, name))
+
+
+def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:
     failing = found.failing
     data: dict[str, Any] = {
         "certificate": name,
@@ -53,20 +66,18 @@ def _as_json(found: Recheck, name: str, note: str) -> str:
         "first_failing": None if failing is None else failing.name,
         "not_examined": list(found.unread),
     }
-    if note:
-        data["specification"] = note
+    data |= {what: note for what, note in notes.items() if note}
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
-def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
+def _as_text(found: Recheck, name: str, notes: Mapping[str, str], output: Output) -> str:
     failing = found.failing
     lines = [verdict_line(found, name)]
     if failing is not None:
         lines.append(f"  first failing claim: {failing.name}: {failing.outcome.why}")
     elif found.stated != "certified":
         lines.append("  what can be examined of it agrees; it certifies nothing")
-    if note:
-        lines.append(f"  {note}")
+    lines += [f"  {note}" for note in notes.values() if note]
     if not output.quiet:
         lines.append("")
         lines += [_line(item.name, item.outcome, verbose=output.verbose) for item in found.claims]

@@ -13,11 +13,13 @@ _AFTER = """\b
 Examples:
   tubecert recheck plant.certificate.json
   tubecert recheck plant.certificate.json --spec plant.yaml
+  tubecert recheck plant.certificate.json --controller plant.controller
   tubecert recheck plant.certificate.json --json | jq .first_failing
 
 \b
-Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted; 2 no
-certificate, or one of another specification; 4 a claim could not be decided, or it says undecided.
+Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted, or the
+controller is another one; 2 no certificate, or one of another specification; 4 a claim could not be
+decided, or it says undecided.
 """
 
 
@@ -37,6 +39,10 @@ def recheck(
     spec: Annotated[
         str | None,
         typer.Option(metavar="SPEC", help="Also: that the certificate is of this specification."),
+    ] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="FOLDER", help="Also: that the exported code in it is that of the certificate."),
     ] = None,
     budget: Annotated[
         str | None,

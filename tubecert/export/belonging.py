@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tubecert.errors import TargetError
+from tubecert.errors import ExitCode, TargetError
 from tubecert.export.controller import Controller, refused
 from tubecert.export.folder import FORMAT, MANIFEST, Exported, Language, Precision, exported
 from tubecert.files import Kind, read
@@ -81,4 +81,6 @@ def _differs(folder: str, name: str, found: str, wanted: str) -> Exception:
 
 
 def _foreign(message: str) -> Exception:
-    return refused(message, "export again, with the same version of tubecert", "TC711")
+    error = refused(message, "export again, with the same version of tubecert", "TC711")
+    error.exit_code = ExitCode.NOT_CERTIFIED
+    return error

@@ -1,0 +1,139 @@
+"""Code and certificate belong together: recheck's own arithmetic, another certificate, a changed byte."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from types import SimpleNamespace
+
+import controllers
+import numpy as np
+import proven
+import pytest
+from controllers import CONTROLLERS
+from flint import ctx
+from typer.testing import CliRunner
+
+from tubecert import certificate
+from tubecert.cli.app import app
+from tubecert.errors import TubecertError
+from tubecert.export.compiled import COMPILERS, compiler
+from tubecert.export.controller import controller_of
+from tubecert.export.examined import examined
+from tubecert.export.folder import exported
+from tubecert.export.vectors import vectors
+from tubecert.library.certification import certification_of
+from tubecert.recheck.balls import exact
+from tubecert.recheck.controller import Machine
+from tubecert.recheck.curve import Knots, hermite
+from tubecert.recheck.document import read
+from tubecert.recheck.specification import read_specification
+from tubecert.recheck.system import curve_of, system_of
+from tubecert.spec import load_text
+from tubecert.spec.canonical import canonical
+
+needs_cc = pytest.mark.skipif(
+    compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"
+)
+TEXTS = {
+    "orbit": (controllers.CONFIGS / "hardware_orbit.yaml").read_text("utf-8"),
+    "turning": controllers.TURNING,
+    "path": controllers.PATH,
+}
+
+
+def in_recheck(name: str) -> Machine:
+    """The machine of a hand-made controller, as recheck reads it."""
+    controller, kind = CONTROLLERS[name](), name.removeprefix("held_").removeprefix("predicting_")
+    given = controllers.GIVEN[name]
+    data = {"format": certificate.FORMAT, "spec": canonical(load_text(TEXTS[kind]))}
+    read_again = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
+    system = system_of(read_again)
+    knots = None
+    if kind == "path":
+        own = controllers.KNOTS
+        knots = Knots(t=own.t, x=own.x, u=own.u, held=False)
+        curve = hermite(knots, [row[0] for row in system.drift], system.states, system.inputs, own.t[-1])
+    else:
+        curve = curve_of(read_again, SimpleNamespace(knots=None), system)
+    rows = given.coordinates
+    S = None if rows is None else tuple(tuple(map(Fraction, row)) for row in rows)
+    case = SimpleNamespace(
+        system=system,
+        curve=curve,
+        tube=SimpleNamespace(coordinates=S),
+        result=SimpleNamespace(plan=SimpleNamespace(knots=knots)),
+    )
+    section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
+    return Machine(case, section, given.recipe, held=given.held)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_recheck_reads_the_same_formulas(name):
+    controller = CONTROLLERS[name]()
+    own = vectors(controller)
+    with ctx.workprec(200):
+        found = list(in_recheck(name).answers([[exact(Fraction(q)) for q in row] for row in own.y[:32]]))
+    values = np.array([[float(ball.mid()) for ball in row] for row in found])
+    assert np.abs(values - np.array(own.u)[:33]).max() < 1e-11 * np.abs(values).max()
+    assert max(float(ball.rad()) for row in found for ball in row) < 1e-30
+
+
+@needs_cc
+@pytest.mark.slow
+def test_a_certificate_its_code_and_what_is_refused(tmp_path):
+    data = proven.shipped("hardware_orbit")
+    text = certificate.dump(data)
+    target = tmp_path / "orbit.certificate.json"
+    target.write_text(text, "utf-8")
+    run = CliRunner().invoke(app, ["export", str(target)], prog_name="tubecert")
+    assert run.exit_code == 0, run.output
+    folder = tmp_path / "orbit.controller"
+    own = certification_of(data).certificate
+    found = examined(str(folder), own, text, target.name)
+    assert found.difference < 1e-13
+    assert "ball arithmetic" in str(found)
+    other = exported(controller_of(own), "python")
+    other.save(str(tmp_path / "python"))
+    assert examined(str(tmp_path / "python"), own, text, target.name).difference < 1e-13
+    source = folder / "hardware_orbit.c"
+    code = source.read_text("utf-8")
+    source.write_text(code.replace("0.25 * before", "0.24 * before"), "utf-8")
+    run = CliRunner().invoke(app, ["recheck", str(target), "--controller", str(folder)], prog_name="tubecert")
+    assert run.exit_code == 1
+    line = 1 + next(i for i, each in enumerate(code.splitlines()) if "0.25 * before" in each)
+    assert f"hardware_orbit.c:{line}" in run.output
+    data["result"]["plan"]["samples"]["t"][1] *= 1.01
+    resealed = certification_of(certificate.seal(data["result"], {})).certificate
+    with pytest.raises(TubecertError, match="that of another certificate"):
+        examined(str(folder), resealed, text, target.name)
+    section = data["result"]["hardware"]
+    section["verdict"] = "undecided"
+    with pytest.raises(TubecertError, match="certifies no controller"):
+        controller_of(certification_of(certificate.seal(data["result"], {})).certificate)
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"recipe": controllers.recipe(feedback_time=Fraction(1, 1000))}, "a clock of its own"),
+        ({"text": (controllers.CONFIGS / "hardware_three.yaml").read_text("utf-8")}, "is not constant"),
+    ],
+)
+def test_what_cannot_be_exported_says_why(changed, why):
+    given = {"text": TEXTS["orbit"]} | changed
+    with pytest.raises(TubecertError, match=why) as error:
+        controllers.assembled(controllers.machine(given.pop("text"), **given))
+    assert error.value.findings[0].code == "TC710"
+
+
+def test_code_that_answers_otherwise_is_found(monkeypatch):
+    """The formulas themselves: whatever the files say, recheck would object to another sign."""
+    own = in_recheck("orbit")
+    monkeypatch.setattr(
+        Machine, "filtered", lambda self, q, sigma: [a - b for a, b in zip(q, sigma, strict=True)]
+    )
+    y = [[exact(Fraction(q)) for q in row] for row in vectors(controllers.orbit()).y[:4]]
+    found = [float(row[0].mid()) for row in own.answers(y)]
+    assert max(abs(a - b[0]) for a, b in zip(found, vectors(controllers.orbit()).u, strict=False)) > 1e-3
