@@ -20,15 +20,15 @@ from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
 
 
-def run(given: Mapping[str, Any], output: Output) -> ExitCode:
-    """Recheck a certificate; with a specification, also whether it belongs to it."""
+def run(given: Mapping[str, Any], output: Output, controller: str | None = None) -> ExitCode:
+    """Recheck a certificate; with a specification, also whether it belongs to it, with a folder its controller."""
     numbers = Numbers()
     budget = numbers.count("--budget", given["budget"])
     numbers.check()
     name = str(given["certificate"])
     text = text_of(name)
     note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
-    code = "" if given["controller"] is None else _controller(str(given["controller"]), text, name)
+    code = "" if controller is None else _controller(controller, text, name)
     with _progress(output) as report:
         found = recheck(text, name, BUDGET if budget is None else budget, report)
     notes = {"specification": note, "controller": code}

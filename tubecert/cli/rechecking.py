@@ -55,5 +55,5 @@ def recheck(
     with guarded(how):
         from tubecert.cli.recheck import run
 
-        code = run(given, how)
+        code = run(given, how, controller)
     raise typer.Exit(code)
