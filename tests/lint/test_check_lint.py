@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -118,8 +119,62 @@ def test_each_finding_where_it_belongs(name):
 
 
 def test_every_code_is_met():
-    met = {code for code, _, _ in CASES.values()}
+    met = {code for code, _, _ in CASES.values()} | {case[0] for case in TABLES.values()}
     assert met == set(lint.CODES)
+
+
+def table(times=1.0, names="t,p,v,u", wrong=(), steps=60):
+    """p = sin(t)/2 with the u that makes it a plan, as a file; `wrong` rows have another p."""
+    lines = [names]
+    for k in range(steps + 1):
+        t = 0.05 * k
+        p, v = math.sin(t) / 2, math.cos(t) / 2
+        lines.append(f"{t * times:.12g},{p + 0.2 * (k in wrong):.12g},{v:.12g},{p + v:.12g}")
+    return "\n".join(lines) + "\n"
+
+
+TABLES = {
+    "ms": ("TC413", "1:1", "ms", table(times=1e3)),
+    "us": ("TC413", "1:1", "us", table(times=1e6)),
+    "exchanged": ("TC414", "1:1", "columns p and v", table(names="t,v,p,u")),
+    "a row": ("TC407", "22:1", "t = 1 s does not belong", table(wrong=(20,))),
+    "rows, and a blank line": (
+        "TC407",
+        "32:1",
+        "t = 1.45 s",
+        table(wrong=(29,)).replace("\n0.05,", "\n\n0.05,"),
+    ),
+    "another plan": ("TC407", "25:1", "between t = 1.15 s", table(names="t,p,u,v")),
+}
+
+
+def inspected(folder, text, interpolation="linear"):
+    (folder / "plan.csv").write_text(text)
+    path = folder / "spec.yaml"
+    plan = f"{{kind: csv, file: plan.csv, interpolation: {interpolation}}}"
+    path.write_text(changed((HELD, plan), (START, ALONG)))
+    return pipeline.inspect(load(str(path)))
+
+
+@pytest.mark.parametrize("name", list(TABLES))
+def test_a_plan_file_is_compared_with_the_dynamics(tmp_path, name):
+    code, where, words, text = TABLES[name]
+    own = [item for item in inspected(tmp_path, text) if item.code in ("TC407", "TC413", "TC414")]
+    assert [item.code for item in own] == [code]
+    assert own[0].severity is Severity.WARNING
+    assert words in own[0].message
+    assert str(own[0].location) == f"{tmp_path / 'plan.csv'}:{where}"
+
+
+def test_nothing_is_said_of_a_plan_file_that_is_one(tmp_path):
+    assert inspected(tmp_path, table()) == []
+    assert inspected(tmp_path, table(steps=3)) == []
+
+
+def test_many_bad_rows_are_named_and_counted(tmp_path):
+    own = inspected(tmp_path, table(wrong=range(5, 60, 9)))
+    assert [item.location.line for item in own] == [7, 16, 25]
+    assert "4 more" in own[0].message
 
 
 def test_knots_outside_are_found(tmp_path):

@@ -8,6 +8,7 @@ would refute, a warning what is hardly meant, a note what is worth knowing. Trus
 | `codes` | finding codes with their meaning |
 | `names` | parameters, names, units, states that cannot change, empty expectations |
 | `plan` | plan and start in the safe set, room for the tube, equilibria, obstacles |
+| `table` | a plan from a file against the dynamics: rows, units of time, exchanged columns |
 | `uncertainty` | h that is zero, declared bounds that are broken or loose |
 | `floats` | exact numbers as floats |
 | `metric` | C1-C3 and declared bounds at points; modes that no metric can contract |

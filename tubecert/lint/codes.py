@@ -27,6 +27,10 @@ NO_ROOM: Final = "TC406"
 PLAN_DEFECT: Final = "TC407"
 COLLISION: Final = "TC408"
 OBSTACLE_OUTSIDE: Final = "TC409"
+PLAN_TIME_UNIT: Final = "TC413"
+PLAN_EXCHANGED: Final = "TC414"
+
+NOTABLE_DEFECT: Final = 0.02  # share of the tube that a plan's defect may take
 
 CODES: Final[Mapping[str, str]] = {
     UNUSED: "a parameter or a definition is never used",
@@ -51,4 +55,6 @@ CODES: Final[Mapping[str, str]] = {
     PLAN_DEFECT: "the plan misses the dynamics by a part of the tube that matters",
     COLLISION: "the plan meets an obstacle",
     OBSTACLE_OUTSIDE: "an obstacle lies outside the safe set",
+    PLAN_TIME_UNIT: "the times of a plan file seem to be no seconds",
+    PLAN_EXCHANGED: "two columns of a plan file seem to be exchanged",
 }

@@ -18,12 +18,12 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
+from tubecert.lint.table import table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
 
 _SAMPLES = 257
 _ROUNDING = 1e-9
-_NOTABLE = 0.02  # share of the tube that a plan's defect may take
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +44,8 @@ def plan_findings(spec: Spec) -> list[Finding]:
     findings += outside or _room(spec, curve)
     if not outside and spec.trajectory.kind in ("equilibrium", "expressions"):
         findings += _defect(spec, curve, build(spec))
+    if spec.trajectory.table is not None:  # exchanged columns leave the safe set, too
+        findings += table_findings(spec, spec.trajectory.table, build(spec), _least_radius(spec))
     return findings if spec.trajectory.bundle is not None else [*findings, *_obstacles(spec, curve)]
 
 
@@ -170,7 +172,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     if not worst > scale:
         return
     bearable = nearest(model.rate) * _least_radius(spec)
-    notable = worst > _NOTABLE * bearable
+    notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
         yield Finding(

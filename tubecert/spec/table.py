@@ -21,7 +21,7 @@ from tubecert.errors import TubecertError
 from tubecert.expression import ExpressionError, parse_number, suggestion
 from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
 from tubecert.files import read
-from tubecert.findings import Finding, capped
+from tubecert.findings import Finding, Location, capped
 from tubecert.spec import codes
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import MODERATE, Field, out_of_range
@@ -47,11 +47,15 @@ class _Cell:
 
 @dataclass(slots=True, kw_only=True)
 class _Sheet:
-    """A file being read, and what is wrong with it; its lines are `shown` once it is known to be a plan."""
+    """A file being read, and what is wrong with it; its lines are `shown` once it is known to be a plan.
+
+    `lines`: where the header and every row of numbers stand.
+    """
 
     source: Source
     shown: bool = False
     findings: list[Finding] = field(default_factory=list)
+    lines: list[Location] = field(default_factory=list)
 
     def fail(self, cell: _Cell, code: str, message: str, help: str = "") -> None:
         """Adds a finding at a cell."""
@@ -59,6 +63,10 @@ class _Sheet:
         location = self.source.location(mark, len(cell.text))
         location = location if self.shown else replace(location, source="")
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
+
+    def note(self, cells: list[_Cell]) -> None:
+        """Keeps where a line stands; its text is not kept."""
+        self.lines.append(Location(file=self.source.file, line=cells[0].line + 1, column=1))
 
 
 def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Table | None:
@@ -82,7 +90,10 @@ def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Tabl
     entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, _ENOUGH))
     if knots is None or sheet.findings:
         return None
-    return Table(file=name, sha256=hashlib.sha256(data).hexdigest(), knots=knots)
+    header, *rows = sheet.lines
+    return Table(
+        file=name, sha256=hashlib.sha256(data).hexdigest(), knots=knots, header=header, rows=tuple(rows)
+    )
 
 
 def _forward(entry: Field, error: TubecertError) -> None:
@@ -109,6 +120,7 @@ def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | 
     columns = _columns(sheet, header, names)
     if columns is None:
         return None
+    sheet.note(header)
     values: list[list[Fraction]] = []
     for row in rows:
         if len(values) == MAX_ROWS:
@@ -120,6 +132,7 @@ def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | 
                 sheet, row[columns[0]], numbers[columns[0]], [line[columns[0]] for line in values[-1:]]
             )
             values.append(numbers)
+            sheet.note(row)
         if len(sheet.findings) >= _ENOUGH:
             return None
     if sheet.findings:

@@ -76,11 +76,13 @@ class Knots:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A plan file: its name as written, the hash of its bytes, and its knots."""
+    """A plan file: its name as written, the hash of its bytes, its knots, where its header and its rows stand."""
 
     file: str
     sha256: str
     knots: Knots = field(repr=False)
+    header: Location | None = field(default=None, repr=False, compare=False)
+    rows: tuple[Location, ...] = field(default=(), repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

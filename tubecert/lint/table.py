@@ -1,0 +1,173 @@
+"""A plan from a file against the dynamics, in floats: rows that do not belong, times in ms, columns that are exchanged.
+
+The defect of a piece is looked at in its middle, where a cubic with the slopes of the dynamics at its ends misses most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.findings import Finding, Location, Severity
+from tubecert.lint import codes
+from tubecert.lint.floats import floats, nearest
+from tubecert.model import ControlAffineModel
+from tubecert.spec import Spec, Table
+
+_FALLS: Final = 0.05  # to which share of it a defect falls where its cause is found
+_STANDS_OUT: Final = 20  # times the defect of most pieces: a row that does not belong
+_ROWS: Final = 3  # of them that are named
+_UNITS: Final = ((1e3, "ms"), (1e6, "us"))
+_SHARE: Final = 0.05  # of the speed, where it is not known what a tube can bear
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Points:
+    """Knots as floats: `t` (K,) in s, `x` (K, n), `u` (K, m)."""
+
+    t: Array
+    x: Array
+    u: Array
+
+
+class _Dynamics:
+    """f + B u of a plan, and how far pieces are from it."""
+
+    def __init__(self, model: ControlAffineModel, *, held: bool) -> None:
+        self.held = held
+        self.tape = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
+
+    def rate(self, x: Array, u: Array) -> Array:
+        """F + B u at points (K, n), (K, m): (K, n)."""
+        return np.asarray(self.tape.run_floats([*x.T, *u.T], (len(x),)).T)
+
+    def defect(self, points: _Points) -> Array:
+        """|x' - f - B u| in the middle of every piece, (K - 1,), in units of the states per s."""
+        h = np.diff(points.t)[:, None]
+        x0, x1, u0 = points.x[:-1], points.x[1:], points.u[:-1]
+        u1 = u0 if self.held else points.u[1:]
+        before, after = self.rate(x0, u0), self.rate(x1, u1)
+        middle = self.rate((x0 + x1) / 2 + h * (before - after) / 8, (u0 + u1) / 2)
+        size = np.linalg.norm(1.5 * (x1 - x0) / h - (before + after) / 4 - middle, axis=1)
+        found: Array = np.nan_to_num(size, nan=np.inf)
+        return found
+
+
+def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: float) -> Iterator[Finding]:
+    """What is amiss with a plan file that can be read; `radius` is that of the least tube."""
+    knots = table.knots
+    points = _Points(
+        t=floats(knots.t), x=np.array([*map(floats, knots.x)]), u=np.array([*map(floats, knots.u)])
+    )
+    dynamics = _Dynamics(model, held=knots.interpolation == "hold")
+    size = dynamics.defect(points)
+    worst = float(size.max())
+    speed = float(np.nanmax(np.linalg.norm(dynamics.rate(points.x, points.u), axis=1), initial=0.0))
+    known = spec.metric is not None and radius > 0
+    bearable = codes.NOTABLE_DEFECT * nearest(model.rate) * radius if known else _SHARE * speed
+    if not worst > bearable:
+        return
+    found = _time_unit(table, points, dynamics, worst) or _exchanged(spec, table, points, dynamics, worst)
+    if found is not None:
+        yield found
+        return
+    rows = _rows_apart(size)
+    for k in rows[:_ROWS]:
+        others = "" if len(rows) <= _ROWS else f"; so do {len(rows) - _ROWS} more rows"
+        yield _finding(
+            codes.PLAN_DEFECT,
+            f"the row at t = {points.t[k]:.4g} s does not belong: the plan misses x*' = f + B u* by "
+            f"{_beside(size, k):.3g} beside it, and by {float(np.median(size)):.3g} elsewhere{others}",
+            _row(table, k),
+            "correct the row, or leave it out",
+        )
+    if not rows:
+        k = int(np.argmax(size))
+        yield _finding(
+            codes.PLAN_DEFECT,
+            f"the plan misses x*' = f + B u* by {worst:.3g} between t = {points.t[k]:.4g} s and "
+            f"t = {points.t[k + 1]:.4g} s",
+            _row(table, k),
+            "see whether it is a plan of this system, in its units, and give more knots there; what is missing is "
+            "paid for in the gains",
+        )
+
+
+def _time_unit(table: Table, points: _Points, dynamics: _Dynamics, worst: float) -> Finding | None:
+    """Times that are no seconds."""
+    tried = [
+        (float(dynamics.defect(replace(points, t=points.t / factor)).max()), factor, unit)
+        for factor, unit in _UNITS
+    ]
+    other, factor, unit = min(tried)
+    if not other < _FALLS * worst:
+        return None
+    return _finding(
+        codes.PLAN_TIME_UNIT,
+        f"the times seem to be in {unit}: the plan misses x*' = f + B u* by {worst:.3g}, and by {other:.3g} with t "
+        f"divided by {factor:g}",
+        table.header,
+        "give t in s",
+    )
+
+
+def _exchanged(
+    spec: Spec, table: Table, points: _Points, dynamics: _Dynamics, worst: float
+) -> Finding | None:
+    """Two columns of states, or of inputs, that are exchanged."""
+    tried = [
+        (float(dynamics.defect(exchange(points, pair)).max()), names[pair[0]], names[pair[1]])
+        for names, exchange in ((spec.states, _states), (spec.inputs, _inputs))
+        for pair in combinations(range(len(names)), 2)
+    ]
+    other, one, another = min(tried, default=(worst, "", ""))
+    if not other < _FALLS * worst:
+        return None
+    return _finding(
+        codes.PLAN_EXCHANGED,
+        f"the columns {one} and {another} seem to be exchanged: the plan misses x*' = f + B u* by {worst:.3g}, and by "
+        f"{other:.3g} with the two exchanged",
+        table.header,
+        "exchange the two names in the first line",
+    )
+
+
+def _states(points: _Points, pair: tuple[int, int]) -> _Points:
+    return replace(points, x=_swapped(points.x, pair))
+
+
+def _inputs(points: _Points, pair: tuple[int, int]) -> _Points:
+    return replace(points, u=_swapped(points.u, pair))
+
+
+def _swapped(rows: Array, pair: tuple[int, int]) -> Array:
+    columns = list(range(rows.shape[1]))
+    i, j = pair
+    columns[i], columns[j] = j, i
+    return rows[:, columns]
+
+
+def _rows_apart(size: Array) -> list[int]:
+    """Knots on both sides of which the plan misses far more than in most places, and more than beside them."""
+    most = float(np.median(size))
+    found = [k for k in range(1, len(size)) if _beside(size, k) > _STANDS_OUT * most]
+    return [k for k in found if _beside(size, k) >= max(_beside(size, k - 1), _beside(size, k + 1))]
+
+
+def _beside(size: Array, k: int) -> float:
+    """The lesser defect of the two pieces at an inner knot; 0 at an end."""
+    return float(min(size[k - 1], size[k])) if 0 < k < len(size) else 0.0
+
+
+def _row(table: Table, k: int) -> Location | None:
+    return table.rows[k] if k < len(table.rows) else None
+
+
+def _finding(code: str, message: str, location: Location | None, help: str) -> Finding:
+    return Finding(code=code, severity=Severity.WARNING, message=message, location=location, help=help)
