@@ -268,3 +268,12 @@ def test_an_end_of_a_range_is_exact_unless_it_is_a_multiple_of_pi():
     assert end(Fraction(-1, 10)) == "-0.1"
     assert end(Fraction(1, 3)) == "1/3"
     assert end(Fraction("0.5235987755982988730771072305")) == "0.523598775598"
+
+
+def test_a_rho_a_that_is_cut_down_is_told():
+    """Within half-widths rho_a is what the start leaves, at most."""
+    result = certified()
+    words = "--rho-a 5 is more than the start leaves"
+    assert words not in shown(result)
+    result["overrides"]["rho_a"] = 5
+    assert words in " ".join(shown(result).split())

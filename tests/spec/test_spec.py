@@ -625,3 +625,11 @@ def test_the_problems_of_a_file_travel() -> None:
     other = pickle.loads(pickle.dumps(caught.value))
     assert other.findings == caught.value.findings
     assert other.exit_code == caught.value.exit_code
+
+
+def test_a_blank_that_is_missing_is_asked_for():
+    (path,) = [path for path in BAD if path.stem == "missing_blank"]
+    text = path.read_text(encoding="utf-8")
+    with pytest.raises(SpecError) as caught:
+        load_text(text, "spec.yaml")
+    assert [item.help for item in caught.value.findings] == ["write `x: 0.001`, with a blank after the colon"]

@@ -47,6 +47,10 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     from tubecert import spec
 
     system = spec.load(given["spec"], settings)
+    if given["metric"] is not None:
+        from tubecert.spec.metric_file import with_metric
+
+        system = with_metric(system, str(given["metric"]))
     wishes = wishes_of(system, numbers, chosen, None if given["gains"] is None else str(given["gains"]))
     folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
     from tubecert.simulate.certified import require_plan
@@ -93,7 +97,9 @@ def _certificate(
         return system, certified
     from tubecert import pipeline
 
-    options = pipeline.Options(epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"])
+    options = pipeline.Options(
+        epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"], metric=given["metric"]
+    )
     _tell("no certificate is given: certifying first")
 
     def show(step: pipeline.Step) -> None:

@@ -81,6 +81,10 @@ def simulate(
     sample_time: Annotated[
         str | None, number_option("--sample-time", "Choose the sample time of sampled, in s.")
     ] = None,
+    metric: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A metric file, as for certify (without --certificate)."),
+    ] = None,
     set_: Settings = None,
     epsilon: Annotated[
         str | None, number_option("--epsilon", "Overrides tube.epsilon (without --certificate).")
@@ -98,6 +102,8 @@ def simulate(
     given = dict(locals())
     if certificate is not None and (epsilon is not None or rho_a is not None):
         raise typer.BadParameter("a certificate has its own epsilon and rho_a", ctx=context)
+    if certificate is not None and metric is not None:
+        raise typer.BadParameter("a certificate has its own metric", ctx=context)
     if certificate is not None and set_:
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context

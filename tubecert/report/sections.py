@@ -203,6 +203,10 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.coordinates is not None:
         lines[0] += " (lengths in the coordinates of the tube)"
         lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
+    if (asked := result.overrides.rho_a) is not None and tube.rho_r is not None and tube.rho_a < asked:
+        lines.append(
+            f"--rho-a {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
+        )
     lines += clearances(result)
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]

@@ -112,7 +112,9 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     delay = None if one_sample else _size(entries, "delay", names, default=Fraction(0))
     if delay is not None and sample_time is not None and delay > sample_time:
         entries["delay"].fail(
-            codes.RANGE, "hardware.delay is longer than the sample time", f"it may be at most {ONE_SAMPLE}"
+            codes.RANGE,
+            "hardware.delay is longer than the sample time",
+            f"write `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep over hardware.rate, too), or less",
         )
     feedback = _positive(entries, "feedback_rate", names)
     found = (

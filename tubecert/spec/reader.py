@@ -384,6 +384,12 @@ class Field:
         message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
         if not key.text.isascii():
             message += " (it contains letters outside ASCII)"
+        name, colon, value = key.text.partition(":")
+        if colon and name in known:  # {x:1}, which YAML reads as one word
+            self._at(
+                codes.UNKNOWN_KEY, key, message, f"write `{name}: {value[:40]}`, with a blank after the colon"
+            )
+            return [name]
         advice = _OTHER_KEYS.get(key.text) or suggestion(key.text, known, what="known keys")
         self._at(codes.UNKNOWN_KEY, key, message, advice)
         return [] if key.text in _OTHER_KEYS else near(key.text, known)
