@@ -46,13 +46,14 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     chosen = controllers_of(given["controllers"], flag)
     from tubecert import spec
 
-    system = spec.load(given["spec"], settings)
-    if given["metric"] is not None:
+    file, gains, metric = (given[name] for name in ("spec", "gains", "metric"))
+    system = spec.load(file, settings)
+    if metric is not None:
         from tubecert.spec.metric_file import with_metric
 
-        system = with_metric(system, str(given["metric"]))
-    wishes = wishes_of(system, numbers, chosen, None if given["gains"] is None else str(given["gains"]))
-    folder = given["output"] or f"{Path(given['spec']).stem}.simulation"
+        system = with_metric(system, str(metric))
+    wishes = wishes_of(system, numbers, chosen, None if gains is None else str(gains))
+    folder = given["output"] or f"{Path(file).stem}.simulation"
     from tubecert.simulate.certified import require_plan
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
