@@ -44,34 +44,32 @@ def pad(at: Digital) -> Fraction:
 
 def along(windows: Sequence[Window], promise: Promise) -> tuple[Passed, ...] | None:
     """What theorem HW gives; None where a condition beside those of the levels, (H.25), is not proven."""
-    found: list[Passed] = []
-    last: _Stage | None = None
     for window in windows:
         if not window.at.sensible or promise.predicts != (window.at.prediction is not None):
             return None
         if window.length < pad(window.at):
             return None
-        last = _Stage(window, promise, last)
-        own = last.found()
-        if own is None:
+    found = []
+    for window, stage in zip(windows, stages(windows, promise), strict=True):
+        if not stage.serves():
             return None
-        last.left = own
-        found.append(
-            Passed(
-                level=last.at.level,
-                loop=own,
-                reach=root(window.setting.n.lower) * exact(window.setting.rho),
-            )
-        )
+        reach = root(window.setting.n.lower) * exact(window.setting.rho)
+        found.append(Passed(level=stage.at.level, loop=stage.left, reach=reach))
     return tuple(found)
 
 
-class _Stage(Evaluation):
-    """One window after another one, or the first one."""
+def stages(windows: Sequence[Window], promise: Promise) -> tuple[Stage, ...]:
+    """Every window after the one before it, whether its conditions hold or not."""
+    found: list[Stage] = []
+    for window in windows:
+        found.append(Stage(window, promise, found[-1] if found else None))
+    return tuple(found)
 
-    left: Loop
 
-    def __init__(self, window: Window, promise: Promise, before: _Stage | None) -> None:
+class Stage(Evaluation):
+    """One window after another one, or the first one; `left` is what follows in it."""
+
+    def __init__(self, window: Window, promise: Promise, before: Stage | None) -> None:
         self.before, self.length, self.own_level = before, window.length, window.at.level
         system = replace(window.setting.system, horizon=window.length)
         setting = replace(window.setting, system=system)
@@ -85,6 +83,7 @@ class _Stage(Evaluation):
         if before is not None:
             self.kb, self.ups, self.X = map(larger, self.own, before.own)
         self.noisy = self._noise()
+        self.left = self.course()
 
     def remembered(self) -> Ball:
         """What bounds the noise-free error of the estimate where the pad of the next window begins: (H.22)."""

@@ -148,7 +148,8 @@ def loop(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digita
     """What theorem H gives at a recipe; None where one of its conditions beside (H.10), (H.12) is not proven."""
     if not at.sensible or promise.predicts != (at.prediction is not None):
         return None
-    return Evaluation(setting, machine, promise, at).found()
+    own = Evaluation(setting, machine, promise, at)
+    return own.course() if own.serves() else None
 
 
 def proposed(
@@ -299,12 +300,11 @@ class Evaluation:
         prediction = arb(0) if self.at.prediction is None else self._prediction()
         return Y, self._bias(), self.ripple(), prediction
 
-    def found(self) -> Loop | None:
-        """Everything, if the side conditions hold."""
+    def serves(self) -> bool:
+        """Whether the side conditions hold."""
         Y, S, N, seen = self.needed()
-        if not (Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)):
-            return None
-        return self.course() if self.bending() > 0 else None
+        enough = Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)
+        return bool(enough and self.bending() > 0)
 
     # -- the estimate
 
