@@ -234,14 +234,16 @@ def _follow(course: Course) -> Outcome:
     return CONFIRMED
 
 
-def claims_of_levels(course: Course, recipe: Digital, margins: Callable[..., Outcome]) -> Iterator[Claim]:
-    """Every window's level by the recipe, and what follows from it; `margins` examines those that are printed."""
+def claims_of_levels(
+    course: Course, recipe: Digital, section: object, margins: Callable[..., Outcome]
+) -> Iterator[Claim]:
+    """Every window's level by the recipe, and what follows from it; `margins` examines what `section` tells of all."""
     ground, windows = course.ground, course.windows
     parts = (windows, recipe)
     yield ground.claim("H: the recipe is that of the windows", parts, lambda: _agrees(windows, recipe))
     yield ground.claim(
         f"H: d stays below its level in each of {len(windows)} windows",
-        parts,
+        (section, recipe),
         lambda: _hold(course, recipe, margins),
     )
     for j, window in enumerate(windows, start=1):
@@ -325,7 +327,7 @@ def _inputs(course: Course, j: int, recipe: Digital) -> Iterator[Claim]:
         if own is not None:
             yield ground.over_tube(
                 f"H: window {j}: {name} in [{float(own[0]):.6g}, {float(own[1]):.6g}]",
-                (course.windows, recipe, j, own, ground.depends),
+                (course.windows, course.clip, recipe, j, own, ground.depends),
                 lambda i=i, own=own: _in_range(course, j, i, own, recipe),  # type: ignore[misc]
             )
 
