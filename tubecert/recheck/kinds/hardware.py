@@ -173,7 +173,7 @@ def _in_windows(section: HardwareSection, recipe: Digital, ground: Ground) -> It
     """Theorem HW in place of theorem H."""
     course = _course(section, recipe, ground)
     yield from claims_of_levels(
-        course, recipe, lambda found: _told_of_windows(section, recipe, found, ground)
+        course, recipe, section, lambda found: _told_of_windows(section, recipe, found, ground)
     )
     yield ground.claim(
         "H: what is told of the whole holds in every window", (section,), lambda: _covers(section, ground)
