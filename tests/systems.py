@@ -137,3 +137,16 @@ metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}
 tube: {epsilon: 0.2, rho_a: 0.1}
 adaptation: {A_m: -10}
 """
+
+# the same on a plan that comes to rest, with windows and a machine of which every term is alive
+IN_WINDOWS = (
+    SMALL.replace(
+        "{kind: equilibrium, at: [0, 0], input: [0]}",
+        '{kind: expressions, horizon: 2, x: ["0.3*exp(-2*t)", "-0.3*exp(-2*t)"],'
+        ' u: ["0.3*exp(-2*t) - 0.3*sin(0.3*exp(-2*t))"]}',
+    )
+    .replace("at: [0.05, 0]", "at: [0.35, -0.3]")
+    .replace("rho_a: 0.1}", "rho_a: 0.1, windows: [0.3, 0.9]}")
+    + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0002, y: 0.0005}}\n"
+    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
+)

@@ -12,13 +12,18 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
+
+import numpy as np
 
 from tubecert import pipeline
 from tubecert.simulate.campaign import Attack, simulate
+from tubecert.simulate.promise import Levels
+from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
 from tubecert.spec import load_text
 
@@ -29,12 +34,13 @@ WIND = "disturbance: {E: [[1, 0], [0, 1]], bound: 1/20}\n"
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A configuration, and what is added to it."""
+    """A configuration, and what is added to it; as it is shipped, if nothing is."""
 
     config: str
     hardware: str
     wind: str = ""
     duration: str = "3"
+    windows: str = ""
 
 
 ROWS = {
@@ -50,6 +56,12 @@ ROWS = {
         "two_state_orbit", "{sample_time: 1/500, delay: 1/2000, noise: 1/10000, feedback_rate: 1000}"
     ),
     "transfer": Row("two_state", "{sample_time: 1/2000, delay: 1/4000, noise: 1/2000}"),
+    "windows": Row("two_state", "{rate: 500}", duration="5", windows="10"),
+    "noisy windows": Row(
+        "two_state", "{rate: 1000, delay: 1/2000, noise: 1/1000}", duration="5", windows="[0.5, 1, 2, 3]"
+    ),
+    "orbit as shipped": Row("hardware_orbit", ""),
+    "three as shipped": Row("hardware_three", "", duration="6"),
     "curved": Row("three_state", "{sample_time: 1/200, delay: 0, noise: 1/10000}", duration="6"),
 }
 
@@ -57,7 +69,9 @@ ROWS = {
 def certified(row: Row) -> tuple[Setting, Loop]:
     """The setting of a row and its certified loop."""
     text = (CONFIGS / f"{row.config}.yaml").read_text("utf-8")
-    spec = load_text(f"{text}\nhardware: {row.hardware}\n{row.wind}")
+    if row.windows:
+        text = text.replace("rho_a: 0.1}", f"rho_a: 0.1, windows: {row.windows}}}")
+    spec = load_text(f"{text}\nhardware: {row.hardware}\n{row.wind}" if row.hardware else text)
     setting = setting_of(
         spec, pipeline.certify(spec, pipeline.Options(conditions="hardware")), Fraction(row.duration)
     )
@@ -103,6 +117,21 @@ def shares(found: Attack) -> dict[str, float]:
     return most
 
 
+def by_window(loop: Loop, found: Iterable[Runs | None]) -> list[float]:
+    """The largest d(x*, x) of every window per level of it, at the times of output; nothing without windows."""
+    own = None if loop.promise is None else loop.promise.decay
+    if not isinstance(own, Levels):
+        return []
+    most = [0.0] * len(own.levels)
+    for runs in found:
+        if runs is not None:
+            greatest = np.nanmax(runs.distance, axis=0) / own(runs.t)
+            for j, (begin, end) in enumerate(pairwise((0.0, *own.ends))):
+                inside = (runs.t >= begin) & (runs.t <= end)
+                most[j] = max(most[j], float(greatest[inside].max()))
+    return most
+
+
 def _broken(found: Attack) -> Iterator[str]:
     for comparison in (found.comparison, found.worst_comparison):
         assert comparison is not None
@@ -131,6 +160,9 @@ def main() -> None:
             failed = failed or (scale == 1 and bool(broken))
             row = " ".join(f"{most.get(q, 0.0):11.4f}" for q in (*QUANTITIES, "u"))
             line = f"{name:10} {scale:5g} {count:6} {row}  {time.perf_counter() - started:.0f} s"
+            runs = (found.sample and found.sample.runs, found.worst)
+            windows = "".join(f" {share:.3f}" for share in by_window(loop, runs))
+            line += f"  d/level by window:{windows}" if windows else ""
             print(f"{line}  {'BROKEN: ' + ', '.join(broken) if broken else ''}", flush=True)
     raise SystemExit(int(failed))
 

@@ -6,22 +6,11 @@ import copy
 
 import pytest
 from rechecked import case_of, certified, examine, failing, sealed
-from systems import SMALL
+from systems import IN_WINDOWS
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.claims import of_certified
 
-MOVING = (
-    SMALL.replace(
-        "{kind: equilibrium, at: [0, 0], input: [0]}",
-        '{kind: expressions, horizon: 2, x: ["0.3*exp(-2*t)", "-0.3*exp(-2*t)"],'
-        ' u: ["0.3*exp(-2*t) - 0.3*sin(0.3*exp(-2*t))"]}',
-    )
-    .replace("at: [0.05, 0]", "at: [0.35, -0.3]")
-    .replace("rho_a: 0.1}", "rho_a: 0.1, windows: [0.3, 0.9]}")
-)
-MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0002, y: 0.0005}}\n"
-WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
 CHEAP = ("H: windows follow", "H: the machine is", "H: the recipe is")
 BUDGET = 4000  # boxes for each claim
 INSIDE = "H: d stays below its level in each of 3 windows"
@@ -31,7 +20,7 @@ H, PROOF, SPEC = ("hardware",), ("proof", "hardware"), ("spec", "effective")
 @pytest.fixture(scope="module")
 def honest():
     """A certificate with three windows in which every term is alive, and outcomes that forged ones share with it."""
-    document, memory = certified(MOVING + MACHINE + WIND, conditions="hardware"), {}
+    document, memory = certified(IN_WINDOWS, conditions="hardware"), {}
     assert document["result"]["verdict"] == "certified", document["result"]["reasons"]
     found = examine(document, BUDGET, memory=memory)
     assert failing(found) == []

@@ -89,7 +89,7 @@ def read(problem, recipe, module=own) -> tuple[list[own.Window], object]:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 @given(courses())
 def test_both_readings_of_theorem_hw_agree(case):
     problem, recipe = case
