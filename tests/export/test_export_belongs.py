@@ -80,6 +80,19 @@ def test_recheck_reads_the_same_formulas(name):
     assert max(float(ball.rad()) for row in found for ball in row) < 1e-30
 
 
+def in_the_loop(target, folder):
+    """The compiled code drives the plant for a while."""
+    arguments = ["simulate", str(controllers.CONFIGS / "hardware_orbit.yaml"), "--controller", str(folder)]
+    assert CliRunner().invoke(app, arguments, prog_name="tubecert").exit_code == 2  # of which certificate?
+    arguments += ["--certificate", str(target), "--runs", "4", "--duration", "0.2", "--json"]
+    run = CliRunner().invoke(app, arguments, prog_name="tubecert")
+    assert run.exit_code == 0, run.output
+    found = json.loads(run.stdout)
+    assert (found["runs"], found["samples"], found["escapes"], found["told"]) == (4, 100, [], 0)
+    assert found["difference"] <= 1e-12 * found["scale"]
+    assert 1e-3 < found["distance"] < found["level"]
+
+
 @needs_cc
 @pytest.mark.slow
 def test_a_certificate_its_code_and_what_is_refused(tmp_path):
@@ -97,6 +110,7 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     other = exported(controller_of(own), "python")
     other.save(str(tmp_path / "python"))
     assert examined(str(tmp_path / "python"), own, text, target.name).difference < 1e-13
+    in_the_loop(target, folder)
     source = folder / "hardware_orbit.c"
     code = source.read_text("utf-8")
     source.write_text(code.replace("0.25 * before", "0.24 * before"), "utf-8")

@@ -17,6 +17,7 @@ Examples:
   tubecert simulate plant.yaml
   tubecert simulate plant.yaml --certificate plant.certificate.json --runs 1000 -o plant.runs
   tubecert simulate plant.yaml --controllers ccm,l1,sampled --control-rate 500
+  tubecert simulate plant.yaml --certificate plant.certificate.json --controller plant.controller
   tubecert simulate plant.yaml --bandwidth 20 --adaptation-rate 1e5
 
 \b
@@ -44,6 +45,12 @@ def simulate(
     certificate: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Its certificate; without one, simulate certifies first."),
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Compile the exported C in it, and let it drive: processor in the loop."
+        ),
     ] = None,
     controllers: Annotated[
         str | None,
@@ -108,8 +115,15 @@ def simulate(
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context
         )
+    if controller is not None and certificate is None:
+        raise typer.BadParameter("a controller is that of a certificate: --certificate FILE", ctx=context)
     with guarded(how):
-        from tubecert.cli.simulate import run
+        if controller is not None:
+            from tubecert.cli.driving import drive
 
-        code = run(given, how)
+            code = drive((str(spec), str(certificate), str(controller)), (runs, seed, duration), how)
+        else:
+            from tubecert.cli.simulate import run
+
+            code = run(given, how)
     raise typer.Exit(code)

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Final, Literal, TypeAlias
 
 from tubecert.expression import Expression, topological
@@ -46,7 +47,7 @@ class Port:
     places: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Program:
     """Steps in their order, what goes in and what comes out."""
 
@@ -55,6 +56,11 @@ class Program:
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     steps: tuple[Step, ...]
+
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """The constants as floats, by place; 0 elsewhere."""
+        return tuple(float(step.value) for step in self.steps)
 
     @property
     def operations(self) -> dict[str, int]:

@@ -24,8 +24,8 @@ def execute(program: Program, *given: Array, real: type = np.float64) -> tuple[A
     memory: list[Array] = []
     inputs = {port.name: values for port, values in zip(program.inputs, given, strict=True)}
     with np.errstate(all="ignore"):
-        for step in program.steps:
-            memory.append(_value(step, memory, inputs, real))
+        for step, number in zip(program.steps, program.numbers, strict=True):
+            memory.append(_value(step, real(number), memory, inputs, real))
     lanes = max(len(value) for value in given)
     return tuple(
         np.stack([np.broadcast_to(memory[p], (lanes,)) for p in port.places], axis=1)
@@ -33,11 +33,11 @@ def execute(program: Program, *given: Array, real: type = np.float64) -> tuple[A
     )
 
 
-def _value(step: Step, memory: list[Array], given: Mapping[str, Array], real: type) -> Array:
+def _value(step: Step, number: Array, memory: list[Array], given: Mapping[str, Array], real: type) -> Array:
     if step.operation == "input":
         return np.asarray(given[step.name][:, step.index], dtype=real)
     if step.operation == "constant":
-        return np.asarray(float(step.value), dtype=real)
+        return number
     args = [memory[place] for place in step.places]
     if step.operation == "call":
         function = _NUMPY.get(step.name) or getattr(np, step.name)
@@ -120,12 +120,18 @@ class Reference:
             return x, u
         return _on_pieces(c.pieces, t, real) if c.pieces is not None else (t, t)
 
-    def _law(self, y: Array, t: Array) -> tuple[Array, Array]:
+    def kappa(self, y: Array, t: Array) -> tuple[Array, Array]:
+        """The feedback (N, m) of (0.5) at (x*(t), y), and d(x*, y)^2 (N,)."""
         c, real = self.controller, self.real
         x, u = self.plan(t)
         (f,), (v,) = execute(c.drift, y, real=real), execute(c.flow, x, u, real=real)
-        kappa, told = execute(c.law, y, f, x, v, u, real=real)
-        return kappa + (u if c.adds_plan else real(0)), told[:, 0]
+        found, told = execute(c.law, y, f, x, v, u, real=real)
+        return found, told[:, 0]
+
+    def _law(self, y: Array, t: Array) -> tuple[Array, Array]:
+        """The same, with u* where that is held."""
+        kappa, square = self.kappa(y, t)
+        return (kappa + self.plan(t)[1] if self.controller.adds_plan else kappa), square
 
     def _mean(self) -> Array:
         """The mean of the inputs over the last sample, (N, m)."""
