@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from tubecert import certificate
 from tubecert.cli.app import app
 from tubecert.errors import TubecertError
-from tubecert.export.compiled import COMPILERS, compiler
+from tubecert.export.compiled import COMPILERS, compiled, compiler
 from tubecert.export.controller import controller_of
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
@@ -151,3 +151,19 @@ def test_code_that_answers_otherwise_is_found(monkeypatch):
     y = [[exact(Fraction(q)) for q in row] for row in vectors(controllers.orbit()).y[:4]]
     found = [float(row[0].mid()) for row in own.answers(y)]
     assert max(abs(a - b[0]) for a, b in zip(found, vectors(controllers.orbit()).u, strict=False)) > 1e-3
+
+
+def test_without_a_compiler_it_says_so(monkeypatch):
+    monkeypatch.setattr("tubecert.export.compiled.shutil.which", lambda name: None)
+    with (
+        pytest.raises(TubecertError, match="no C compiler on PATH") as error,
+        compiled(exported(controllers.orbit())),
+    ):
+        pass
+    assert error.value.findings[0].code == "TC712"
+
+
+def test_a_constant_that_is_no_float_is_refused_in_single_precision():
+    given = controllers.machine(TEXTS["orbit"], recipe=controllers.recipe(clip_radius=Fraction(10) ** 40))
+    with pytest.raises(TubecertError, match="too large"):
+        exported(controllers.assembled(given), precision="single")

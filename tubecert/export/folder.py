@@ -59,7 +59,7 @@ def exported(controller: Controller, language: Language = "c", precision: Precis
     said = {name: what for name, (what, _) in own.items()} | {MANIFEST: "what these files are, for tubecert"}
     files = {name: text for name, (_, text) in own.items()}
     files[MANIFEST] = json.dumps(manifest, indent=1, sort_keys=True) + "\n"
-    files["README.md"] = readme(controller, said, precision=precision)
+    files["README.md"] = readme(controller, said, precision=precision if language == "c" else None)
     return Exported(controller=controller, language=language, precision=precision, files=files)
 
 

@@ -9,6 +9,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from tubecert.export.controller import refused
 from tubecert.export.program import Program, Step
 
 _WIDEST: Final = 72  # characters of what is written in place
@@ -99,7 +100,10 @@ def decimal(value: Fraction, *, single: bool = False) -> str:
 
 def _single(value: Fraction) -> np.float32:
     """The nearest `float` to a fraction: rounded once, not by way of `double`."""
-    near = np.float32(float(value))
+    with np.errstate(over="ignore"):
+        near = np.float32(float(value))
+    if not np.isfinite(near):
+        raise refused(f"{float(value):g} is no float: it is too large", "export it in double")
     below, above = np.nextafter(near, np.float32(-np.inf)), np.nextafter(near, np.float32(np.inf))
     return min(
         (x for x in (near, below, above) if np.isfinite(x)), key=lambda x: abs(Fraction(float(x)) - value)

@@ -25,12 +25,12 @@ def heading(controller: Controller) -> str:
     return f"{controller.system}: the controller of certificate H. Written by tubecert export; do not edit."
 
 
-def readme(c: Controller, files: Mapping[str, str], *, precision: str) -> str:
-    """README.md of the folder."""
+def readme(c: Controller, files: Mapping[str, str], *, precision: str | None) -> str:
+    """README.md of the folder; the precision of C, None for Python."""
     return "\n".join(_readme(c, files, precision)) + "\n"
 
 
-def _readme(c: Controller, files: Mapping[str, str], precision: str) -> Iterator[str]:
+def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> Iterator[str]:
     yield f"# The controller of {c.system}"
     yield ""
     yield "Written by `tubecert export` from the certificate"
@@ -43,7 +43,7 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str) -> Iterator
     yield "## What is proven of it"
     yield ""
     yield "The certificate proves that this loop keeps the state in its tube, for the noise, wind and uncertainty"
-    yield f"that it names, with this sample time and delay. Arithmetic: `{precision}`."
+    yield f"that it names, with this sample time and delay. Arithmetic: `{precision or 'double'}`."
     yield ""
     yield from NOT_COVERED
     yield ""
@@ -76,14 +76,15 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str) -> Iterator
     yield ""
     yield "## What a step costs"
     yield ""
-    yield "At most, whatever is measured (assignments and the tests of loops are not counted):"
+    yield "At most, whatever is measured (assignments, comparisons and indices are not counted):"
     yield ""
     yield "| operation | times |"
     yield "|---|---|"
     for name, count in sorted(operations(c).items()):
         yield f"| {_OPERATIONS.get(name, name)} | {count} |"
-    yield ""
-    yield "There is no allocation, no recursion, and no loop without a bound."
+    if precision is not None:
+        yield ""
+        yield "There is no allocation, no recursion, and no loop without a bound."
 
 
 _OPERATIONS: Final = {
