@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate, pipeline
+from tubecert.cli.corridor import Asked, corridor, pareto, refused
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import PARAMETER, settings_of
@@ -32,6 +33,7 @@ from tubecert.spec.override import Setting
 from tubecert.spec.source import read_source
 
 if TYPE_CHECKING:
+    from tubecert.certificate.result import Result
     from tubecert.pipeline.design import Design
     from tubecert.spec import Spec
 
@@ -42,6 +44,8 @@ class Given:
 
     spec: str
     minimise: str | None
+    corridor: str | None
+    pareto: str | None
     settings: Sequence[str]
     metric: Path | None
     gap: str
@@ -50,7 +54,7 @@ class Given:
 
 
 def run(given: Given, output: Output) -> ExitCode:
-    """Try tubes of every size, and write the certificate of the narrowest."""
+    """Try tubes of every size, and write the certificate of the narrowest; or what a tube asks of the machine."""
     numbers = Numbers()
     gap = numbers.positive("--gap", given.gap, below=1)
     budget = numbers.count("--budget", given.budget)
@@ -61,11 +65,13 @@ def run(given: Given, output: Output) -> ExitCode:
     fixed = settings_of({PARAMETER: given.settings, "metric": given.metric})
     source = read_source(given.spec)
 
-    def at(settings: Sequence[Setting]) -> Spec:
-        found = load_source(source, (*fixed, *settings))
+    def load(settings: Sequence[Setting]) -> Spec:
+        # what a design sets itself takes the place of what the command line says of the same key
+        kept = [own for own in fixed if not any(each.covers(own.path) for each in settings)]
+        found = load_source(source, (*kept, *settings))
         return found if given.metric is None else with_metric(found, str(given.metric))
 
-    first = at(())
+    first = load(())
     _check(first)
     from tubecert.pipeline.design import narrowest
 
@@ -74,7 +80,17 @@ def run(given: Given, output: Output) -> ExitCode:
     measure = _minimised(first, given.minimise)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        found = narrowest(lambda scale: at(_scaled(first, scale)), options, measure, report)
+        if given.corridor is not None or given.pareto is not None:
+            asked = Asked(
+                target=target,
+                load=load,
+                seal=_certificate,
+                options=options,
+                measure=measure,
+                progress=report,
+            )
+            return _traded(given, asked, output, lambda scale: _scaled(first, scale))
+        found = narrowest(lambda scale: load(_scaled(first, scale)), options, measure, report)
     text = _sealed(found)
     if text is not None:
         certificate.write_text(target, text)
@@ -128,10 +144,24 @@ def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:
     return [Setting.of(f"{key}={number_text(value * scale)}") for key, value in sizes.items()]
 
 
+def _traded(
+    given: Given, asked: Asked, output: Output, scaled: Callable[[Fraction], list[Setting]]
+) -> ExitCode:
+    """What a tube asks of the machine."""
+    if given.corridor is not None and given.pareto is not None:
+        raise refused("--corridor", "it is beside --pareto", "give one of the two")
+    if given.corridor is not None:
+        return corridor(given.corridor, asked, output)
+    return pareto(given.pareto or "", asked, output, scaled)
+
+
 def _sealed(found: Design) -> str | None:
     """The certificate of the best attempt, as a text."""
-    if found.best is None:
-        return None
+    return None if found.best is None else _certificate(found.best.result)
+
+
+def _certificate(result: Result) -> str:
+    """A certificate as a text."""
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     run = {"command": command, "versions": versions()}
-    return certificate.dump(certificate.seal(found.best.result.to_json(), run))
+    return certificate.dump(certificate.seal(result.to_json(), run))

@@ -14,10 +14,13 @@ _AFTER = """\b
 Examples:
   tubecert design configs/hardware_orbit.yaml
   tubecert design plant.yaml --minimise px,pz --set hardware.rate=250
+  tubecert design plant.yaml --corridor px=0.2,pz=0.2
+  tubecert design plant.yaml --pareto tube,hardware.rate
 
 \b
 The tube of the specification is scaled up and down; every attempt is a full certification of the kind that
 decides (conditions.decides, normally H: the machine), and the narrowest one that is certified is written.
+With --corridor the tube is given: what is written is the lowest rate, the largest delay, noise and wind, each alone.
 
 \b
 Exit codes: 0 a tube was found; 1 none, and a claim is refuted; 2 invalid input; 4 none.
@@ -42,6 +45,22 @@ def design(
             show_default=False,
         ),
     ] = None,
+    corridor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R|STATE=WIDTH,...",
+            help="The cheapest machine for this tube, in place of the narrowest tube.",
+            show_default=False,
+        ),
+    ] = None,
+    pareto: Annotated[
+        str | None,
+        typer.Option(
+            metavar="tube,KEY",
+            help="The tube against hardware.rate, .delay, .noise or disturbance.bound, as a front of certificates.",
+            show_default=False,
+        ),
+    ] = None,
     set_: Settings = None,
     metric: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
@@ -62,6 +81,8 @@ def design(
         given = Given(
             spec=spec,
             minimise=minimise,
+            corridor=corridor,
+            pareto=pareto,
             settings=set_ or (),
             metric=metric,
             gap=gap,
