@@ -6,10 +6,10 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate, pipeline
 from tubecert.cli.corridor import Asked, corridor, pareto, refused
@@ -38,6 +38,16 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec
 
 
+SEARCH: Final = "search"
+
+
+@dataclass(slots=True)
+class _Held:
+    """The file of the metric that stands for the specification's own."""
+
+    file: str | None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Given:
     """What the command line says, as texts."""
@@ -47,7 +57,7 @@ class Given:
     corridor: str | None
     pareto: str | None
     settings: Sequence[str]
-    metric: Path | None
+    metric: str | None
     gap: str
     budget: str | None
     target: str | None
@@ -61,7 +71,8 @@ def run(given: Given, output: Output) -> ExitCode:
     numbers.check()
     target = given.target or f"{Path(given.spec).stem}.design.json"
     certificate.check_target(target)
-    spare(target, {"specification": given.spec, "metric file": given.metric})
+    held = _Held(None if given.metric == SEARCH else given.metric)
+    spare(target, {"specification": given.spec, "metric file": held.file})
     fixed = settings_of({PARAMETER: given.settings, "metric": given.metric})
     source = read_source(given.spec)
 
@@ -69,26 +80,26 @@ def run(given: Given, output: Output) -> ExitCode:
         # what a design sets itself takes the place of what the command line says of the same key
         kept = [own for own in fixed if not any(each.covers(own.path) for each in settings)]
         found = load_source(source, (*kept, *settings))
-        return found if given.metric is None else with_metric(found, str(given.metric))
+        return found if held.file is None else with_metric(found, held.file)
 
     first = load(())
-    _check(first)
+    _check(first, searched=given.metric == SEARCH)
     from tubecert.pipeline.design import narrowest
 
     default = pipeline.Options()
-    options = pipeline.Options(metric=given.metric, gap=gap or default.gap, budget=budget or default.budget)
+    options = pipeline.Options(gap=gap or default.gap, budget=budget or default.budget)
     measure = _minimised(first, given.minimise)
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        asked = Asked(
+            target=target, load=load, seal=_certificate, options=options, measure=measure, progress=report
+        )
+        if given.metric == SEARCH:
+            held.file = _searched(first, lambda scale: load(_scaled(first, scale)), asked)
+        if held.file is not None:
+            options = replace(options, metric=Path(held.file))
+            asked = replace(asked, options=options)
         if given.corridor is not None or given.pareto is not None:
-            asked = Asked(
-                target=target,
-                load=load,
-                seal=_certificate,
-                options=options,
-                measure=measure,
-                progress=report,
-            )
             return _traded(given, asked, output, lambda scale: _scaled(first, scale))
         found = narrowest(lambda scale: load(_scaled(first, scale)), options, measure, report)
     text = _sealed(found)
@@ -106,9 +117,9 @@ def run(given: Given, output: Output) -> ExitCode:
     return best.result.verdict.exit_code
 
 
-def _check(spec: Spec) -> None:
+def _check(spec: Spec, *, searched: bool) -> None:
     """What a design needs; raises `SpecError`."""
-    if spec.metric is None:
+    if spec.metric is None and not searched:
         raise _error(spec, "metric", "a design needs a metric", "tubecert synth, then --metric FILE")
     if spec.tube.epsilon is None and not spec.tube.half_widths:
         raise _error(spec, "tube", "a design needs a tube to begin with", "write tube: {half_widths: {...}}")
@@ -142,6 +153,33 @@ def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:
         radii = (("tube.epsilon", spec.tube.epsilon), ("tube.rho_a", spec.tube.rho_a))
         sizes = {key: value for key, value in radii if value is not None}
     return [Setting.of(f"{key}={number_text(value * scale)}") for key, value in sizes.items()]
+
+
+def _searched(spec: Spec, scaled: Callable[[Fraction], Spec], asked: Asked) -> str | None:
+    """The file of the metric that was found; None if the specification's own serves better."""
+    from tubecert.pipeline.metric_search import search
+
+    def held(own: Spec, scale: Fraction) -> Spec:
+        return replace(scaled(scale), metric=own.metric, synthesis=None)
+
+    try:
+        found = search(spec, held, asked.measure, asked.options, asked.progress)
+    except ValueError as error:
+        raise _error(
+            spec, "system.B", f"--metric search: {error}", "tubecert synth, then --metric FILE"
+        ) from error
+    best = found.best
+    if best is None and spec.metric is None:
+        best = min(found.candidates, key=lambda each: each.told, default=None)
+        if best is None:
+            help = "raise hardware.rate, shrink the safe set, or lower the wind"
+            raise _error(spec, "hardware", "no metric was found that may serve this machine", help)
+    if best is None:
+        return None
+    file = f"{asked.target.removesuffix('.json')}.metric.json"
+    certificate.check_target(file)
+    certificate.write_text(file, best.text)
+    return file
 
 
 def _traded(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,6 +13,7 @@ _AFTER = """\b
 Examples:
   tubecert design configs/hardware_orbit.yaml
   tubecert design plant.yaml --minimise px,pz --set hardware.rate=250
+  tubecert design plant.yaml --metric search
   tubecert design plant.yaml --corridor px=0.2,pz=0.2
   tubecert design plant.yaml --pareto tube,hardware.rate
 
@@ -63,7 +63,11 @@ def design(
     ] = None,
     set_: Settings = None,
     metric: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
+        str | None,
+        typer.Option(
+            metavar="FILE|search",
+            help="Metric file (JSON) in place of the specification's; or one is looked for, for this machine.",
+        ),
     ] = None,
     gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
     budget: Budget = None,
