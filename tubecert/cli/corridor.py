@@ -20,7 +20,7 @@ from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json, visible
 from tubecert.records import Json
 from tubecert.report import trade as told
-from tubecert.spec import canonical
+from tubecert.spec.canonical import hardware_data
 from tubecert.spec.hardware import LARGEST
 from tubecert.spec.override import Setting
 
@@ -158,7 +158,7 @@ def largest(spec: Spec, part: HardwarePart) -> Setting:
     """The setting that asks for the largest value of a part, the rest of the machine being as it is."""
     if part == "wind":
         return Setting(path="disturbance.bound", text=LARGEST)
-    machine: Mapping[str, Json] = canonical(spec)["hardware"]
+    machine = {} if spec.hardware is None else hardware_data(spec, spec.hardware)
     return Setting(path="hardware", text=_flow({**machine, part: LARGEST}))
 
 
@@ -172,8 +172,8 @@ def corridor_settings(words: str, asked: Asked) -> list[Setting]:
         return [Setting(path=TUBE, text=_flow({"half_widths": widths}), option=CORRIDOR)]
     numbers = Numbers()
     radius = numbers.positive(CORRIDOR, words)
-    numbers.check()
-    assert radius is not None
+    if radius is None:
+        raise SpecError(numbers.findings)
     return _radius_settings(radius, asked)
 
 

@@ -64,7 +64,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
     if spec.simulation is not None:
         data["simulation"] = _simulation(spec.simulation)
     if spec.hardware is not None:
-        data["hardware"] = _hardware(spec, spec.hardware)
+        data["hardware"] = hardware_data(spec, spec.hardware)
     if (wind := spec.disturbance) is not None:
         bound = LARGEST if wind.bound is None else number_text(wind.bound)
         data["disturbance"] = {"E": [_texts(row) for row in wind.E], "bound": bound, **_given(rate=wind.rate)}
@@ -187,7 +187,9 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     return shown | {"disc": {"center": _numbers(obstacle.center), **_given(radius=obstacle.radius)}}
 
 
-def _hardware(spec: Spec, machine: Hardware) -> dict[str, Any]:
+def hardware_data(spec: Spec, machine: Hardware) -> dict[str, Any]:
+    """The section `hardware`, with every key."""
+
     def sought(value: Fraction | None, word: str = LARGEST) -> str:
         return word if value is None else number_text(value)
 
