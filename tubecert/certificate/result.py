@@ -122,7 +122,7 @@ class PlanData:
     """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps."""
 
     kind: Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
-    interpolation: Literal["exact", "hold", "linear"] | None = None
+    interpolation: Literal["exact", "hold", "linear", "hermite-simpson"] | None = None
     curve: Literal["hermite"] | None = None
     knots: KnotTexts | None = None
     samples: Samples | None = None

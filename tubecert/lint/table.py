@@ -29,11 +29,12 @@ _SHARE: Final = 0.05  # of the speed, where it is not known what a tube can bear
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Points:
-    """Knots as floats: `t` (K,) in s, `x` (K, n), `u` (K, m)."""
+    """Knots as floats: `t` (K,) in s, `x` (K, n), `u` (K, m); `between` (K - 1, m) where u has rows there."""
 
     t: Array
     x: Array
     u: Array
+    between: Array | None = None
 
 
 class _Dynamics:
@@ -53,7 +54,8 @@ class _Dynamics:
         x0, x1, u0 = points.x[:-1], points.x[1:], points.u[:-1]
         u1 = u0 if self.held else points.u[1:]
         before, after = self.rate(x0, u0), self.rate(x1, u1)
-        middle = self.rate((x0 + x1) / 2 + h * (before - after) / 8, (u0 + u1) / 2)
+        u = (u0 + u1) / 2 if points.between is None else points.between
+        middle = self.rate((x0 + x1) / 2 + h * (before - after) / 8, u)
         size = np.linalg.norm(1.5 * (x1 - x0) / h - (before + after) / 4 - middle, axis=1)
         found: Array = np.nan_to_num(size, nan=np.inf)
         return found
@@ -62,9 +64,15 @@ class _Dynamics:
 def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: float) -> Iterator[Finding]:
     """What is amiss with a plan file that can be read; `radius` is that of the least tube."""
     knots = table.knots
+    rows = np.array([*map(floats, knots.u)])
+    each = 2 if knots.interpolation == "hermite-simpson" else 1
     points = _Points(
-        t=floats(knots.t), x=np.array([*map(floats, knots.x)]), u=np.array([*map(floats, knots.u)])
+        t=floats(knots.t[::each]),
+        x=np.array([*map(floats, knots.x[::each])]),
+        u=rows[::each],
+        between=rows[1::2] if each == 2 else None,
     )
+    places = table.rows[::each]
     dynamics = _Dynamics(model, held=knots.interpolation == "hold")
     size = dynamics.defect(points)
     worst = float(size.max())
@@ -77,23 +85,23 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
     if found is not None:
         yield found
         return
-    rows = _rows_apart(size)
-    for k in rows[:_ROWS]:
-        others = "" if len(rows) <= _ROWS else f"; so do {len(rows) - _ROWS} more rows"
+    apart = _rows_apart(size)
+    for k in apart[:_ROWS]:
+        others = "" if len(apart) <= _ROWS else f"; so do {len(apart) - _ROWS} more rows"
         yield _finding(
             codes.PLAN_DEFECT,
             f"the row at t = {points.t[k]:.4g} s does not belong: the plan misses x*' = f + B u* by "
             f"{_beside(size, k):.3g} beside it, and by {float(np.median(size)):.3g} elsewhere{others}",
-            _row(table, k),
+            places[k],
             "correct the row, or leave it out",
         )
-    if not rows:
+    if not apart:
         k = int(np.argmax(size))
         yield _finding(
             codes.PLAN_DEFECT,
             f"the plan misses x*' = f + B u* by {worst:.3g} between t = {points.t[k]:.4g} s and "
             f"t = {points.t[k + 1]:.4g} s",
-            _row(table, k),
+            places[k],
             "see whether it is a plan of this system, in its units, and give more knots there; what is missing is "
             "paid for in the gains",
         )
@@ -143,7 +151,8 @@ def _states(points: _Points, pair: tuple[int, int]) -> _Points:
 
 
 def _inputs(points: _Points, pair: tuple[int, int]) -> _Points:
-    return replace(points, u=_swapped(points.u, pair))
+    between = None if points.between is None else _swapped(points.between, pair)
+    return replace(points, u=_swapped(points.u, pair), between=between)
 
 
 def _swapped(rows: Array, pair: tuple[int, int]) -> Array:
@@ -163,10 +172,6 @@ def _rows_apart(size: Array) -> list[int]:
 def _beside(size: Array, k: int) -> float:
     """The lesser defect of the two pieces at an inner knot; 0 at an end."""
     return float(min(size[k - 1], size[k])) if 0 < k < len(size) else 0.0
-
-
-def _row(table: Table, k: int) -> Location | None:
-    return table.rows[k] if k < len(table.rows) else None
 
 
 def _finding(code: str, message: str, location: Location | None, help: str) -> Finding:

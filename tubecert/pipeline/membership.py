@@ -86,7 +86,7 @@ def _boxes(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator
         yield _stays(f"{name}*", curve, plan, high, effort)
         yield _stays(f"{name}*", -curve, plan, -low, effort)
     for j, (name, (low, high)) in enumerate(zip(family.inputs, bundle.u, strict=True)):
-        if plan.knots is None:
+        if plan.knots is None or plan.knots.interpolation == "hermite-simpson":
             yield _stays(f"{name}*", plan.u[j], plan, high, effort)
             yield _stays(f"{name}*", -plan.u[j], plan, -low, effort)
         else:  # held or linear between knots: no further out than at one of them

@@ -44,7 +44,7 @@ def _specification(result: Result) -> Iterator[tuple[bool, str]]:
     if plan.interpolation is not None:
         between = "exact"
         if isinstance(trajectory, (Tabled, Planned)):
-            between = "hold" if trajectory.held else "linear"
+            between = trajectory.between
         yield plan.interpolation == between, "plan.interpolation is not that of the specification"
         yield plan.curve in (None, _CURVE), "plan.curve is not what lies between knots"
     given = spec.uncertainty

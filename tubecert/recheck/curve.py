@@ -199,12 +199,16 @@ def expressed(x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Knots:
-    """Exact knots of a plan: times, states, inputs (row by row), and whether inputs are held or linear between."""
+    """Exact knots of a plan: times, states, inputs (row by row), and whether inputs are held or linear between.
+
+    With `inner`, a time and inputs between every two knots, u* is the parabola through those and the two knots.
+    """
 
     t: tuple[Fraction, ...]
     x: tuple[tuple[Fraction, ...], ...]
     u: tuple[tuple[Fraction, ...], ...]
     held: bool
+    inner: tuple[tuple[Fraction, tuple[Fraction, ...]], ...] = ()
 
 
 def hermite(
@@ -216,7 +220,8 @@ def hermite(
     """
     s = variable(CLOCK)
     x = [_polynomial([variable(f"x{i}#{k}") for k in range(4)], s) for i in range(len(states))]
-    u = [_polynomial([variable(f"u{j}#{k}") for k in range(2)], s) for j in range(len(inputs))]
+    powers = 3 if knots.inner else 2
+    u = [_polynomial([variable(f"u{j}#{k}") for k in range(powers)], s) for j in range(len(inputs))]
     rate = Program(drift, (*states, *inputs))
     parts = []
     for k, (begin, end) in enumerate(pairwise(knots.t)):
@@ -236,9 +241,25 @@ def hermite(
                 f"x{i}#3": (m0[i] + m1[i] - 2 * secant) / (width * width),
             }
         for j, (p, q) in enumerate(zip(left, right, strict=True)):
-            values |= {f"u{j}#0": exact(p), f"u{j}#1": exact((q - p) / h)}
+            found = (
+                [p, (q - p) / h] if not knots.inner else _parabola(knots.inner[k], j, (begin, p), (end, q))
+            )
+            values |= {f"u{j}#{power}": exact(c) for power, c in enumerate(found)}
         parts.append(Part(exact(begin), exact(min(end, horizon) - begin), values))
     return Curve(tuple(x), tuple(u), tuple(parts), horizon, tuple(map(number, knots.x[0])))
+
+
+def _parabola(
+    inner: tuple[Fraction, tuple[Fraction, ...]],
+    j: int,
+    first: tuple[Fraction, Fraction],
+    last: tuple[Fraction, Fraction],
+) -> list[Fraction]:
+    """Coefficients in s = t - t0 of the parabola through (t0, p), (t, row[j]) and (t1, q): divided differences."""
+    (t0, p), (t1, q), (t, row) = first, last, inner
+    steep = (row[j] - p) / (t - t0)
+    bend = ((q - row[j]) / (t1 - t) - steep) / (t1 - t0)
+    return [p, steep - bend * (t - t0), bend]
 
 
 def _polynomial(coefficients: Sequence[Term], s: Term) -> Term:

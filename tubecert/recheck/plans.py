@@ -51,7 +51,9 @@ def read_plan(node: Node, specification: Specification) -> Plan:
         own.require(*(key for key in optional if key != "samples"))
     return Plan(
         kind=own["kind"].text(),
-        interpolation=own.get("interpolation", lambda item: item.word("exact", "hold", "linear")),
+        interpolation=own.get(
+            "interpolation", lambda item: item.word("exact", "hold", "linear", "hermite-simpson")
+        ),
         curve=own.get("curve", Node.text),
         knots=knots,
         samples=own.get("samples", lambda item: _samples(item, n)),

@@ -155,7 +155,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     if isinstance(trajectory, Expressed):
         return expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon)
     return hermite(
-        _knots(plan, trajectory.held, trajectory.horizon),
+        _knots(plan, trajectory.between, trajectory.horizon),
         [row[0] for row in s.drift],
         s.states,
         s.inputs,
@@ -163,7 +163,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     )
 
 
-def _knots(plan: Plan, held: bool, horizon: Fraction) -> Knots:
+def _knots(plan: Plan, between: str, horizon: Fraction) -> Knots:
     """Knots that span the horizon, in order, filled as the specification says."""
     path, knots = "certificate.result.plan", plan.knots
     if knots is None:
@@ -173,6 +173,13 @@ def _knots(plan: Plan, held: bool, horizon: Fraction) -> Knots:
         raise wrong("TC603", f"{path}.knots.t must begin at 0 and increase")
     if t[-1] < horizon:
         raise wrong("TC603", f"{path}.knots.t ends before the horizon")
-    if plan.interpolation != ("hold" if held else "linear"):
+    if plan.interpolation != between:
         raise wrong("TC603", f"{path}.interpolation is not that of the specification")
-    return Knots(t=t, x=knots.x, u=knots.u, held=held)
+    if between != "hermite-simpson":
+        return Knots(t=t, x=knots.x, u=knots.u, held=between == "hold")
+    if len(t) % 2 == 0:
+        raise wrong(
+            "TC603", f"{path}.knots must begin and end with a knot, points between knots in turn with them"
+        )
+    inner = tuple(zip(t[1::2], knots.u[1::2], strict=True))
+    return Knots(t=t[::2], x=knots.x[::2], u=knots.u[::2], held=False, inner=inner)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 Section = tuple[str, list["RenderableType"]]
 MEANINGS = EVERY
+_NOTABLE = 0.01  # of the range of the knots
 VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 
@@ -207,9 +208,27 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(
             f"--rho-a {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
         )
-    lines += clearances(result)
+    lines += [*excursion(result), *clearances(result)]
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
+
+
+def excursion(result: Result) -> Iterator[str]:
+    """How far the plan leaves the range of its knots, where that is worth a word; by the points it is drawn by."""
+    knots, drawn = result.plan.exact_knots(), result.plan.samples
+    if knots is None or drawn is None:
+        return
+    for name, own, curve in zip(
+        result.spec.effective.system.states,
+        zip(*knots.x, strict=True),
+        zip(*drawn.x, strict=True),
+        strict=True,
+    ):
+        low, high = float(min(own)), float(max(own))
+        beyond = max(low - min(curve), max(curve) - high)
+        if beyond > _NOTABLE * (high - low):
+            span = f"[{low:.4g}, {high:.4g}]"
+            yield f"between its knots the plan takes {name} {beyond:.3g} beyond all of them, which are in {span}"
 
 
 def extent(result: Result) -> str:

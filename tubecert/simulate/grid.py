@@ -63,6 +63,8 @@ def _kinks(knots: Knots | None) -> Array:
     if knots is None:
         return np.zeros(0)
     values = knots.u
+    if knots.interpolation == "hermite-simpson":
+        return np.array([float(t) for t in knots.t[2::2]])
     if knots.interpolation == "hold":
         # also where u* does not jump: a step is evaluated on one piece of the plan
         return np.array([float(t) for t in knots.t[1:]])

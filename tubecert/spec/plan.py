@@ -22,6 +22,8 @@ MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 
 _KNOTS: Final = 101
 
+_OF_FILES: tuple[Interpolation, ...] = ("hold", "linear", "hermite-simpson")
+
 
 def read_trajectory(field: Field, names: Names) -> Trajectory | None:
     """The plan; what a planner's start is by default is not known yet (see `completed`)."""
@@ -90,7 +92,7 @@ def _csv(field: Field, names: Names) -> Trajectory | None:
     entries = field.mapping(required=("kind", "file"), optional=("interpolation", "horizon"))
     if entries is None:
         return None
-    interpolation, sound = _interpolation(entries.get("interpolation"), "linear")
+    interpolation, sound = _interpolation(entries.get("interpolation"), "linear", _OF_FILES)
     horizon, readable = _horizon(entries.get("horizon"), names)
     table = read_table(entries["file"], names, interpolation) if "file" in entries else None
     if table is None or not sound or not readable:
@@ -170,12 +172,14 @@ def completed(plan: Trajectory, x0: Vector | None) -> Trajectory | None:
     return replace(plan, task=replace(plan.task, start=x0))
 
 
-def _interpolation(field: Field | None, default: Interpolation) -> tuple[Interpolation, bool]:
+def _interpolation(
+    field: Field | None, default: Interpolation, known: tuple[Interpolation, ...] = ("hold", "linear")
+) -> tuple[Interpolation, bool]:
     """What u does between knots, and whether what is written is sound."""
     if field is None:
         return default, True
-    word = field.word(("hold", "linear"))
-    return ("hold" if word == "hold" else "linear"), word is not None
+    word = field.word(known)
+    return next((each for each in known if each == word), default), word is not None
 
 
 def _count(field: Field | None, names: Names) -> int | None:

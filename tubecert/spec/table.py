@@ -141,6 +141,12 @@ def _read(sheet: _Sheet, names: Names, interpolation: Interpolation) -> Knots | 
         last = header[0] if not values else _Cell(text="", line=len(sheet.source.lines) - 1, column=0)
         sheet.fail(last, codes.PLAN_TIMES, f"a plan needs 2 rows or more below its header, not {len(values)}")
         return None
+    if interpolation == "hermite-simpson" and len(values) % 2 == 0:
+        last = _Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+        message = f"hermite-simpson needs an odd number of rows, not {len(values)}"
+        help = "rows are in turn a knot and the point between it and the next knot"
+        sheet.fail(last, codes.PLAN_TIMES, message, help)
+        return None
     n = len(names.states)
     return Knots(
         t=tuple(row[columns[0]] for row in values),

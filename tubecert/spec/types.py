@@ -12,7 +12,7 @@ from tubecert.findings import Location
 
 Vector = tuple[Fraction, ...]
 Matrix = tuple[Vector, ...]
-Interpolation = Literal["hold", "linear"]
+Interpolation = Literal["hold", "linear", "hermite-simpson"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +60,8 @@ class Uncertainty:
 class Knots:
     """A curve by its values: `t` (K) in s from 0 on, `x` (K, n), `u` (K, m), all exact.
 
-    u is held from each knot to the next, or linear between them.
+    u is held from each knot to the next, or linear between them; or rows are in turn a knot and a point between two, as
+    planners by Hermite-Simpson collocation have them, and u is quadratic through a knot, that point and the next knot.
     """
 
     t: Vector
@@ -72,6 +73,7 @@ class Knots:
         assert len(self.t) == len(self.x) == len(self.u) >= 2
         assert self.t[0] == 0
         assert all(a < b for a, b in zip(self.t, self.t[1:], strict=False))
+        assert self.interpolation != "hermite-simpson" or len(self.t) % 2 == 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

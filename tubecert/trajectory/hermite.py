@@ -1,8 +1,10 @@
 """The data of a plan through knots: coefficients of its pieces as intervals, and their ranges.
 
 Knots are exact. Between two of them x* is the cubic with the values x_k, x_k+1 and the one-sided slopes
-f(x_k) + B(x_k) u(t_k+), f(x_k+1) + B(x_k+1) u(t_k+1-); u* is held or linear. Where u* jumps x* has a kink, as it must:
-one smooth curve through a held input would have a defect of the size of the jump. Implements: theory 4, plan defect.
+f(x_k) + B(x_k) u(t_k+), f(x_k+1) + B(x_k+1) u(t_k+1-); u* is held or linear. Where rows are in turn a knot and a point
+between two knots (Hermite-Simpson), u* is quadratic through the three; x in that point is no part of the curve. Where
+u* jumps x* has a kink, as it must: one smooth curve through a held input would have a defect of the size of the jump.
+Implements: theory 4, plan defect.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Knots
+from tubecert.spec import Knots, Vector
 
 Index = NDArray[np.intp]
 
@@ -28,7 +30,8 @@ Index = NDArray[np.intp]
 class Pieces:
     """K pieces, each a function of tau = t - t_k in [0, length]; nothing else is known of them.
 
-    `x` (K, n, 4): coefficients of 1, tau, tau^2, tau^3; `u` (K, m, 2): of 1, tau; `start`, `end`, `length` (K,), in s.
+    `x` (K, n, 4): coefficients of 1, tau, tau^2, tau^3; `u` (K, m, 2): of 1, tau, or (K, m, 3): of 1, tau, tau^2;
+    `start`, `end`, `length` (K,), in s.
     """
 
     start: Interval
@@ -82,7 +85,11 @@ class Pieces:
         bend = a[..., 2] + 3 * (c * a[..., 3])
         square = Interval(np.zeros_like(r), np.nextafter(r * r, np.inf))
         x = value + slope * swing + bend * square + a[..., 3] * swing**3
-        u = b[..., 0] + b[..., 1] * Interval(left[:, None], right[:, None])
+        if b.lo.shape[-1] == 2:
+            u = b[..., 0] + b[..., 1] * Interval(left[:, None], right[:, None])
+        else:  # about the middle, exactly: q(c + d) = q(c) + q'(c) d + b2 d^2
+            value = b[..., 0] + c * (b[..., 1] + c * b[..., 2])
+            u = value + (b[..., 1] + 2 * (c * b[..., 2])) * swing + b[..., 2] * square
         both = Interval(np.concatenate([x.lo, u.lo], axis=1), np.concatenate([x.hi, u.hi], axis=1))
         return both.sanitised()
 
@@ -111,6 +118,8 @@ class Pieces:
 
 def pieces(model: ControlAffineModel, knots: Knots, horizon: Fraction) -> Pieces:
     """The pieces through the knots up to the horizon; the last one may be cut short."""
+    inputs = slopes_of_inputs(knots)
+    knots = ends_of_pieces(knots)
     count = next(k for k, t in enumerate(knots.t) if t >= horizon)
     t = knots.t[: count + 1]
     steps = [b - a for a, b in pairwise(t)]
@@ -129,19 +138,14 @@ def pieces(model: ControlAffineModel, knots: Knots, horizon: Fraction) -> Pieces
     m1 = rate(x[1:], intervals_of_rows(u_right))
     a2 = (3 * secant - 2 * m0 - m1) / h
     a3 = (m0 + m1 - 2 * secant) / (h * h)
-    ramp = intervals_of_rows(
-        [
-            [(q - p) / step for p, q in zip(a, b, strict=True)]
-            for a, b, step in zip(u_left, u_right, steps, strict=True)
-        ]
-    )
+    powers = [intervals_of_rows([row[power] for row in inputs[:count]]) for power in range(len(inputs[0]))]
     length = [min(b, horizon) - a for a, b in pairwise(t)]
     return Pieces(
         start=intervals(t[:-1]),
         end=intervals([min(b, horizon) for b in t[1:]]),
         length=intervals(length),
         x=_stacked([x[:-1], m0, a2, a3]),
-        u=_stacked([intervals_of_rows(u_left), ramp]),
+        u=_stacked([intervals_of_rows(u_left), *powers]),
     )
 
 
@@ -149,6 +153,33 @@ def sides(knots: Knots, count: int) -> tuple[list[Sequence[Fraction]], list[Sequ
     """u* just after the left knot of every piece, and just before its right knot."""
     left: list[Sequence[Fraction]] = list(knots.u[:count])
     return left, (left if knots.interpolation == "hold" else list(knots.u[1 : count + 1]))
+
+
+def ends_of_pieces(knots: Knots) -> Knots:
+    """The rows in which pieces begin and end; as linear ones where there are others."""
+    if knots.interpolation != "hermite-simpson":
+        return knots
+    return Knots(t=knots.t[::2], x=knots.x[::2], u=knots.u[::2], interpolation="linear")
+
+
+def slopes_of_inputs(knots: Knots) -> list[tuple[Vector, ...]]:
+    """The coefficients of tau, and of tau^2 where u* is quadratic, of u* on every piece; each of shape (m,)."""
+    if knots.interpolation == "hermite-simpson":
+        return [_quadratic(knots, k) for k in range(0, len(knots.t) - 1, 2)]
+    held = knots.interpolation == "hold"
+    return [
+        (tuple(Fraction(0) if held else (q - p) / (end - begin) for p, q in zip(a, b, strict=True)),)
+        for (begin, end), (a, b) in zip(pairwise(knots.t), pairwise(knots.u), strict=True)
+    ]
+
+
+def _quadratic(knots: Knots, k: int) -> tuple[Vector, Vector]:
+    """The parabola through rows k, k + 1, k + 2 in tau = t - t_k: c1, c2 with u = u_k + c1 tau + c2 tau^2."""
+    h, H = knots.t[k + 1] - knots.t[k], knots.t[k + 2] - knots.t[k]
+    middle, end = ([b - a for a, b in zip(knots.u[k], knots.u[row], strict=True)] for row in (k + 1, k + 2))
+    # c1 h + c2 h^2 = middle, c1 H + c2 H^2 = end
+    bend = tuple((e * h - m * H) / (h * H * (H - h)) for m, e in zip(middle, end, strict=True))
+    return tuple(m / h - c * h for m, c in zip(middle, bend, strict=True)), bend
 
 
 class _Drift:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import isqrt
+from typing import Literal
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from tubecert.enclosure.interval import fraction_bounds
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Interpolation, Knots, Spec, Task
+from tubecert.spec import Knots, Spec, Task
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.family import family
 from tubecert.trajectory.pieces import piecewise_plan
@@ -113,7 +114,9 @@ def remedy(plan: Plan, model: ControlAffineModel, room: Room) -> PlanRemedy:
     knots = plan.knots
     if knots is None:
         return CorrectPlan()
-    other: Interpolation = "linear" if knots.interpolation == "hold" else "hold"
+    if knots.interpolation == "hermite-simpson":
+        return MoreKnots()
+    other: Literal["hold", "linear"] = "linear" if knots.interpolation == "hold" else "hold"
     mended = piecewise_plan(model, replace(knots, interpolation=other), plan.horizon)
     rho, effort = fraction_bounds(room.rho)[1], replace(room.effort, gap=0.05)
     own, instead = (Defect.of(each, model, rho, effort).in_state().above for each in (plan, mended))

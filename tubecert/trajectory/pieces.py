@@ -29,7 +29,7 @@ TAU = "tau#"  # no state can have this name
 
 @dataclass(frozen=True)
 class PiecewisePlan(Plan):
-    """Cubic Hermite pieces for x*, held or linear u*; `data` is exact, `pieces` encloses what follows from them."""
+    """Cubic Hermite pieces for x*, held, linear or quadratic u*; `data` is exact, `pieces` encloses what follows."""
 
     data: Knots
     pieces: Pieces
@@ -108,6 +108,8 @@ def piecewise_plan(model: ControlAffineModel, knots: Knots, horizon: Fraction | 
     u = [_coefficient("u", j, 0) for j in range(len(model.inputs))]
     if knots.interpolation == "linear":
         u = [e + tau * _coefficient("u", j, 1) for j, e in enumerate(u)]
+    elif knots.interpolation == "hermite-simpson":
+        u = [e + tau * (_coefficient("u", j, 1) + tau * _coefficient("u", j, 2)) for j, e in enumerate(u)]
     end = knots.t[-1] if horizon is None else horizon
     with np.errstate(all="ignore"):
         return PiecewisePlan(tuple(x), tuple(u), end, knots, pieces(model, knots, end))

@@ -47,7 +47,7 @@ class Expressed:
 class Tabled:
     """A plan from a file: its knots are in the certificate."""
 
-    held: bool
+    between: str  # hold, linear, hermite-simpson
     horizon: Fraction
     kind: str = "csv"
 
@@ -59,7 +59,7 @@ class Planned:
     start: Numbers
     target: Numbers
     goal: bool
-    held: bool
+    between: str  # hold, linear
     horizon: Fraction
     kind: str = "ilqr"
 
@@ -118,15 +118,12 @@ def _any(node: Node, plant: Plant) -> AnyPlan:
     return AnyPlan(x, u, not_negative(own["defect"]), own.get("horizon", positive))
 
 
-def _held(node: Node) -> bool:
-    return node.word("hold", "linear") == "hold"
-
-
 def _tabled(node: Node, n: int, m: int) -> Tabled:
     del n, m
     own = node.closed("kind", "file", "interpolation", "horizon")
     own["file"].text()
-    return Tabled(_held(own["interpolation"]), positive(own["horizon"]))
+    between = own["interpolation"].word("hold", "linear", "hermite-simpson")
+    return Tabled(between, positive(own["horizon"]))
 
 
 def _planned(node: Node, n: int, m: int) -> Planned:
@@ -140,6 +137,6 @@ def _planned(node: Node, n: int, m: int) -> Planned:
         start=several(own["start"], n),
         target=several(own["target"], n),
         goal=own["goal"].word("true", "false") == "true",
-        held=_held(own["interpolation"]),
+        between=own["interpolation"].word("hold", "linear"),
         horizon=positive(own["horizon"]),
     )
