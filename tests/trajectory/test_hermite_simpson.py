@@ -22,6 +22,7 @@ from tubecert.report.sections import excursion
 from tubecert.spec import Knots, load
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.tube import containment
 from tubecert.verdict import Verdict
 
 x, y = symbol("x"), symbol("y")
@@ -193,3 +194,16 @@ def checked(text):
         return str(recheck(text, "c.json").verdict)
     except CertificateError:
         return "refused"
+
+
+def test_points_between_knots_are_no_points_of_the_curve():
+    """Where slopes are not defined, knots outside refute the tube; what is between them says nothing of x*."""
+    undefined = replace(MODEL, f=(y / x, x))
+    box = ((Fraction(-1), Fraction(1)), (Fraction(-1), Fraction(1)))
+    for k, verdict in ((1, Verdict.UNDECIDED), (2, Verdict.REFUTED)):
+        data = knots()
+        moved = tuple((Fraction(5), row[1]) if i == k else row for i, row in enumerate(data.x))
+        plan = piecewise_plan(undefined, replace(data, x=moved))
+        assert not plan.defined
+        found = containment(plan, Fraction(1, 100), ("x", "y"), box, Effort())
+        assert found.verdict is verdict

@@ -210,6 +210,11 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
     spec = load_text(json.dumps(dict(data)), "certificate")
     trajectory, model = spec.trajectory, build(spec)
     if knots is not None:
+        if knots.interpolation == "hermite-simpson":
+            raise refused(
+                "a plan with quadratic inputs (interpolation: hermite-simpson) is not exported yet",
+                "give its rows with interpolation: linear, and certify that",
+            )
         horizon = certificate.result.spec.effective.trajectory.horizon
         return spec, piecewise_plan(model, knots, horizon), model
     x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))

@@ -11,6 +11,7 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.pencil import scalar
 from tubecert.trajectory import Plan
+from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
 
 
@@ -93,7 +94,7 @@ def _knots_outside(
     piece only: the curve need not reach them.
     """
     worst = Containment()
-    knots = plan.knots
+    knots = None if plan.knots is None else ends_of_pieces(plan.knots)
     reached = zip(knots.t, knots.x, strict=True) if knots else ()
     for t, x in reached:
         if plan.horizon is not None and t > plan.horizon:
