@@ -168,8 +168,9 @@ class ConditionHolds(Claim):
 
     `condition` is one of the section's own (26a, 26b, 26c, distance, sampled), or what no gains can help:
     `initial_distance` (d0 < dbar), `plan_defect` (delta/lambda < dbar), `parameters` and `wind` (the same with what
-    they add), `wind_bound` (it is searched for), `wind_not_covered` (the theorem knows no wind), `bounded` (the
-    constant `constant` is),
+    they add), `wind_bound` (it is searched for), `wind_not_covered` (the theorem knows no wind), `gain_not_covered`
+    (it knows no uncertain B), `gain_unmatched` (B acts where B(theta0) does), `gain_range` (|Delta| < 1), `bounded`
+    (the constant `constant` is),
     `corrected_formulas`; or `any_gains`: none were found; or `proven_gains`: of those found none could be proven.
     `beyond`: the margin is below all floats; `blocked_by` names a condition without which this one has no margin.
     """
@@ -405,6 +406,7 @@ HardwareCause = Literal[
     "lag",
     "noise_feedback",
     "sampling",
+    "gain",
 ]
 
 
@@ -755,7 +757,7 @@ class WindWithin(Assumption):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParametersWithin(Assumption):
-    """The parameters of the claim are constant, anywhere in their ranges; the controller knows f at the middles."""
+    """The parameters of the claim are constant, anywhere in their ranges; the controller knows f, B at the middles."""
 
     tag: ClassVar[str] = "parameters_within"
 

@@ -71,7 +71,8 @@ class ControlAffineModel:
 
     Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
     where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
-    `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows.
+    `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
+    `gained`, B(x, theta) (n, m), in place of B, if that is not empty.
     """
 
     states: tuple[str, ...]
@@ -85,6 +86,7 @@ class ControlAffineModel:
     wind_bound: Fraction | None = None
     wind_rate: Fraction | None = None
     drift: tuple[Expression, ...] = ()
+    gained: Matrix = ()
     parameters: tuple[tuple[str, Range], ...] = ()
 
     @cached_property
@@ -201,6 +203,7 @@ def build(spec: Spec) -> ControlAffineModel:
         wind_bound=None if wind is None else wind.bound,
         wind_rate=None if wind is None else wind.rate,
         drift=tuple(term.expression for term in spec.drift),
+        gained=tuple(tuple(term.expression for term in row) for row in spec.gained),
         parameters=spec.ranges,
     )
 
@@ -272,14 +275,14 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
     """What is undefined, not differentiable or rank-deficient on the safe set (and for h and the plan: over `time`)."""
     box: dict[str, Range] = dict(zip(spec.states, spec.safe_set, strict=True))
     over_time: dict[str, Range] = box if time is None else {**box, TIME: time}
-    terms = [*(() if spec.drift else spec.f), *(t for row in spec.B for t in row)]
+    terms = [*(() if spec.drift else spec.f), *(() if spec.gained else (t for row in spec.B for t in row))]
     if spec.metric:
         terms += [t for row in spec.metric.dual_metric for t in row]
     if spec.disturbance:
         terms += [t for row in spec.disturbance.E for t in row]
     findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
     everywhere: dict[str, Range] = {**box, **dict(spec.ranges)}
-    for term in spec.drift:
+    for term in (*spec.drift, *(t for row in spec.gained for t in row)):
         findings += _undefined(term, everywhere, "the safe set and the ranges of the parameters", effort)
     for term in spec.uncertainty.h or ():
         findings += _undefined(term, over_time, "the safe set and the horizon", effort)

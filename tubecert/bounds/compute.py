@@ -13,7 +13,7 @@ import numpy as np
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
-from tubecert.bounds.wind import Beside, uncertainty_constants
+from tubecert.bounds.wind import beside_of, uncertainty_constants
 from tubecert.enclosure.constant import decimal_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.model import TIME
@@ -142,7 +142,7 @@ def uncertainty_bounds(
     """h, h_x, h_t and h_initial over the tube: those that stand as they were declared, and those that are derived."""
     if "h" in declared:  # the class of uncertainties is what is declared, whatever the expression starts from
         declared = {**declared, "h_initial": declared["h"]}
-    if Beside(suprema.fields).joins_uncertainty:
+    if beside_of(suprema).joins_uncertainty:
         return {}, uncertainty_constants(suprema, start, declared)
     derived: dict[str, Constant] = {}
     if suprema.model.h is not None:

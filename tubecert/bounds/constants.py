@@ -191,9 +191,32 @@ class ResidualConstants:
         ]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainConstants:
+    """How far the gain of the inputs is from what the controller takes it for (theory 8.9).
+
+    `matched`: whether the plant's inputs are proven to act where the controller's do, B_u = 0.
+    """
+
+    error: Constant = field(metadata=_of("D_b", "theory 8.9", "1", "sup |B^+ B(x, theta) - I|"))
+    matched: bool
+
+    def printable(self) -> GainConstants:
+        """The same with every enclosure widened to printable bounds."""
+        return GainConstants(error=self.error.printable(), matched=self.matched)
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of each, by its name in a certificate."""
+        return [("gain_error", self.error, GAIN["gain_error"])]
+
+
 WIND: dict[str, Meaning] = {
     **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
     **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
+}
+
+GAIN: dict[str, Meaning] = {
+    "gain_error": next(item.metadata["meaning"] for item in fields(GainConstants) if item.name == "error")
 }
 
 DERIVED: dict[str, Meaning] = {

@@ -13,6 +13,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
+from tubecert.bounds.gains import Gain
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Fields
@@ -27,9 +28,14 @@ Entries = tuple[Expression, ...]
 
 @dataclass(frozen=True)
 class Beside:
-    """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly."""
+    """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly.
+
+    Where parameters stand in B, too, what joins h is made by the B of the plant, and part of it is what that B does to
+    u* (theory 8.9); `inputs` is u* then, in t.
+    """
 
     fields: Fields
+    inputs: Entries = ()
 
     @cached_property
     def reached(self) -> Matrix:
@@ -42,9 +48,20 @@ class Beside:
         return self._split(self.fields.model.E)[1]
 
     @cached_property
+    def gain(self) -> Gain | None:
+        """What is not known of B; None if it is known."""
+        return Gain(self.fields) if self.fields.model.gained else None
+
+    @cached_property
     def known(self) -> Entries:
-        """B^+ (f(x, theta) - f0(x)), (m,): what of unknown parameters an input can make; empty without any."""
-        return tuple(row[0] for row in self._split(self._unknown_drift)[0])
+        """What of unknown parameters joins h, (m,); empty without any.
+
+        B^+ (f(x, theta) - f0(x)), or of an unknown B `Gain.joined` of it.
+        """
+        matched = self._split(self._unknown_drift)[0]
+        if self.gain is not None:
+            matched = self.gain.joined(matched, column(self.inputs))
+        return tuple(row[0] for row in matched)
 
     @cached_property
     def residual(self) -> Matrix:
@@ -71,7 +88,12 @@ class Beside:
         model = self.fields.model
         if not model.E or model.wind_bound is None or model.wind_rate is None or _vanishes(self.reached):
             return ()
-        return _times(model.wind_bound, self.reached)
+        return _times(model.wind_bound, self.made)
+
+    @cached_property
+    def made(self) -> Matrix:
+        """What of a wind with a rate joins h: B^+ E, of an unknown B by (I + Delta)^-1 of it."""
+        return self.reached if self.gain is None else multiply(self.gain.inverse, self.reached)
 
     @property
     def rate(self) -> Fraction:
@@ -91,6 +113,11 @@ def _exact(rows: Matrix) -> Matrix:
 
 def _vanishes(rows: Matrix) -> bool:
     return all(e is ZERO for row in rows for e in row)
+
+
+def beside_of(suprema: Suprema) -> Beside:
+    """What joins h in the loop of a plan."""
+    return Beside(suprema.fields, suprema.plan.u)
 
 
 def wind_constants(suprema: Suprema, beta: Constant) -> WindConstants | None:
@@ -145,7 +172,7 @@ def uncertainty_constants(
 
     What is declared is about the specification's own h.
     """
-    beside = Beside(suprema.fields)
+    beside = beside_of(suprema)
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
     total, blown = joined(suprema)
 
@@ -166,14 +193,14 @@ def uncertainty_constants(
     in_time = suprema.norms("h_t", [column(derivatives(total, TIME))]) if by_time is None else by_time
     if blown:
         lipschitz = grown(lipschitz, suprema.norms("h_x", suprema.fields.slopes(blown)))
-        in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.reached)]))
+        in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.made)]))
     at_start = whole if first is not None else _at_start(suprema, start, total, blown)
     return {"h": whole, "h_x": lipschitz, "h_t": in_time, "h_initial": at_start}
 
 
 def joined(suprema: Suprema) -> tuple[Entries, Matrix]:
     """H = v + G w/|w|: its entries v without wind, of what is given as expressions, and G (empty without wind)."""
-    beside, own = Beside(suprema.fields), suprema.model.h
+    beside, own = beside_of(suprema), suprema.model.h
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
     total = known if own is None else tuple(a + b for a, b in zip(own, known, strict=True))
     return total, beside.blown

@@ -19,6 +19,7 @@ from tubecert.bounds.constants import (
     TABLE,
     BoundConstants,
     Constant,
+    GainConstants,
     Meaning,
     ResidualConstants,
     WindConstants,
@@ -145,6 +146,7 @@ class TubeProblem:
     machine: Machine | None = None
     wind: Wind | None = None
     residual: ResidualConstants | None = None
+    gain: GainConstants | None = None
 
     def __post_init__(self) -> None:
         if min(self.rate, self.rho_a, self.epsilon) <= 0:
@@ -276,9 +278,10 @@ class TubeProblem:
         return tuple(name for name, value, _ in self.beside() if not np.isfinite(value.above))
 
     def beside(self) -> list[tuple[str, Constant, Meaning]]:
-        """What acts that is no input: the constants of wind and of unknown parameters, as `BoundConstants.items`."""
+        """What is beside the known model: constants of wind and of unknown parameters, as `BoundConstants.items`."""
         wind = [] if self.wind is None else self.wind.constants.items()
-        return wind + ([] if self.residual is None else self.residual.items())
+        rest = [] if self.residual is None else self.residual.items()
+        return wind + rest + ([] if self.gain is None else self.gain.items())
 
 
 _SMALL_IS_SAFE = _INFIMA | {"rho_r", "rho_a", "lam"}

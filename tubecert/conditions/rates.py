@@ -28,7 +28,7 @@ from tubecert.conditions.predictor import predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
 from tubecert.conditions.verdict import UNKNOWN, Shortfall
-from tubecert.conditions.wind import not_covered
+from tubecert.conditions.wind import known_gains_only, not_covered
 from tubecert.enclosure.interval import Interval
 
 Margins = dict[str, Interval]
@@ -153,7 +153,7 @@ def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
 def _provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """Several of the paper's printed formulas are wrong, and theorem A knows nothing that is no input."""
     printed = (Shortfall(claim="corrected_formulas", margin=UNKNOWN),) if problem.as_printed else ()
-    return (*printed, *not_covered(problem))
+    return (*printed, *not_covered(problem), *known_gains_only(problem))
 
 
 THEOREM = Theorem(

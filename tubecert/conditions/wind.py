@@ -62,10 +62,15 @@ def prediction(n: Numbers[T], s1: T, p: Predictor[T], Gamma: T, zb: T) -> T:
 
 
 def provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """Why nothing follows for a wind: its bound is not given, but looked for."""
-    if problem.wind is None or problem.wind.bound is not None:
-        return ()
-    return (Shortfall(claim="wind_bound", margin=UNKNOWN),)
+    """Why nothing follows for a wind whose bound is not given, but looked for; nor for an uncertain gain."""
+    sought = problem.wind is not None and problem.wind.bound is None
+    wind = (Shortfall(claim="wind_bound", margin=UNKNOWN),) if sought else ()
+    return (*wind, *known_gains_only(problem))
+
+
+def known_gains_only(problem: TubeProblem) -> tuple[Shortfall, ...]:
+    """Why all certificates but H say nothing: they are stated for the B that the controller knows."""
+    return () if problem.gain is None else (Shortfall(claim="gain_not_covered", margin=UNKNOWN),)
 
 
 def not_covered(problem: TubeProblem) -> tuple[Shortfall, ...]:

@@ -228,6 +228,12 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe) -> None:
             "the metric is not constant: its geodesics would have to be computed with a certified error",
             "metric: {synthesise: {degree: 0}} asks for a constant one",
         )
+    if model.gained:
+        raise refused(
+            "parameters known by ranges stand in B: the feedback is multiplied by 1/(1 - D_b) then, "
+            "which is not exported yet",
+            "give them one value",
+        )
     if recipe.feedback_time != recipe.sample_time:
         raise refused(
             "the feedback has a clock of its own, which is not exported yet",

@@ -90,9 +90,11 @@ class Kind(ABC, Generic[R]):
         return self.name.key
 
     def applies(self, problem: TubeProblem) -> bool:
-        """Whether the kind says anything of a problem: if not, certificates have no section of it."""
-        del problem
-        return True
+        """Whether the kind says anything of a problem: if not, certificates have no section of it.
+
+        All but certificate H are stated for a B that is known.
+        """
+        return problem.gain is None
 
     @abstractmethod
     def section(self, problem: TubeProblem, proposal: Proposal[R]) -> Section[R]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tubecert.conditions.problem import TubeProblem
-from tubecert.kinds import name_of
+from tubecert.kinds import HARDWARE, name_of
 from tubecert.kinds.alone import Alone
 from tubecert.kinds.distance import Distance
 from tubecert.kinds.hardware import Hardware
@@ -30,6 +30,9 @@ def kinds_of(problem: TubeProblem) -> tuple[AnyKind, ...]:
 
 
 def needed_by_all(problem: TubeProblem) -> frozenset[str]:
-    """The constants without which no kind with adaptation can say anything, by field name."""
-    adaptive = [kind for kind in kinds_of(problem) if kind.name.adapts]
+    """The constants without which no kind with adaptation can say anything, by field name.
+
+    Where nothing is said yet of a machine, an uncertain B leaves no kind: then it is about certificate H all the same.
+    """
+    adaptive = [kind for kind in kinds_of(problem) if kind.name.adapts] or [kind_of(HARDWARE.letter)]
     return frozenset.intersection(*(kind.theorem.needs(problem) for kind in adaptive))

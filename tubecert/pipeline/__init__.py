@@ -23,7 +23,7 @@ from tubecert.findings import Severity
 from tubecert.model import domain_findings
 from tubecert.pipeline.advice import Ledger, advised
 from tubecert.pipeline.certification import answer, result
-from tubecert.pipeline.checks import inspect, missing_parts
+from tubecert.pipeline.checks import inspect, missing_parts, not_covered
 from tubecert.pipeline.deadline import Deadline
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised
@@ -91,7 +91,7 @@ def question_of(
     """The question that options make of a specification; raises `SpecError` if it is meaningless."""
     spec = overridden(spec, options)
     findings, time = time_of(spec)
-    findings += missing_parts(spec)
+    findings += [*missing_parts(spec), *not_covered(spec, options.conditions)]
     if not findings:
         findings = domain_findings(spec, time, Effort(budget=options.budget))
     if any(item.severity is Severity.ERROR for item in findings):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tubecert.recheck import covariant, machine, unknown, wind
+from tubecert.recheck import covariant, gains, machine, unknown, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -438,6 +438,8 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
         names += wind.CONSTANTS
     if spec.plant.ranges:
         names += unknown.CONSTANTS
+    if spec.plant.gained is not None:
+        names += gains.CONSTANTS
     if spec.hardware is not None:
         names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
     groups = (machine.OF_CONSTANT_METRICS, covariant.NAMES) if spec.hardware is not None else ()

@@ -15,6 +15,7 @@ from tubecert.recheck import (
     clearances,
     consistency,
     covariant,
+    gains,
     geodesics,
     inputs,
     machine,
@@ -124,6 +125,7 @@ class Case:
                 self._wind,
                 turns=not all(map(all_zero, self.place.fields.slopes(self.system.B))),
                 rest=rest[1],
+                gain=None if self.system.gained is None else self._ball(gains.CONSTANTS[0]),
             )
 
     @property
@@ -402,6 +404,13 @@ def _beside(case: Case) -> Iterator[Claim]:
                 (*over, limit),
                 lambda name=name, limit=limit: unknown.bounded(place, name, limit),  # type: ignore[misc]
             )
+    limit = None if case.system.gained is None else case.bound_if_any(gains.CONSTANTS[0])
+    if limit is not None:
+        yield Claim(
+            f"{gains.CONSTANTS[0]} <= {float(limit):.6g}",
+            (*over, limit),
+            lambda limit=limit: gains.bounded(place, limit),  # type: ignore[misc]
+        )
     asked = case.result.specification.hardware
     if asked is None:
         return

@@ -66,6 +66,7 @@ class Setting:
     """Constants, radii and options of one certificate; `turns`: whether B depends on the state.
 
     `rest`: what unknown parameters do beside the inputs, which is a part of the plan's defect and drift in `n`.
+    `gain`: a bound of |Delta| of an uncertain B.
     """
 
     system: System
@@ -75,6 +76,7 @@ class Setting:
     wind: WindNumbers | None = None
     turns: bool = True
     rest: Ball = field(default_factory=lambda: arb(0))
+    gain: Ball | None = None
 
     @property
     def wind_bound(self) -> Ball:

@@ -16,6 +16,7 @@ from flint import arb, ctx
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.filtering import Distance
+from tubecert.recheck.gains import factors
 
 _ROUGH = 64  # bits, for proposals
 _RISES = 60
@@ -268,6 +269,14 @@ class Evaluation:
             machine.noise_size * exact(at.noise),
             machine.noise_explained * exact(at.noise),
         )
+        gain = factors(setting.gain)
+        # an input v acts as at most `most` |v|, kappa is multiplied by `more`, and its slope is du `most` `more`
+        self.g, self.most, self.more = (
+            (arb(0), arb(1), arb(1)) if gain is None else (gain.g, gain.most, gain.more)
+        )
+        self.gain = gain
+        self.beta = self.most * self.n.metric_input_gain
+        self.du = self.most * self.more * self.n.feedback_gain
         self.rate = self.n.h_t + self.n.h_x * self.Y  # s1
         self.ups = self._feedforward()
         # what a state that the feedback sees is off by: in x, and in the metric
@@ -276,15 +285,15 @@ class Evaluation:
         else:
             self.seen = exact(at.prediction)
             self.n_M = root(self.n.upper) * self.seen
-        self.kb = self.n.feedback_gain * (self.level + self.n_M)
+        self.kb = self.more * self.n.feedback_gain * (self.level + self.n_M)
         self.H1 = smaller(self.n.h, self.n.h_initial + self.rate * self.t1)
         later = self.S + larger(self.n.h_initial - self.S, nothing) + self.N + self.rate * self.t1
         self.X = smaller(self.n.h + self.R, larger(self.H1, later))
 
     @property
     def push(self) -> Ball:
-        """|u + h - u*|."""
-        return self.kb + self.ups + self.X
+        """|u + h - u*|, as it acts."""
+        return self.most * (self.kb + self.ups + self.X)
 
     def _feedforward(self) -> Ball:
         """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old."""
@@ -303,6 +312,8 @@ class Evaluation:
     def serves(self) -> bool:
         """Whether the side conditions hold."""
         Y, S, N, seen = self.needed()
+        if self.gain is not None and not self.gain.sensible:
+            return False
         enough = Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)
         return bool(enough and self.bending() > 0)
 
@@ -313,11 +324,16 @@ class Evaluation:
         n, m, Ts, Y = self.n, self.m, self.Ts, self.Y
         turning = smaller(n.B_pinv * n.B_x, n.B_pinv_x * n.B)  # b0
         apart = Y * Ts / 2 + self.nbar
-        whole = n.u_star + self.ups + self.kb + self.R + n.h  # |u + h|
+        whole = n.u_star + self.most * (self.ups + self.kb + self.R + n.h)  # |u + h|, as it acts
         e = self.rate * Ts / 2 + turning * whole * apart
         e = e + m.drift_explained * (Y * Ts / 4 + self.nbar)
         e = e + self._gust() + n.B_pinv_x * self.setting.rest * apart
-        return (1 - self.th) / self.th * self.rate * Ts + e
+        return (1 - self.th) / self.th * self.rate * Ts + e + self._mistaken()
+
+    def _mistaken(self) -> Ball:
+        """What Delta makes of kappa, of u0 - u* and of what the last sample's input missed: no part of h, but seen."""
+        missed = self.S + self.N + self.rate * (self.Ts / 2 + self.tau)
+        return self.g * (self.kb + self.ups + missed)
 
     def ripple(self) -> Ball:
         """(H.7); where the noise drifts, each of its steps is small instead."""
@@ -333,7 +349,8 @@ class Evaluation:
         slope = n.f_x + n.b_x * (n.u_star + self.ups + self.kb)
         growth = (slope * self.tau).expm1()
         mean = growth / slope if slope > 0 else self.tau * (growth + 1)  # at most tau e^(D_p tau)
-        return self.nbar * (growth + 1) + (n.B * self.X + self.blown + self.setting.rest) * mean
+        unknown = self.most * self.X + self.g * (self.kb + self.ups)
+        return self.nbar * (growth + 1) + (n.B * unknown + self.blown + self.setting.rest) * mean
 
     # -- the feedback
 
@@ -362,11 +379,11 @@ class Evaluation:
             assert m.drift_slope_metric is not None
             drift = smaller(m.drift_difference_metric, m.drift_slope_metric * self.level)
             V_M, V_d = smaller(V_M, drift + forced), smaller(V_d, drift + forced)
-        slope = m.feedback_slope + n.metric_input_gain * n.feedback_gain
+        slope = m.feedback_slope + n.metric_input_gain * self.du
         bend = m.feedback_curvature * (self.level + self.n_M) / 2
         stretched = self.n_M + (j1 - 1) * top_A * self.seen
         ell0 = slope * stretched + bend * j0 * self.seen  # (H.8)
-        tilt = n.feedback_gain * m.plan_tilt * m.plan_speed * self.level
+        tilt = self.du * m.plan_tilt * m.plan_speed * self.level
         ell = slope * V_M + bend * V_J + tilt  # (H.9), per second
         if m.bent is not None:
             other = self._by_metric(m.bent, slope)
@@ -378,7 +395,7 @@ class Evaluation:
         )
         first = larger(oldest, self.tau)
         least = lam * self.floor
-        base = n.plan_defect_metric + n.metric_input_gain * self.ups + self.pushed
+        base = n.plan_defect_metric + self.beta * self.ups + self.pushed
         begun = (V_d * first + self.n_M) / self.floor
         moved = (V_d * oldest + self.n_M) / self.floor
         delta_1 = larger(least, base + (ell0 + ell * first) * (1 + begun))
@@ -401,7 +418,7 @@ class Evaluation:
         bend = m.form_slope * (self.level + self.n_M) / 2
         ell0 = (slope * (1 + K / (2 * chi)) + bend * (1 + K / (8 * chi))) * self.n_M
         apart = m.drift_slope * self.level + added + Q / 2
-        tilt = n.feedback_gain * m.input_slope * fastest * self.level
+        tilt = self.du * m.input_slope * fastest * self.level
         return ell0, slope * apart + bend * (fastest + Q / 8) + tilt
 
     def _distance(self, delta_1: Ball, delta: Ball, ell: Ball, base: Ball, noisy: Ball) -> Loop:
@@ -410,7 +427,7 @@ class Evaluation:
         The slower clock begins a tooth where the first phase ends. Where the other one does not, what it causes is only
         known to stay below its periodic course: that much is added at once.
         """
-        n, lam, beta, at = self.n, self.lam, self.n.metric_input_gain, self.at
+        n, lam, beta, at = self.n, self.lam, self.beta, self.at
         late = at.feedback_time > at.sample_time
         early = self.X if late else self.H1  # a feedback that is slower meets the estimate in its first phase
         share = -(-lam * self.first_phase).expm1()
@@ -430,7 +447,9 @@ class Evaluation:
             e=self.N + self.rate * self.tau,
             delta=delta + waiting + lagging,
             rate=lam,
-            omega=exact(at.bandwidth or 1),
+            omega=exact(at.bandwidth or 1)
+            if self.gain is None
+            else -self.gain.kept(1 - self.th).log() / self.Ts,
             horizon=self.setting.horizon,
         )
         peak = self.peak(bound)
@@ -440,11 +459,12 @@ class Evaluation:
             "feedforward": beta * self.ups,
             "wind": self.pushed,
             "wind_estimate": beta * gust,
-            "bias": beta * (self.S - gust),
+            "bias": beta * (self.S - gust - self._mistaken()),
             "noise_estimate": beta * self.N,
             "lag": beta * self.rate * self.tau + lagging,
             "noise_feedback": noisy,
             "sampling": delta + waiting - base - noisy,
+            "gain": beta * self._mistaken(),
         }
         return Loop(
             error=self.X,
@@ -470,7 +490,8 @@ class Evaluation:
 
     def peak(self, bound: Distance) -> Ball:
         """Sup D."""
-        return larger(bound.d0, bound.ultimate()) if self.at.bandwidth is None else bound.supremum()
+        at_once = self.at.bandwidth is None and self.gain is None
+        return larger(bound.d0, bound.ultimate()) if at_once else bound.supremum()
 
     def _gust(self) -> Ball:
         """What wind adds to the bias of the estimate."""

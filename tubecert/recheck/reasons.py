@@ -112,6 +112,7 @@ _CAUSE = _word(
     "lag",
     "noise_feedback",
     "sampling",
+    "gain",
 )
 _KNOB = _word(
     "epsilon",

@@ -18,7 +18,7 @@ from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
 from tubecert.recheck.specified.numbers import Numbers, Range, ends, positive
 from tubecert.recheck.specified.plant import Plant, Uncertainty, read_plant, read_uncertainty
 from tubecert.recheck.specified.start import Start, read_start
-from tubecert.recheck.specified.trajectory import AnyPlan, Trajectory, read_trajectory
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Trajectory, read_trajectory
 from tubecert.recheck.specified.windows import KEY as WINDOWS
 from tubecert.recheck.specified.windows import read_windows
 
@@ -91,6 +91,11 @@ def read_specification(node: Node) -> Specification:
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
     )
     read_idle(own, plant)
+    written = isinstance(found.trajectory, (Resting, Expressed))
+    if plant.gained is not None and found.windows:
+        raise own["tube"].refused("has windows beside an uncertain B")
+    if plant.gained is not None and (hardware is None or not written):
+        raise own["system"].refused("has an uncertain B, without hardware or a plan that is written down")
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
     return found

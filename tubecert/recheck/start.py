@@ -227,7 +227,7 @@ class _Speed:
 
 def uncertainty(place: Place, limit: Fraction) -> Outcome:
     """|h(0, x(0))| <= limit, and where a bound of |h| is declared, that bound."""
-    s, more, known = place.system, adapted(place), joins(place)
+    s, more, known = place.system, adapted(place), _at_first(joins(place))
     beside, outcomes = [] if more is None else [more], []
     if "h" in s.declared:
         room = limit - s.declared["h"]
@@ -241,6 +241,11 @@ def uncertainty(place: Place, limit: Fraction) -> Outcome:
         outcomes.append(_norms(place, [own, *beside], limit))
     assert outcomes, "h is given, or a bound of it is declared"
     return together(outcomes)
+
+
+def _at_first(known: Matrix | None) -> Matrix | None:
+    """What joins h, at t = 0."""
+    return None if known is None else matrix_replaced(known, {TIME: NOUGHT})
 
 
 def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:

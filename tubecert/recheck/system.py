@@ -55,6 +55,7 @@ class System:
     wind: Disturbance | None = None
     ranges: dict[str, Range] = field(default_factory=dict)  # of parameters of the plant's drift,
     unknown: Matrix | None = None  # which is this, (n, 1), in place of f
+    gained: Matrix | None = None  # the plant's B, if they stand in it
 
     @property
     def h(self) -> Matrix | None:
@@ -137,6 +138,7 @@ def system_of(spec: Specification) -> System:
         wind=wind,
         ranges=spec.plant.ranges,
         unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
+        gained=spec.plant.gained,
     )
 
 

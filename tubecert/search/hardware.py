@@ -17,7 +17,7 @@ from tubecert.conditions import hardware as theorem_h
 from tubecert.conditions import machine as machines
 from tubecert.conditions.arithmetic import Array, least_solution, quiet
 from tubecert.conditions.decimals import round_down, round_up
-from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant
+from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, gains
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import TubeProblem
@@ -103,6 +103,7 @@ class Search:
             rest=exact.rest.hi,
             held=exact.held,
             drift=None if exact.drift is None else exact.drift.hi,
+            gain=None if exact.gain is None else exact.gain.hi,
         )
         self.dbar = float(reach(self.plant.n))
         self.rate = float(self.plant.n.lam)
@@ -116,28 +117,33 @@ class Search:
         loop = replace(loop, f0=chosen.f0 + 0 * loop.Ts)
         for _ in range(1 if loop.np is None else _PREDICTIONS):
             Y = self._least_speed(loop)
-            e = theorem_h.estimate(self.plant, replace(loop, Y=Y))
-            loop = replace(loop, Y=Y, S=e.bias, N=e.ripple)
+            loop = self._filtered(replace(loop, Y=Y))
             e = theorem_h.estimate(self.plant, loop)
             loop = replace(loop, Y=np.maximum(Y, e.speed), np=e.prediction)
-        e = theorem_h.estimate(self.plant, loop)
-        return replace(loop, S=e.bias, N=e.ripple)
+        return self._filtered(loop)
+
+    def _filtered(self, loop: Loop[Array]) -> Loop[Array]:
+        """With the least S and N."""
+        zero = 0 * loop.Y
+        e = theorem_h.estimate(self.plant, replace(loop, S=zero, N=zero))
+        return replace(loop, S=gains.settled(self.plant, e.bias, e.ripple), N=e.ripple)
 
     def _least_speed(self, loop: Loop[Array]) -> Array:
         """The least Y: every term of the minimum and maximum in X is affine in Y."""
-        n = self.plant.n
+        n, DB = self.plant.n, gains.acting(self.plant, self.plant.n.DB)
         still, moving = (theorem_h.estimate(self.plant, replace(loop, Y=loop.Y * 0 + y)) for y in (0.0, 1.0))
         wait = loop.Ts + loop.tau
-        drift = n.phi + n.DB * (still.kb + still.ups) + self.plant.D_E * loop.wbar
+        drift = n.phi + DB * (still.kb + still.ups) + self.plant.D_E * loop.wbar
 
         def least(*parts: tuple[Array, Array]) -> Array:
             first = sum((x for x, _ in parts), still.s1 * wait)
             second = sum((y for _, y in parts), moving.s1 * wait)
-            return least_solution(drift + n.DB * first, n.DB * (second - first))
+            return least_solution(drift + DB * first, DB * (second - first))
 
         ripple = still.ripple, moving.ripple
-        settled = least((still.bias, moving.bias), ripple)
-        return np.minimum(drift + n.DB * (n.Dh + n.R), np.maximum(settled, least((n.H0, n.H0), ripple)))
+        bias = tuple(gains.settled(self.plant, e.bias, e.ripple) for e in (still, moving))
+        settled = least((bias[0], bias[1]), ripple)
+        return np.minimum(drift + DB * (n.Dh + n.R), np.maximum(settled, least((n.H0, n.H0), ripple)))
 
     @quiet
     def needed(self, at: Lanes, chosen: Choice) -> Array:

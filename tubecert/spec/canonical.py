@@ -79,7 +79,7 @@ def _system(spec: Spec) -> dict[str, Any]:
         "parameters": {name: number_text(value) for name, value in spec.parameters}
         | {name: _numbers(ends) for name, ends in spec.ranges},
         "f": _texts(spec.drift or spec.f),
-        "B": [_texts(row) for row in spec.B],
+        "B": [_texts(row) for row in spec.gained or spec.B],
     }
 
 

@@ -28,7 +28,15 @@ from tubecert.spec.settings import (
 )
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
-from tubecert.spec.system import nominal, read_dynamics, read_metric, read_uncertainty, wanted_metric
+from tubecert.spec.system import (
+    check_gains,
+    is_uncertain,
+    known_of,
+    read_dynamics,
+    read_metric,
+    read_uncertainty,
+    wanted_metric,
+)
 from tubecert.spec.types import Metric, Places, Spec, Synthesis, Term, TermMatrix
 from tubecert.spec.windows import check_windows
 
@@ -154,27 +162,24 @@ def _is_another_file(root: Field) -> bool:
 
 
 def _in_the_middle(
-    system: dict[str, Field], dynamics: tuple[tuple[Term, ...], TermMatrix] | None, names: Names
-) -> tuple[Term, ...] | None:
-    """The f that the controller knows."""
-    if dynamics is None:
+    f: Field | None, B: Field | None, dynamics: tuple[tuple[Term, ...], TermMatrix] | None, names: Names
+) -> tuple[tuple[Term, ...], TermMatrix] | None:
+    """The f and B that the controller knows."""
+    if dynamics is None or f is None or B is None:
         return None
-    try:
-        return nominal(dynamics[0], names)
-    except ZeroDivisionError:
-        system["f"].fail(
-            codes.EXPRESSION,
-            "f is undefined where every parameter is in the middle of its range",
-            "a divisor vanishes there; give ranges that keep away from it",
-        )
+    drift = known_of(f, dynamics[0], names)
+    rows = [known_of(B, row, names) for row in dynamics[1]]
+    if drift is None or None in rows:
         return None
+    return drift, tuple(row for row in rows if row is not None)
 
 
 def _read_named(
     reader: Reader, entries: dict[str, Field], system: dict[str, Field], name: str | None, names: Names
 ) -> Spec | None:
-    dynamics = read_dynamics(system.get("f"), system.get("B"), names)
-    known = _in_the_middle(system, dynamics, names)
+    f, B = system.get("f"), system.get("B")
+    dynamics = read_dynamics(f, B, names)
+    known = _in_the_middle(f, B, dynamics, names)
     units = read_units(system.get("units"), names)
     box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
     uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
@@ -196,6 +201,10 @@ def _read_named(
     limits = read_limits(limits_of(entries.get("limits"), entries.get("hardware")), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
     hardware = read_hardware(entries.get("hardware"), entries.get("disturbance"), names)
+    gained = dynamics is not None and is_uncertain(dynamics[1], names)
+    if gained and B is not None and plan is not None and trajectory is not None:
+        windows = tube is not None and tube.windows is not None
+        check_gains(B, plan.kind, has_hardware="hardware" in entries, has_windows=windows)
     disturbance = read_disturbance(entries.get("disturbance"), names)
     if plan is not None and tube is not None and not reader.findings:
         check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
@@ -214,10 +223,11 @@ def _read_named(
         units=units,
         parameters=names.parameters,
         definitions=tuple(name for name, _ in names.definitions),
-        f=known,
+        f=known[0],
         drift=dynamics[0] if names.ranges else (),
         ranges=names.ranges,
-        B=dynamics[1],
+        B=known[1],
+        gained=dynamics[1] if gained else (),
         safe_set=box,
         uncertainty=uncertainty,
         trajectory=plan,

@@ -40,7 +40,7 @@ _RESERVED: Final = frozenset(
 class Names:
     """The names of a system, the values of its parameters, and what its definitions stand for.
 
-    Of the parameters in `ranges` only an interval is known: they are symbols, and f alone may use them.
+    Of the parameters in `ranges` only an interval is known: they are symbols, and f and B alone may use them.
     """
 
     states: tuple[str, ...]
@@ -56,15 +56,15 @@ class Names:
         return {name: constant(value) for name, value in self.parameters} | dict(self.irrational)
 
     def of_state(self) -> Scope:
-        """For f, B and the dual metric: states and parameters."""
+        """For the dual metric and E: states and parameters."""
         refused = {
             TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
             **self._inputs_refused(),
         }
         return self._scope(self.states, refused | self._ranges_refused())
 
-    def of_drift(self) -> Scope:
-        """For f: the same, and parameters of which a range is known."""
+    def of_plant(self) -> Scope:
+        """For f and B: the same, and parameters of which a range is known."""
         names = (*self.states, *dict(self.ranges))
         refused = {name: why for name, why in self.of_state().refused.items() if name not in names}
         return self._scope(names, refused)
@@ -99,8 +99,8 @@ class Names:
 
     def _ranges_refused(self) -> dict[str, str]:
         return {
-            name: f"{name} is known by a range only; such a parameter may be used in f alone (elsewhere use its "
-            "middle, by a name of its own)"
+            name: f"{name} is known by a range only; such a parameter may be used in f and B alone (elsewhere use "
+            "its middle, by a name of its own)"
             for name, _ in self.ranges
         }
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import constant, root_above, substitute, to_text
+from tubecert.expression import constant, free_symbols, root_above, substitute, to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
 from tubecert.spec.document import MappingNode
@@ -17,22 +17,64 @@ from tubecert.spec.synthesis import read_synthesis
 from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
+_WRITTEN: Final = ("equilibrium", "expressions")  # kinds of plans
 
 
 def read_dynamics(
     f: Field | None, B: Field | None, names: Names
 ) -> tuple[tuple[Term, ...], TermMatrix] | None:
-    """The drift f, of n entries, and the input matrix B, n x m; f may contain parameters known by a range."""
+    """The drift f, of n entries, and the input matrix B, n x m; both may contain parameters known by a range."""
     n, m = len(names.states), len(names.inputs)
-    drift = f.terms(n, names.of_drift(), "expressions, one per state") if f else None
-    inputs = B.term_matrix(n, m, names.of_state()) if B else None
+    drift = f.terms(n, names.of_plant(), "expressions, one per state") if f else None
+    inputs = B.term_matrix(n, m, names.of_plant()) if B else None
     if B is not None and inputs is not None and not _independent(B, inputs):
         inputs = None
     return (drift, inputs) if drift is not None and inputs is not None else None
 
 
-def nominal(drift: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
-    """F where every parameter that is known by a range is in its middle; raises `ZeroDivisionError`."""
+def known_of(field: Field, terms: tuple[Term, ...], names: Names) -> tuple[Term, ...] | None:
+    """What the controller knows: `terms` of f or B where every parameter known by a range is in its middle."""
+    try:
+        return _nominal(terms, names)
+    except ZeroDivisionError:
+        which = field.path.rpartition(".")[2]
+        field.fail(
+            codes.EXPRESSION,
+            f"{which} is undefined where every parameter is in the middle of its range",
+            "a divisor vanishes there; give ranges that keep away from it",
+        )
+        return None
+
+
+def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
+    """Whether a parameter that is known by a range stands in a matrix."""
+    return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
+
+
+def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: bool) -> None:
+    """What is covered where parameters known by ranges stand in B."""
+    if not has_hardware:
+        field.fail(
+            codes.RANGE,
+            "a parameter known by a range stands in B, and there is no section hardware",
+            "certificate H alone is stated for an uncertain gain: add hardware, or give the parameter one value",
+        )
+    elif has_windows:
+        field.fail(
+            codes.RANGE,
+            "a parameter known by a range stands in B, beside tube.windows",
+            "leave the windows out, or give the parameter one value",
+        )
+    elif kind not in _WRITTEN:
+        field.fail(
+            codes.RANGE,
+            f"a parameter known by a range stands in B, beside a trajectory of kind {kind}",
+            f"for an uncertain gain u* has to be written down: kind {' or '.join(_WRITTEN)}",
+        )
+
+
+def _nominal(drift: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
+    """Raises `ZeroDivisionError`."""
     middle = {name: constant((low + high) / 2) for name, (low, high) in names.ranges}
     if not middle:
         return drift

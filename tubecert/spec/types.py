@@ -304,7 +304,7 @@ class Spec:
     f (n), B (n, m), `safe_set` (n pairs) and x0 (n) are in the order of `states`. Parameters are substituted
     in every expression; of those in `ranges` the plant's is anywhere in its range, constant: `drift` is f of them, and
     f itself is that of their middles, which the controller knows. `locations` says where a key's value stands, by
-    dotted path (`metric.rate`, `system.f[0]`).
+    dotted path (`metric.rate`, `system.f[0]`). `gained` is the plant's B, if parameters in `ranges` stand in it.
     """
 
     name: str
@@ -321,6 +321,7 @@ class Spec:
     f: tuple[Term, ...]
     drift: tuple[Term, ...] = ()
     B: TermMatrix
+    gained: TermMatrix = ()
     safe_set: tuple[tuple[Fraction, Fraction], ...]
     uncertainty: Uncertainty
     trajectory: Trajectory

@@ -10,6 +10,7 @@ from math import isfinite
 from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
 from tubecert.bounds.compute import bound_constants
 from tubecert.bounds.constants import BoundConstants
+from tubecert.bounds.gains import gain_constants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.claims import (
@@ -239,6 +240,7 @@ def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> Tu
         constants=constants,
         wind=None if blows is None else Wind(bound=question.model.wind_bound, constants=blows),
         residual=residual_constants(suprema),
+        gain=gain_constants(suprema),
         rate=question.model.rate,
         epsilon=epsilon,
         rho_a=rho_a,

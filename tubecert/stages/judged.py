@@ -76,8 +76,10 @@ class Judged:
 
 
 def deciding(question: Question) -> tuple[str, ...]:
-    """The kinds that decide a question, by key."""
+    """The kinds that decide a question, by key; of an uncertain B nothing is known but by certificate H."""
     chosen = question.options.conditions or question.spec.decides or RATES.option
+    if question.spec.gained:
+        return (HARDWARE.key,)
     if chosen == ALL:
         given = question.spec.hardware is not None
         return tuple(kind.key for kind in KINDS if kind.name.adapts and (given or kind.name is not HARDWARE))

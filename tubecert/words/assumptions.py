@@ -38,7 +38,7 @@ _FIXED: dict[type[Assumption], str] = {
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
     ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "
-    "plan are those of f at the middles of the ranges",
+    "plan are those of f and B at the middles of the ranges",
     UncertaintyAsDeclared: "the uncertainty obeys its declared bounds on the tube",
 }
 

@@ -47,7 +47,16 @@ from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation
 from tubecert.words.digits import floor_text
 
 _OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
-_WITHOUT_MARGIN = ("wind_bound", "wind_not_covered", "corrected_formulas", "proven_gains", "any_gains")
+_WITHOUT_MARGIN = (
+    "wind_bound",
+    "wind_not_covered",
+    "gain_not_covered",
+    "gain_unmatched",
+    "gain_range",
+    "corrected_formulas",
+    "proven_gains",
+    "any_gains",
+)
 
 
 def title(claim: Claim) -> str:

@@ -29,6 +29,9 @@ NAMES: Mapping[str, str] = {
     "wind": "dbar <= delta/lambda, with the wind",
     "wind_bound": "wind without a bound",
     "wind_not_covered": "stated without wind",
+    "gain_not_covered": "stated for a known B",
+    "gain_unmatched": "inputs that act elsewhere",
+    "gain_range": "gains that are too uncertain",
     "corrected_formulas": "as-printed",
     "proven_gains": "nothing found",
     "any_gains": "nothing found",
@@ -60,6 +63,10 @@ SAYS: Mapping[str, str] = {
     "wind_bound": "the bound of the wind is searched for, which certificate H does; nothing follows here without it",
     "wind_not_covered": "the theorem is stated for inputs and matched uncertainty alone: it says nothing of a wind, or "
     "of unknown parameters, beside what the inputs can make",
+    "gain_not_covered": "the theorem is stated for a B that is known; parameters known by ranges in B are what "
+    "certificate H alone covers",
+    "gain_unmatched": "the inputs must be proven to act where those of the middles do: B(x, theta) = B B^+ B(x, theta)",
+    "gain_range": "the gain of the inputs must be proven to be off by less than itself, |B^+ B(x, theta) - I| < 1",
     "corrected_formulas": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
     "proven_gains": "gains that seem to serve were found, but none could be proven to; the constants may be too wide "
     "(lower --gap), or the margins too thin for the arithmetic",

@@ -16,6 +16,7 @@ CAUSES: Mapping[HardwareCause | str, str] = {
     "lag": "the input's lag: delay, and holding between samples",
     "noise_feedback": "noise in the feedback",
     "sampling": "feedback that is sampled and delayed",
+    "gain": "the gain of the inputs, that the estimate takes for uncertainty",
 }
 
 PARTS: Mapping[HardwarePart, str] = {

@@ -15,6 +15,7 @@ from tubecert.conditions.arithmetic import (
 )
 from tubecert.conditions.hardware.estimation import Estimate
 from tubecert.conditions.hardware.feedback import Loss
+from tubecert.conditions.hardware.gains import acting, forgetting
 from tubecert.conditions.hardware.loop import Loop, Plant
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.sampled import ages
@@ -65,7 +66,7 @@ def _supremum(D: DistanceBound[T], omega: T | None) -> T:
 @quiet
 def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[T]:
     """delta_1, delta_H, d1 and the bound of (H.12)."""
-    n, age = p.n, ages_of_feedback(loop)
+    n, age, beta = p.n, ages_of_feedback(loop), acting(p, p.n.beta)
     mu = mean_wait(n.lam, loop.Ts)
     t_a = maximum(loop.Ts, loop.Tf) + loop.tau
     early = (cost.V_d * age.first + e.n_fb) / loop.f0
@@ -74,9 +75,9 @@ def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[
     start = maximum(n.d0, loop.f0)
     # before t_a nothing is compensated; where the feedback is the slower one, the estimate acts already
     xi = e.H1 + loop.late * (e.X - e.H1)
-    d1 = start * exp(-n.lam * t_a) + (n.beta * xi + delta_1) * t_a * decay_mean(n.lam * t_a)
+    d1 = start * exp(-n.lam * t_a) + (beta * xi + delta_1) * t_a * decay_mean(n.lam * t_a)
     # where the saw-tooth of the faster clock does not begin at t_a, it adds its periodic solution at most: theory 8.4
-    faster = loop.late * (n.beta * e.s1 * mu) + (1 - loop.late) * waiting
+    faster = loop.late * (beta * e.s1 * mu) + (1 - loop.late) * waiting
     d1 = d1 + loop.off * faster / n.lam
     return replace(resumed(p, loop, e, cost, d1), start=start)
 
@@ -84,26 +85,26 @@ def course(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T]) -> Course[
 @quiet
 def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) -> Course[T]:
     """The bound of (H.12) from d = `at` >= f0 on, once the feedback and the estimate act: D stays above f0."""
-    n, age = p.n, ages_of_feedback(loop)
+    n, age, omega = p.n, ages_of_feedback(loop), forgetting(p, loop)
     base = base_of(p, loop, e)
     later = (cost.V_d * age.oldest + e.n_fb) / loop.f0
-    acting = base + cost.at(age.youngest) + cost.at(age.oldest) * later
+    pushes = base + cost.at(age.youngest) + cost.at(age.oldest) * later
     lag = e.s1 * (loop.tau + mean_wait(n.lam, loop.Ts))
     return Course(
         start=at,
         d1=at,
         bound=DistanceBound(
             d0=at,
-            beta=n.beta,
+            beta=acting(p, n.beta),
             H0=maximum(n.H0, loop.S),
             S=loop.S,
             e=loop.N + lag,
-            delta=maximum(n.lam * loop.f0, acting) + cost.ell1 * mean_wait(n.lam, loop.Tf),
+            delta=maximum(n.lam * loop.f0, pushes) + cost.ell1 * mean_wait(n.lam, loop.Tf),
             lam=n.lam,
-            omega=n.lam if loop.omega is None else loop.omega,
+            omega=n.lam if omega is None else omega,
             horizon=n.horizon,
         ),
-        omega=loop.omega,
+        omega=omega,
         base=base,
         lag=lag,
         noisy=cost.ell0 * (1 + later),
@@ -112,7 +113,7 @@ def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) ->
 
 def base_of(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> T:
     """What pushes whatever the feedback knows: the plan's defect, the input of the plan that is held, the wind."""
-    return p.n.delta + p.n.beta * e.ups + p.beta_w * loop.wbar
+    return p.n.delta + acting(p, p.n.beta) * e.ups + p.beta_w * loop.wbar
 
 
 def mean_wait(rate: T, period: T) -> T:

@@ -16,6 +16,7 @@ from tubecert.conditions.arithmetic import (
     quiet,
     sqrt,
 )
+from tubecert.conditions.hardware.gains import acting, applied, mistaken, raised, unpredicted
 from tubecert.conditions.hardware.loop import Loop, Plant
 
 
@@ -64,7 +65,8 @@ class Estimate(Generic[T]):
     """What the estimate, the filter and the clip leave of h, and what Y, S, N, np have to reach for that.
 
     `n_fb`: what noise is to the feedback, |Theta n| at most; `e_fb` the same in |.|; kb bounds |kappa|, ups |u0 - u*|,
-    s1 the rate of h along the loop, H1 and X |h - q^| at first and always. `gust` is the part of S that wind causes.
+    s1 the rate of h along the loop, H1 and X |h - q^| at first and always, `added` what all this is behind B. `gust` is
+    the part of S that wind causes, `mistaken` the one that an uncertain gain does.
     After other windows kb, ups and X hold in the window before too; `acts` are those of its own.
     """
 
@@ -75,7 +77,9 @@ class Estimate(Generic[T]):
     s1: T
     H1: T
     X: T
+    added: T
     gust: T
+    mistaken: T
     bias: T
     ripple: T
     speed: T
@@ -94,25 +98,30 @@ def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimat
     H1 = minimum(n.Dh, n.H0 + s1 * t1)
     # S + (H0 - S)_+ = max(S, H0)
     X = minimum(n.Dh + n.R, maximum(H1, maximum(loop.S, n.H0) + loop.N + s1 * t1))
-    own = Acts(kb=n.du * (loop.dhat + n_fb), ups=feedforward_error(p, loop), X=X)
+    own = Acts(kb=raised(p, n.du) * (loop.dhat + n_fb), ups=feedforward_error(p, loop), X=X)
     acts = own if past is None else own.with_those(past.acts)
     known = n.Dus + acts.ups + acts.kb
     felt = noise_felt(p, loop)
     sensed = felt if past is None else felt.with_those(past.sensed)
     gust = wind_in_estimate(p, loop)
+    kb, ups = acts.kb, acts.ups
+    added, wrong = acting(p, kb + ups + acts.X), mistaken(p, loop, s1, kb, ups)
+    bias = lag_of_filter(loop) * s1 + error_of_estimate(p, loop, s1, applied(p, ups, kb)) + gust
     return Estimate(
         n_fb=n_fb,
         e_fb=e_fb,
-        kb=acts.kb,
-        ups=acts.ups,
+        kb=kb,
+        ups=ups,
         s1=s1,
         H1=H1,
         X=acts.X,
+        added=added,
         gust=gust,
-        bias=lag_of_filter(loop) * s1 + error_of_estimate(p, loop, s1, known) + gust,
+        mistaken=wrong,
+        bias=bias if p.gain is None else bias + wrong,
         ripple=noise_in_estimate(p, loop, sensed),
-        speed=n.phi + n.DB * (acts.kb + acts.ups + acts.X) + p.D_E * loop.wbar,
-        prediction=prediction_error(p, loop, known, acts.X),
+        speed=n.phi + n.DB * added + p.D_E * loop.wbar,
+        prediction=prediction_error(p, loop, known, unpredicted(p, acts.X, kb, ups)),
         acts=own,
         sensed=sensed,
     )
@@ -145,15 +154,15 @@ def gain_of_filter(loop: Loop[T]) -> T:
     return 1 / loop.Ts if loop.omega is None else loop.omega * decay_mean(loop.omega * loop.Ts)
 
 
-def error_of_estimate(p: Plant[T], loop: Loop[T], s1: T, known: T) -> T:
-    """e_s of (H.6) without wind; `known` bounds |u0 + kappa|."""
+def error_of_estimate(p: Plant[T], loop: Loop[T], s1: T, whole: T) -> T:
+    """e_s of (H.6) without wind and what is `mistaken`; `whole` is what `applied` says."""
     n = p.n
     b0 = minimum(n.DBp * n.DBx, n.DBpx * n.DB)
     nbar = loop.nu * p.m.n_E
     moved = loop.Y * loop.Ts / 2 + nbar
     return (
         s1 * loop.Ts / 2
-        + b0 * (known + n.R + n.Dh) * moved
+        + b0 * whole * moved
         + p.m.D_pf * (loop.Y * loop.Ts / 4 + nbar)
         + n.DBpx * p.rest * moved
     )
@@ -177,14 +186,14 @@ def noise_in_estimate(p: Plant[T], loop: Loop[T], sensed: Sensed[T]) -> T:
     return summed if p.drift is None else minimum(summed, sensed.explained * p.drift)
 
 
-def prediction_error(p: Plant[T], loop: Loop[T], known: T, X: T) -> T | None:
-    """What np has to reach, (H.17); `known` bounds |u0 + kappa|."""
+def prediction_error(p: Plant[T], loop: Loop[T], known: T, missed: T) -> T | None:
+    """What np has to reach, (H.17); `known` bounds |u0 + kappa|, `missed` what else acts behind B."""
     if loop.np is None:
         return None
     n = p.n
     y = (n.Dfx + n.Dbx * known) * loop.tau
     # (e^y - 1)/D_p = tau e^y (1 - e^(-y))/y
     grown = exp(y)
-    return loop.nu * p.m.n_E * grown + (n.DB * X + p.D_E * loop.wbar + p.rest) * (
+    return loop.nu * p.m.n_E * grown + (n.DB * missed + p.D_E * loop.wbar + p.rest) * (
         loop.tau * grown * decay_mean(y)
     )

@@ -16,6 +16,7 @@ from tubecert.conditions.arithmetic import (
     sqrt,
 )
 from tubecert.conditions.hardware.estimation import Estimate
+from tubecert.conditions.hardware.gains import steepness
 from tubecert.conditions.hardware.loop import Loop, Plant
 from tubecert.conditions.machine import Bent
 from tubecert.conditions.obstacles import reach
@@ -42,7 +43,7 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
     G, L = 2 * m.G * n.rho, m.L_G * n.rho**2
     chi = 1 - G / 2 - L / 8
     bent = L + G
-    added, blown = e.kb + e.ups + e.X, loop.wbar
+    added, blown = e.added, loop.wbar
     V = m.phi_rel + n.DB * added + p.D_E * blown + n.delta_p + p.rest
     fastest = maximum(loop.Y, m.Ystar)
     Q = (L * fastest + G * V) / chi
@@ -53,12 +54,13 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
         # M and B are constant: Theta (x' - x*') is bounded in the metric, without curvature
         straight = minimum(m.phi_relM, m.D_A * loop.dhat) + pushed
         V_M, V_d = minimum(V_M, straight), minimum(V_d, straight)
-    slope, turn = m.D_F + n.beta * n.du, m.D_Fx * (loop.dhat + e.n_fb) / 2
+    du = steepness(p)
+    slope, turn = m.D_F + n.beta * du, m.D_Fx * (loop.dhat + e.n_fb) / 2
     # j1 n_M: a box of noise is measured by n_M as it is, and by sqrt(A) nbar where geodesics bend
     first = e.n_fb + bent / (2 * chi) * (sqrt(n.A) * e.e_fb)
     j0 = 1 + bent / (8 * chi)
     ell0 = slope * first + turn * j0 * e.e_fb
-    ell1 = slope * V_M + turn * V_J + n.du * m.D_cx * m.Ystar * loop.dhat
+    ell1 = slope * V_M + turn * V_J + du * m.D_cx * m.Ystar * loop.dhat
     if m.bent is not None:
         other = covariant_loss(p, m.bent, loop, e)
         ell0, ell1 = minimum(ell0, other[0]), minimum(ell1, other[1])
@@ -71,15 +73,16 @@ def covariant_loss(p: Plant[T], m: Bent[T], loop: Loop[T], e: Estimate[T]) -> tu
     n = p.n
     K = m.K_R * reach(n) ** 2
     chi = 1 - K / 8
-    added = m.beta_O * (e.kb + e.ups + e.X) + metric_gust(p, m) * loop.wbar + n.delta
+    added = m.beta_O * e.added + metric_gust(p, m) * loop.wbar + n.delta
     fastest = m.phi_M + added
     Q = K * fastest / chi
-    slope, turn = p.m.D_F + n.beta * n.du, m.D_nF * (loop.dhat + e.n_fb) / 2
+    du = steepness(p)
+    slope, turn = p.m.D_F + n.beta * du, m.D_nF * (loop.dhat + e.n_fb) / 2
     ell0 = (slope * (1 + K / (2 * chi)) + turn * (1 + K / (8 * chi))) * e.n_fb
     ell1 = (
         slope * (m.D_nX * loop.dhat + added + Q / 2)
         + turn * (fastest + Q / 8)
-        + n.du * m.D_nb * fastest * loop.dhat
+        + du * m.D_nb * fastest * loop.dhat
     )
     endless = -nothing(chi)
     return choose(chi, ell0, endless), choose(chi, ell1, endless)

@@ -82,7 +82,7 @@ class Plant(Generic[T]):
     """All that is known of the system over the tube, in one arithmetic.
 
     `beta_w`, `D_E`, `eps_w`: what a wind does per |w|; `rest`: |r| of unknown parameters; `held`: whether u* is played
-    from sample to sample; `drift`: the bound of |n_k - n_(k-1)|/Ts in units of noise.
+    from sample to sample; `drift`: the bound of |n_k - n_(k-1)|/Ts in units of noise; `gain`: D_b, None of a known B.
     """
 
     n: Numbers[T]
@@ -93,6 +93,7 @@ class Plant(Generic[T]):
     rest: T
     held: bool = False
     drift: T | None = None
+    gain: T | None = None
 
 
 def in_step(first: Fraction, second: Fraction) -> bool:
@@ -114,6 +115,7 @@ def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
         rest=zero if problem.residual is None else Interval.exact(problem.residual.size.above),
         held=machine.asked.held,
         drift=None if machine.drift is None else Interval.of(machine.drift),
+        gain=None if problem.gain is None else Interval.exact(problem.gain.error.above),
     )
 
 

@@ -16,6 +16,7 @@ from tubecert.conditions.arithmetic import (
 )
 from tubecert.conditions.hardware import windows
 from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
+from tubecert.conditions.hardware.gains import uncovered
 from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
@@ -30,11 +31,13 @@ LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
 def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Interval, Interval]:
     """The margins of (H.10) and (H.12), scalars; -inf below where a side condition is not proven."""
     nothing = Interval(-np.inf, np.inf)
-    if problem.machine is None or not _describes_a_loop(recipe):
+    if problem.machine is None or uncovered(problem) or not _describes_a_loop(recipe):
         return nothing, nothing
     if not problem.machine.clips_within(problem.constants.h, recipe.clip_radius):
         return nothing, nothing
     if problem.machine.windows or recipe.windows:
+        if problem.gain is not None:  # theorem HW is stated for a known B
+            return nothing, nothing
         return _margins_in_windows(problem, recipe)
     x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))
     if not _side_conditions(x):
@@ -146,7 +149,8 @@ def stands_in_the_way(problem: TubeProblem) -> tuple[Shortfall, ...]:
     if problem.machine is None:
         return ()
     # what fills the tube in the long run need not fill a window
-    return unbounded(problem.machine.unbounded()) or (() if problem.machine.windows else obstacles(problem))
+    lasting = () if problem.machine.windows else obstacles(problem)
+    return unbounded(problem.machine.unbounded()) or uncovered(problem) or lasting
 
 
 def ultimate_radius(problem: TubeProblem, recipe: HardwareRecipe) -> float:

@@ -11,6 +11,7 @@ from tubecert.conditions.arithmetic import (
     sqrt,
 )
 from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
+from tubecert.conditions.hardware.gains import acting
 from tubecert.conditions.hardware.loop import HardwareRecipe, loop_of, plant
 from tubecert.conditions.hardware.windows import course_of
 from tubecert.conditions.problem import TubeProblem
@@ -25,7 +26,7 @@ class Budget:
 
     `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the
     rest of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the
-    floor.
+    floor; `gain` the part of beta S that an uncertain gain causes, and beta is beta (1 + D_b) then.
     """
 
     plan: float
@@ -37,6 +38,7 @@ class Budget:
     lag: float
     noise_feedback: float
     sampling: float
+    gain: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +91,7 @@ def _widest(recipe: HardwareRecipe, found: Sequence[Told]) -> Told:
 def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
     n, e, loop, run = x.plant.n, x.estimate, x.loop, x.course
     whole = n.lam * dhat
+    beta, biased = acting(x.plant, n.beta), loop.S - e.gust
 
     def share(part: Interval) -> float:
         most = float((part / whole).sanitised().hi)
@@ -96,12 +99,13 @@ def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
 
     return Budget(
         plan=share(n.delta),
-        feedforward=share(n.beta * e.ups),
+        feedforward=share(beta * e.ups),
         wind=share(x.plant.beta_w * loop.wbar),
-        wind_estimate=share(n.beta * e.gust),
-        bias=share(n.beta * (loop.S - e.gust)),
-        noise_estimate=share(n.beta * loop.N),
-        lag=share(n.beta * run.lag),
+        wind_estimate=share(beta * e.gust),
+        bias=share(beta * (biased if x.plant.gain is None else biased - e.mistaken)),
+        noise_estimate=share(beta * loop.N),
+        lag=share(beta * run.lag),
         noise_feedback=share(run.noisy),
         sampling=share(run.bound.delta - run.base - run.noisy),
+        gain=share(beta * e.mistaken),
     )

@@ -49,6 +49,7 @@ SHARES = (
     "noise_feedback",
     "sampling",
 )
+OF_GAINS = ("gain",)  # a share of specifications with an uncertain B: left out where it is 0
 _MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
 _PROOF = ("floor", "speed", "bias", "ripple")
 
@@ -260,8 +261,9 @@ def _section(node: Node) -> HardwareSection:
 
 
 def _budget(node: Node) -> dict[str, Fraction]:
-    own = node.closed(*SHARES)
-    return {key: own[key].number() for key in SHARES}
+    own = node.closed(*SHARES, optional=OF_GAINS)
+    more = {key: own.get(key, Node.number) or Fraction(0) for key in OF_GAINS}
+    return {key: own[key].number() for key in SHARES} | more
 
 
 def _points(node: Node) -> tuple[tuple[Fraction, Fraction], ...]:

@@ -131,9 +131,8 @@ class Kind(ABC, Generic[S, R]):
         """Everything that is examined of it. One that is not certified does not claim its gains, but the rest."""
 
     def applies(self, specification: Specification) -> bool:
-        """Whether a certificate of a specification has this section."""
-        del specification
-        return True
+        """Whether a certificate of a specification has this section: not where its theorem has a B that is known."""
+        return specification.plant.gained is None
 
     def uncovered(self, setting: Setting) -> str | None:
         """The condition that a section names, uncertified, where it does not cover the disturbance; None if it does."""

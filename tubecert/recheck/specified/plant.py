@@ -10,7 +10,7 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.reading import TIME, Column, Reader
 from tubecert.recheck.specified.numbers import Range, ends, not_negative
-from tubecert.recheck.terms import Matrix, number, replaced
+from tubecert.recheck.terms import Matrix, names, number, replaced
 
 _MOST_STATES = 32
 
@@ -19,8 +19,8 @@ _MOST_STATES = 32
 class Plant:
     """x' = f + B u on a box; all exact, with what the expressions owe there.
 
-    Where `ranges` of some parameters are given the plant's drift is `unknown`, anywhere in them; f is that of the
-    middles.
+    Where `ranges` of some parameters are given the plant's drift is `unknown`, anywhere in them, and its B is `gained`
+    if they stand in it; f and B are those of the middles.
     """
 
     states: tuple[str, ...]
@@ -31,6 +31,7 @@ class Plant:
     duties: tuple[Owed, ...]
     ranges: dict[str, Range]
     unknown: Column | None
+    gained: Matrix | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,18 +66,20 @@ def read_plant(node: Node, box: Node) -> Plant:
         unit.text()
     ranges = _ranges(own["parameters"])
     _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping()])
-    reader, of_drift = Reader.of(states), Reader.of((*states, *ranges))
-    drift = of_drift.column(own["f"], n)
+    reader = Reader.of((*states, *ranges))
+    drift, B = reader.column(own["f"], n), reader.matrix(own["B"], n, m)
+    gained = not names(e for row in B for e in row).isdisjoint(ranges)
     sides = box.closed(*states)
     return Plant(
         states=states,
         inputs=inputs,
         f=_in_the_middle(own["f"], drift, ranges),
-        B=reader.matrix(own["B"], n, m),
+        B=[list(_in_the_middle(own["B"], tuple(row), ranges)) for row in B],
         safe_set={name: ends(sides[name]) for name in states},
-        duties=(*of_drift.duties, *reader.duties),
+        duties=tuple(reader.duties),
         ranges=ranges,
         unknown=drift if ranges else None,
+        gained=B if gained else None,
     )
 
 
@@ -92,7 +95,7 @@ def _ranges(node: Node) -> dict[str, Range]:
 
 
 def _in_the_middle(node: Node, drift: Column, ranges: dict[str, Range]) -> Column:
-    """What the controller knows of f."""
+    """What the controller knows of f, or of a row of B."""
     if not ranges:
         return drift
     middle = {name: number((low + high) / 2) for name, (low, high) in ranges.items()}
@@ -102,12 +105,12 @@ def _in_the_middle(node: Node, drift: Column, ranges: dict[str, Range]) -> Colum
         raise node.refused("is undefined in the middle of the ranges of its parameters") from None
 
 
-def _names(node: Node, names: Sequence[str]) -> None:
+def _names(node: Node, given: Sequence[str]) -> None:
     """Names that mean one thing each: not a constant, a function or a word of the grammar, and all different."""
-    for name in names:
+    for name in given:
         if not is_name(name):
             raise node.refused(f"has the name {name[:60]!r}, which may not be used")
-    if len(set(names)) != len(names):
+    if len(set(given)) != len(given):
         raise node.refused("uses a name twice")
 
 
