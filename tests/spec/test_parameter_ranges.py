@@ -1,4 +1,4 @@
-"""Parameters of which a range is known: read, in the middle for the controller, canonical, in f alone."""
+"""Parameters of which a range is known: read, in the middle for the controller, canonical, in f and B alone."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fractions import Fraction
 import pytest
 from systems import SMALL
 
+from tubecert import pipeline
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
 from tubecert.model import build
@@ -73,7 +74,6 @@ def test_ends_that_are_no_decimals_are_rounded_outward():
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("B: [[0], [1]]", "B: [[0], [m]]"),
         ("0.05*x", "m*x"),
         ("input: [0]", "input: [m]"),
         ("at: [0.05", "at: [m"),
@@ -82,3 +82,36 @@ def test_ends_that_are_no_decimals_are_rounded_outward():
 def test_anywhere_else_it_is_refused(old, new):
     with pytest.raises(SpecError, match=r"known by a range only|unknown symbol m"):
         load_text(with_mass(only=(old, new)), "s.yaml")
+
+
+MACHINE = "hardware: {rate: 500}\n"
+
+
+def with_gain(**changes):
+    """The same with the parameter in B, too, and a machine."""
+    return with_mass(gain=("B: [[0], [1]]", "B: [[0], [0.3/m]]"), **changes) + MACHINE
+
+
+def test_a_gain_is_known_at_the_middle():
+    spec = load_text(with_gain(), "s.yaml")
+    assert [[to_text(term.expression) for term in row] for row in spec.B] == [["0"], ["1"]]
+    assert [[to_text(term.expression) for term in row] for row in spec.gained] == [["0"], ["0.3/m"]]
+    model = build(spec)
+    assert model.constant_input
+    assert to_text(model.gained[1][0]) == "0.3/m"
+    data = canonical(spec)
+    assert data["system"]["B"] == [["0"], ["0.3/m"]]
+    again = load_text(json.dumps(data), "s.json")
+    assert canonical(again) == data
+    assert [to_text(term.expression) for row in again.gained for term in row] == ["0", "0.3/m"]
+
+
+def test_a_range_that_is_in_f_alone_leaves_B():
+    assert load_text(with_mass() + MACHINE, "s.yaml").gained == ()
+
+
+def test_another_kind_may_not_decide_of_a_gain():
+    spec = load_text(with_gain(), "s.yaml")
+    with pytest.raises(SpecError, match="stated for a known B") as found:
+        pipeline.question_of(spec, pipeline.Options(conditions="distance"))
+    assert found.value.findings[0].location == spec.location("system.B")

@@ -207,16 +207,13 @@ class GainConstants:
 
     def items(self) -> list[tuple[str, Constant, Meaning]]:
         """`(name, value, meaning)` of each, by its name in a certificate."""
-        return [("gain_error", self.error, GAIN["gain_error"])]
+        return [("gain_error", self.error, WIND["gain_error"])]
 
 
 WIND: dict[str, Meaning] = {
     **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
     **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
-}
-
-GAIN: dict[str, Meaning] = {
-    "gain_error": next(item.metadata["meaning"] for item in fields(GainConstants) if item.name == "error")
+    "gain_error": table_of(item for item in fields(GainConstants) if item.name == "error")["error"],
 }
 
 DERIVED: dict[str, Meaning] = {

@@ -260,7 +260,7 @@ def _is_range(field: Field) -> bool:
     if found is None or (found[1] and not _rises(found[1], found[2])):
         return False
     message = f"{text[:40]} reads as a range; a parameter is one exact number, or [lower, upper]"
-    help = "write the nominal value, or [lower, upper] for a parameter of f that lies anywhere between"
+    help = "write the nominal value, or [lower, upper] for a parameter of f or B that lies anywhere between"
     field.fail(codes.NUMBER, message, f"{help}; a difference may stand in parentheses" if found[1] else help)
     return True
 
