@@ -135,8 +135,8 @@ class BoundConstants:
 
 
 def table_of(constants: Iterable[Field[object]]) -> dict[str, Meaning]:
-    """What each of the fields of a class of constants is."""
-    return {item.name: item.metadata["meaning"] for item in constants}
+    """What each of the fields of a class of constants is; what has no meaning of its own is no constant."""
+    return {item.name: item.metadata["meaning"] for item in constants if item.metadata}
 
 
 TABLE: dict[str, Meaning] = table_of(fields(BoundConstants))
@@ -193,12 +193,12 @@ class ResidualConstants:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainConstants:
-    """How far the gain of the inputs is from what the controller takes it for (theory 8.9).
+    """How far the gain of the inputs is from what the controller takes it for (theory 8.10).
 
     `matched`: whether the plant's inputs are proven to act where the controller's do, B_u = 0.
     """
 
-    error: Constant = field(metadata=_of("D_b", "theory 8.9", "1", "sup |B^+ B(x, theta) - I|"))
+    error: Constant = field(metadata=_of("D_b", "theory 8.10", "1", "sup |B^+ B(x, theta) - I|"))
     matched: bool
 
     def printable(self) -> GainConstants:
@@ -207,13 +207,15 @@ class GainConstants:
 
     def items(self) -> list[tuple[str, Constant, Meaning]]:
         """`(name, value, meaning)` of each, by its name in a certificate."""
-        return [("gain_error", self.error, WIND["gain_error"])]
+        return [
+            (f"gain_{name}", getattr(self, name), meaning) for name, meaning in table_of(fields(self)).items()
+        ]
 
 
 WIND: dict[str, Meaning] = {
     **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
     **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
-    "gain_error": table_of(item for item in fields(GainConstants) if item.name == "error")["error"],
+    **{f"gain_{name}": meaning for name, meaning in table_of(fields(GainConstants)).items()},
 }
 
 DERIVED: dict[str, Meaning] = {

@@ -1,7 +1,7 @@
 """An input matrix of which parameters are known by ranges: how far its gain is from what the controller takes it for.
 
 B is that of the middles, B(x, theta) = B (I + Delta) + B_u with Delta = B^+ B(x, theta) - I. In: the fields of a model
-over a tube. Out: Delta, what it adds to h, and sup |Delta|. Trusted: yes. Implements: theory 8.9.
+over a tube. Out: Delta, what it adds to h, and sup |Delta|. Trusted: yes. Implements: theory 8.10.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Beside:
     """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly.
 
     Where parameters stand in B, too, what joins h is made by the B of the plant, and part of it is what that B does to
-    u* (theory 8.9); `inputs` is u* then, in t.
+    u* (theory 8.10); `inputs` is u* then, in t.
     """
 
     fields: Fields

@@ -1,6 +1,6 @@
 """Claims about an input matrix of which parameters are known by ranges, and what it does to h and to theorem H.
 
-B is that of the middles, P(x, theta) the plant's. Written from theory 8.9. What joins h is what an input of the *plant*
+B is that of the middles, P(x, theta) the plant's. Written from theory 8.10. What joins h is what an input of the plant
 makes up for: P^+ (f(x, theta) - f(x) + (P - B) u*), with P^+ = (P'P)^-1 P'; as P = B (I + Delta), it is what is stated
 there. Everything in the coordinates of the tube; theta is a variable of every test.
 """

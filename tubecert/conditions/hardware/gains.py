@@ -1,7 +1,7 @@
-"""What an uncertain gain of the inputs costs theorem H: (H.20)-(H.24). Trusted.
+"""What an uncertain gain of the inputs costs theorem H: (H.30)-(H.35). Trusted.
 
 The plant has B (I + Delta) in place of B, |Delta| <= D_b < 1, and the controller multiplies kappa by 1/(1 - D_b). Where
-nothing of B is unknown every function here gives back what it was given, digit by digit. Implements: theory 8.9.
+nothing of B is unknown every function here gives back what it was given, digit by digit. Implements: theory 8.10.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def applied(p: Plant[T], ups: T, kb: T) -> T:
 
 
 def mistaken(p: Plant[T], loop: Loop[T], s1: T, kb: T, ups: T) -> T:
-    """What the estimate takes for h and is not, (H.22): D_b (kb + ups + S + N + s1 (Ts/2 + tau)); 0 of a known gain."""
+    """What the estimate takes for h and is not, (H.34): D_b (kb + ups + S + N + s1 (Ts/2 + tau)); 0 of a known gain."""
     if p.gain is None:
         return number(0, loop.Ts)
     return p.gain * (kb + ups + loop.S + loop.N + s1 * (loop.Ts / 2 + loop.tau))
@@ -54,7 +54,7 @@ def settled(p: Plant[T], bias: T, ripple: T) -> T:
 
 @quiet
 def forgetting(p: Plant[T], loop: Loop[T]) -> T | None:
-    """The rate at which the filter forgets, (H.23): omega, or -log(r)/Ts; None where it does at once."""
+    """The rate at which the filter forgets, (H.35): omega, or -log(r)/Ts; None where it does at once."""
     if p.gain is None:
         return loop.omega
     nothing = number(0, loop.Ts)
