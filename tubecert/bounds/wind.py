@@ -58,10 +58,13 @@ class Beside:
 
         B^+ (f(x, theta) - f0(x)), or of an unknown B `Gain.joined` of it.
         """
-        matched = self._split(self._unknown_drift)[0]
-        if self.gain is not None:
-            matched = self.gain.joined(matched, column(self.inputs))
-        return tuple(row[0] for row in matched)
+        own = self.matched if self.gain is None else self.gain.joined(self.matched, column(self.inputs))
+        return tuple(row[0] for row in own)
+
+    @cached_property
+    def matched(self) -> Matrix:
+        """B^+ (f(x, theta) - f0(x)), (m, 1); empty where no parameter is unknown."""
+        return self._split(self._unknown_drift)[0]
 
     @cached_property
     def residual(self) -> Matrix:

@@ -36,6 +36,7 @@ from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import sentence
 
+GAIN: Final = "gain_error"
 _UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 
 
@@ -106,6 +107,11 @@ class Certified:
     def __getitem__(self, name: str) -> float:
         """The safe side of a constant."""
         return self.constants[name]
+
+    @property
+    def raised(self) -> float:
+        """What the feedback of a machine is multiplied by: 1/(1 - D_b), 1 where B is known (theory 8.10)."""
+        return 1 / (1 - self.constants.get(GAIN, 0.0))
 
     @property
     def machine(self) -> Own | None:

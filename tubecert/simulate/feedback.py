@@ -32,7 +32,7 @@ _THIN = 0.05  # of the layer: where a wind that aims turns round
 class Field(NamedTuple):
     """f (n,), B (n, m), the base of h (m,), E (n, k), row by row, and r (n,) as one program; metric, rate in 1/s.
 
-    The program is one of t, x and the parameters of which ranges are known.
+    The program is one of t, x and the parameters of which ranges are known; if these stand in B, that B comes last.
     """
 
     program: Program
@@ -86,7 +86,7 @@ class Point(NamedTuple):
 
     `plant`: f and B at the state; `seen`: where a machine looks; h (m,) at the state, k (m,), `push` = B'M gamma_s(1)
     (m,); E (n, k), w (k,) and `wind` = E w (n,). `signal` (2, m): a h that moves along a line (`problem.Beside`), its
-    value and its slope since the time `since` (1,).
+    value and its slope since the time `since` (1,). `gain` (n, m) is the plant's B less B; empty if B is known.
     """
 
     memory: Array
@@ -100,6 +100,7 @@ class Point(NamedTuple):
     wind: Array
     signal: Array
     since: Array
+    gain: Array
     curve: Curve
 
 
@@ -111,18 +112,24 @@ def field(
     h = [ZERO] * m if base is None else list(base)
     outputs = [*model.f, *(e for row in model.B for e in row), *h, *(e for row in E for e in row)]
     outputs += [row[0] for row in rest]
+    outputs += [e for row in model.gained for e in row]
     program, memory = assemble(outputs, (TIME, *model.states, *dict(model.parameters)))
     space, curve = metric(model, degree)
-    return Field(program, space, float(model.rate)), point(memory, curve, (n, m, len(E[0]) if E else 0))
+    sizes = n, m, len(E[0]) if E else 0
+    return Field(program, space, float(model.rate)), point(memory, curve, sizes, uncertain=bool(model.gained))
 
 
-def point(memory: Array, curve: Curve, sizes: tuple[int, int, int]) -> Point:
-    """Fresh results around the memory of a program and of a geodesic, for n states, m inputs and k winds."""
+def point(memory: Array, curve: Curve, sizes: tuple[int, int, int], *, uncertain: bool = False) -> Point:
+    """Fresh results around the memory of a program and of a geodesic, for n states, m inputs and k winds.
+
+    `uncertain`: whether the plant has a B of its own.
+    """
     n, m, k = sizes
+    gain = np.zeros((n, m) if uncertain else (0, m))
     plant, seen = (Model(np.zeros(n), np.zeros((n, m))) for _ in range(2))
     h, push, feedback = (np.zeros(m) for _ in range(3))
     wind = np.zeros((n, k)), np.zeros(k), np.zeros(n)
-    return Point(memory, plant, seen, h, feedback, push, *wind, np.zeros((2, m)), np.zeros(1), curve)
+    return Point(memory, plant, seen, h, feedback, push, *wind, np.zeros((2, m)), np.zeros(1), gain, curve)
 
 
 def force(d: Disturbance) -> Force:
@@ -170,6 +177,9 @@ def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point)
     if theta.shape[1] > 0 and field.program.outputs.shape[0] > rest:
         for i in range(n):
             point.wind[i] += point.memory[field.program.outputs[rest + i]]
+            for j in range(m if point.gain.shape[0] > 0 else 0):
+                own = point.memory[field.program.outputs[rest + n + i * m + j]]
+                point.gain[i, j] = own - point.plant.B[i, j]
     return status, energy
 
 

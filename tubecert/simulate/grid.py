@@ -176,6 +176,7 @@ def machine(problem: LoopProblem) -> Machine | None:
         plays=not own.held,
         box=unbounded(m) if own.box is None else own.box,
         radius=own.radius,
+        raised=own.raised,
     )
 
 

@@ -40,7 +40,7 @@ class Machine(NamedTuple):
     """`Ts` in s and `th` = 1 - e^(-omega Ts) of the estimate, its `box` (2, m) and `radius`.
 
     `predicts`: theorem H-P; `plays`: u* acts in continuous time, else it is held with the feedback. `waiting`: how many
-    feedbacks may wait for their delay to end.
+    feedbacks may wait for their delay to end; `raised`: what kappa is multiplied by, 1 where B is known.
     """
 
     Ts: float
@@ -50,6 +50,7 @@ class Machine(NamedTuple):
     plays: bool
     box: Array
     radius: float
+    raised: float
 
 
 class Notes(NamedTuple):
@@ -192,7 +193,7 @@ def _look(machine: Machine, own: Lane, count: int, now: Moment, work: Work) -> i
     else:
         status = _law(own, now.t, now.plan, kept.y, work.point)
         for j in range(fed.shape[0]):
-            fed[j] += work.point.k[j]
+            fed[j] += machine.raised * work.point.k[j]
     return status
 
 
@@ -204,7 +205,7 @@ def _feed(machine: Machine, own: Lane, count: int, now: Moment, work: Work) -> i
     if machine.predicts:
         status = _law(own, now.t, now.plan, kept.predicted, work.point)
         for j in range(fed.shape[0]):
-            kept.acting[j] += work.point.k[j]
+            kept.acting[j] += machine.raised * work.point.k[j]
     return status
 
 

@@ -63,7 +63,8 @@ class MachineRun:
 
     The estimate is clipped to the box (2, m), or where there is none to the ball of `radius`. `feedback_time` is None
     where the feedback has no rate of its own; its delay is the same; `held`: u* is played from sample to sample;
-    `predict`: the feedback is that of the predicted state (H-P). ValueError for a delay of more than a sample.
+    `predict`: the feedback is that of the predicted state (H-P). `raised`: what the feedback is multiplied by, where B
+    is uncertain. ValueError for a delay of more than a sample.
     """
 
     sample_time: float
@@ -74,6 +75,7 @@ class MachineRun:
     feedback_time: float | None = None
     held: bool = False
     predict: bool = False
+    raised: float = 1.0
 
     def __post_init__(self) -> None:
         for period, delay in (self.adaptation, self.feedback):

@@ -139,7 +139,7 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
 
 def _promise_of_machine(certified: Certified, kind: Kind, section: Section, own: Own) -> Promise:
     """Theorem H: d <= dhat, |kappa| <= kb, |h - q^| <= X, |x'| <= Y, and |q - h| of (H.6), (H.7) at the samples."""
-    r, h, feedback = own.recipe, class_of(certified), certified["feedback_gain"]
+    r, h, feedback = own.recipe, class_of(certified), certified["feedback_gain"] * certified.raised
     noise = float(r.noise) * certified["noise_metric"]  # n_M, and n_P of (H.17)
     noise = max(noise, math.sqrt(certified.upper or 0.0) * float(r.prediction or 0))
     moved = h.rate_at(float(r.speed)) * float(r.sample_time + r.delay)

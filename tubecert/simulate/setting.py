@@ -226,9 +226,9 @@ def _rest(model: ControlAffineModel, result: Result) -> Matrix:
     """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
     if not model.drift:
         return ()
-    known = Beside(_fields(model, result)).known
+    matched = Beside(_fields(model, result)).matched
     unknown = combine(1, column(model.drift), -1, column(model.f))
-    return combine(1, unknown, -1, multiply(model.B, column(known)))
+    return combine(1, unknown, -1, multiply(model.B, matched))
 
 
 def _fields(model: ControlAffineModel, result: Result) -> Fields:
@@ -289,6 +289,8 @@ def loop_of(
     """A loop with its gains; raises `TubecertError` if there are none for it, or none at the control rate."""
     if DESIGNS[controller].terms.measures:
         return _loop_on_machine(setting, choice)
+    if setting.model.gained and DESIGNS[controller].terms.filters:
+        raise TubecertError([_known_gains_only(setting, controller)])
     tuning = _tuning(setting, controller, choice)
     covered = DESIGNS[controller].terms.predicts and control_rate is None and tuning.certified
     if control_rate is not None:
@@ -340,12 +342,22 @@ def _loop_on_machine(setting: Setting, choice: Choice) -> Loop:
         feedback_time=None if hardware.feedback_time is None else float(slower * r.feedback_time),
         held=hardware.held,
         predict=hardware.predict,
+        raised=setting.certified.raised,
     )
     same = (sample_time, bandwidth) == (r.sample_time, r.bandwidth)
     return Loop(
         problem=_problem(setting, "hardware", machine=machine),
         origin=f"certified by {kind.name}" if same else CHOSEN,
         promise=promise(setting.certified, kind) if same else None,
+    )
+
+
+def _known_gains_only(setting: Setting, controller: Controller) -> Finding:
+    return Finding(
+        code="TC705",
+        message=f"parameters known by ranges stand in B: the controller {controller} is stated for a known B",
+        location=setting.spec.location("system.B"),
+        help="simulate hardware, or ccm without adaptation",
     )
 
 

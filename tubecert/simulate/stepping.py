@@ -134,7 +134,12 @@ def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
         stages=Stages(np.zeros((4, forces)), np.zeros((4, n, m)), np.zeros((4, n))),
         kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
         notes=notes(n, m, waiting),
-        point=point(shared.memory.copy(), copied(shared.curve), (n, m, shared.E.shape[1])),
+        point=point(
+            shared.memory.copy(),
+            copied(shared.curve),
+            (n, m, shared.E.shape[1]),
+            uncertain=shared.gain.shape[0] > 0,
+        ),
         inner=inner(at, forces),
     )
 
@@ -207,7 +212,7 @@ def _step(own: Lane, lane: int, s: int, work: Work, out: Output) -> int:
         for j in range(work.u.shape[0]):
             work.u[j] = work.kept.u[j] if own.holds else work.point.k[j]
             work.u[j] += plan.u[j] if own.plays else 0.0
-        _keep(stage, work.point, work.u, work.stages)
+        _keep(stage, work.point, work.u, plan.u, work.stages)
         if stage == 0:
             _hurry(own, lane, t, work, out)
     if own.flows:
@@ -271,8 +276,11 @@ def _finish(x: Array, slope: Array, y: Array, end: Array, length: float, v: int,
 
 
 @compiled
-def _keep(stage: int, point: Point, u: Array, stages: Stages) -> None:
-    """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows."""
+def _keep(stage: int, point: Point, u: Array, known: Array, stages: Stages) -> None:
+    """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows.
+
+    Of a plant with a B of its own, f + B u* + B(x, theta)(u - u* + h) + E w, (H.32), u* being `known`.
+    """
     n, m = point.plant.B.shape
     for i in range(n):
         stages.slope[stage, i] = point.plant.f[i]
@@ -280,6 +288,8 @@ def _keep(stage: int, point: Point, u: Array, stages: Stages) -> None:
             stages.h[stage, j], stages.B[stage, i, j] = point.h[j], point.plant.B[i, j]
             stages.slope[stage, i] += point.plant.B[i, j] * (u[j] + point.h[j])
         stages.slope[stage, i] += point.wind[i]
+        for j in range(m if point.gain.shape[0] > 0 else 0):
+            stages.slope[stage, i] += point.gain[i, j] * (u[j] - known[j] + point.h[j])
         if stages.h.shape[1] > m:
             stages.h[stage, m + i] = point.wind[i]
 
