@@ -28,17 +28,19 @@ def theorem(g: Given) -> dict[str, Any]:
     predicts = g.np is not None
     nbar, n_M = g.nu * g.n_E, g.nu * g.n_M
     e_fb, n_fb = (g.np, max(n_M, mp.sqrt(g.A) * g.np)) if predicts else (nbar, n_M)
-    kb = g.du * (g.dhat + n_fb)
+    acts, more = 1 + g.D_b, 1 / (1 - g.D_b)
+    kb = more * g.du * (g.dhat + n_fb)
     ups = min(2 * g.Dus, g.Lus * (max(Ts, Tf) + tau)) if g.held else mp.mpf(0)
     s1 = g.Dht + g.Dhx * g.Y
     b0 = min(g.DBp * g.DBx, g.DBpx * g.DB)
     step = g.Y * Ts / 2 + nbar
     e_s = (
         s1 * Ts / 2
-        + b0 * (g.Dus + ups + kb + g.R + g.Dh) * step
+        + b0 * (g.Dus + acts * (ups + kb + g.R + g.Dh)) * step
         + g.D_pf * (g.Y * Ts / 4 + nbar)
         + (g.eps_w + g.DBpx * g.D_E * step) * g.wbar
         + g.DBpx * g.D_r * step
+        + g.D_b * (kb + ups + g.S + g.N + s1 * (Ts / 2 + tau))
     )
     q["bias"] = (1 - th) / th * s1 * Ts + e_s
     q["ripple"] = 2 * th / Ts * g.n_B * g.nu + g.DBpx * (g.Y + 2 * nbar / Ts) * nbar
@@ -46,38 +48,42 @@ def theorem(g: Given) -> dict[str, Any]:
         q["ripple"] = min(q["ripple"], g.n_B * g.drift)
     H1 = min(g.Dh, g.H0 + s1 * (Ts + tau))
     X = min(g.Dh + g.R, max(H1, g.S + max(g.H0 - g.S, 0) + g.N + s1 * (Ts + tau)))
-    q["speed"] = g.phi + g.D_r + g.DB * (kb + ups + X) + g.D_E * g.wbar
+    q["speed"] = g.phi + g.D_r + g.DB * acts * (kb + ups + X) + g.D_E * g.wbar
     if predicts:
         Dp = g.Dfx + g.Dbx * (g.Dus + ups + kb)
         grown = mp.exp(Dp * tau)
-        q["prediction"] = nbar * grown + (g.DB * X + g.D_E * g.wbar + g.D_r) * (grown - 1) / Dp
+        q["prediction"] = (
+            nbar * grown
+            + (g.DB * (acts * X + g.D_b * (kb + ups)) + g.D_E * g.wbar + g.D_r) * (grown - 1) / Dp
+        )
     # (H.8), (H.9)
     LG, GG = g.L_G * g.rho**2, 2 * g.G * g.rho
     chi = 1 - g.G * g.rho - LG / 8
     j1, j0 = 1 + (LG + GG) / (2 * chi), 1 + (LG + GG) / (8 * chi)
     big = max(g.Y, g.Ystar)
-    V = g.phi_rel + g.DB * (kb + ups + X) + g.D_E * g.wbar + g.delta_p + g.D_r
+    V = g.phi_rel + g.DB * acts * (kb + ups + X) + g.D_E * g.wbar + g.delta_p + g.D_r
     Q = (LG * big + GG * V) / chi
     delta = g.delta + g.beta_r
-    forced = g.beta * (kb + ups + X) + g.beta_w * g.wbar + delta
+    forced = g.beta * acts * (kb + ups + X) + g.beta_w * g.wbar + delta
     V_M, V_J = mp.sqrt(g.A) * (V + Q / 2), big + Q / 8
     V_d = (g.D_F / 2 + lam) * g.dhat + forced
     if g.flat:
         inner = min(g.phi_relM, g.D_A * g.dhat) + forced
         V_M, V_d = min(V_M, inner), min(V_d, inner)
-    K = g.D_F + g.beta * g.du
+    du = acts * more * g.du
+    K = g.D_F + g.beta * du
     wide = g.dhat + n_fb
     ell0 = K * (n_fb + (j1 - 1) * mp.sqrt(g.A) * e_fb) + g.D_Fx / 2 * wide * j0 * e_fb
-    ell1 = K * V_M + g.D_Fx / 2 * wide * V_J + g.du * g.D_cx * g.Ystar * g.dhat
+    ell1 = K * V_M + g.D_Fx / 2 * wide * V_J + du * g.D_cx * g.Ystar * g.dhat
     if g.covariant:
         kr = g.K_R * g.a * g.rho**2
         chi_c = 1 - kr / 8
         gust = min(mp.sqrt(g.A) * g.D_E, g.beta_w * max(1, g.beta_O / g.beta)) * g.wbar
-        V_0 = g.D_nX * g.dhat + g.beta_O * (kb + ups + X) + gust + delta
-        Y_M = g.phi_M + g.beta_O * (kb + ups + X) + gust + delta
+        V_0 = g.D_nX * g.dhat + g.beta_O * acts * (kb + ups + X) + gust + delta
+        Y_M = g.phi_M + g.beta_O * acts * (kb + ups + X) + gust + delta
         Qc = kr * Y_M / chi_c
         c0 = K * (1 + kr / (2 * chi_c)) * n_fb + g.D_nF / 2 * wide * (1 + kr / (8 * chi_c)) * n_fb
-        c1 = K * (V_0 + Qc / 2) + g.D_nF / 2 * wide * (Y_M + Qc / 8) + g.du * g.D_nb * Y_M * g.dhat
+        c1 = K * (V_0 + Qc / 2) + g.D_nF / 2 * wide * (Y_M + Qc / 8) + du * g.D_nb * Y_M * g.dhat
         if chi_c > 0:
             ell0, ell1 = min(ell0, c0), min(ell1, c1)
     q |= {
@@ -94,7 +100,8 @@ def theorem(g: Given) -> dict[str, Any]:
     # (H.12)
     young, old = (mp.mpf(0), Tf) if predicts else (tau, Tf + tau)
     first = max(Tf, tau) if predicts else Tf + tau
-    base = delta + g.beta * ups + g.beta_w * g.wbar
+    beta = acts * g.beta
+    base = delta + beta * ups + g.beta_w * g.wbar
 
     def ell(age: Any) -> Any:
         return ell0 + ell1 * age
@@ -107,16 +114,17 @@ def theorem(g: Given) -> dict[str, Any]:
     t_a = max(Ts, Tf) + tau
     left = mp.exp(-lam * t_a)
     xi = X if Tf > Ts else H1
-    d1 = left * max(g.d0, g.f0) + (g.beta * xi + delta_1) * (1 - left) / lam
+    d1 = left * max(g.d0, g.f0) + (beta * xi + delta_1) * (1 - left) / lam
     slow, fast = max(Ts, Tf), min(Ts, Tf)
     if not mp.almosteq(slow / fast, mp.nint(slow / fast), 1e-20):
-        d1 += (ell1 * mu(Tf) if Tf < Ts else g.beta * s1 * mu(Ts)) / lam
-    push = g.beta * (g.S + g.N + s1 * (tau + mu(Ts))) + delta_2 + ell1 * mu(Tf)
+        d1 += (ell1 * mu(Tf) if Tf < Ts else beta * s1 * mu(Ts)) / lam
+    push = beta * (g.S + g.N + s1 * (tau + mu(Ts))) + delta_2 + ell1 * mu(Tf)
     q |= {
         "d1": d1,
         "t_a": t_a,
         "push": push,
-        "extra": max(g.H0 - g.S, 0),
+        "extra": acts * max(g.H0 - g.S, 0),
+        "omega": omega_of(g),
         "delta_1": delta_1,
         "delta_2": delta_2,
     }
@@ -127,7 +135,17 @@ def theorem(g: Given) -> dict[str, Any]:
 def needed(g: Given) -> Any:
     """max(d0, f0, d1, sup D)."""
     q = theorem(g)
-    return max(g.d0, g.f0, q["d1"], supremum(g, q["d1"], q["push"], q["extra"]))
+    forgets = Given(g.values | {"omega": q["omega"]})
+    return max(g.d0, g.f0, q["d1"], supremum(forgets, q["d1"], q["push"], q["extra"]))
+
+
+def omega_of(g: Given) -> Any:
+    """How fast the estimate forgets, (H.35): the larger root of r^2 = (1 - th) r + th D_b, once per sample."""
+    if not g.D_b:
+        return g.omega
+    th = mp.mpf(1) if g.omega is None else 1 - mp.exp(-g.omega * g.Ts)
+    r = max(mp.polyroots([1, -(1 - th), -th * g.D_b]))
+    return -mp.log(r) / g.Ts
 
 
 def supremum(g: Given, d1: Any, push: Any, extra: Any) -> Any:
@@ -225,6 +243,8 @@ def given(problem: Any, recipe: Any) -> Given:
         "N": exact(recipe.ripple),
         "np": exact(recipe.prediction),
     }
+    if problem.gain is not None:
+        values["D_b"] = most(problem.gain.error)
     if problem.wind is not None:
         wind = problem.wind.constants
         values |= {"beta_w": most(wind.push), "D_E": most(wind.size), "eps_w": most(wind.explained)}

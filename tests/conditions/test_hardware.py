@@ -14,7 +14,7 @@ from machines import alive_machine, asking, covariant_constants, hardware_consta
 from problems import ALIVE as TUBE
 from problems import constants as tube_constants
 
-from tubecert.bounds.constants import ResidualConstants
+from tubecert.bounds.constants import GainConstants, ResidualConstants
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import HardwareRecipe, evaluated, loop_of, margins_hardware, plant
 from tubecert.conditions.obstacles import reach
@@ -118,6 +118,13 @@ def with_covariant(problem, **values):
     return replace(problem, machine=replace(problem.machine, covariant=covariant_constants(**values)))
 
 
+def with_gain(problem, error=0.03):
+    return replace(problem, gain=GainConstants(error=Constant(below=0.0, above=error), matched=True))
+
+
+for _name in ("plain", "no filter", "prediction", "a slow feedback out of step", "a flat metric", "wind"):
+    FORMS[f"an uncertain gain, {_name}"] = with_gain(FORMS[_name][0]), FORMS[_name][1]
+FORMS["covariant with an uncertain gain"] = with_covariant(with_gain(alive_machine())), {}
 FORMS["covariant"] = with_covariant(alive_machine()), {}
 FORMS["covariant in wind"] = with_covariant(windy(alive_machine(), F("0.03"))), FORMS["wind"][1]
 FORMS["covariant with prediction"] = with_covariant(alive_machine(predict=True)), {"prediction": F("0.004")}

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rechecked import case_of, certified
 from systems import SMALL
 
-from tubecert.bounds.constants import WindConstants
+from tubecert.bounds.constants import GainConstants, WindConstants
 from tubecert.bounds.covariant import CovariantConstants
 from tubecert.conditions import hardware as theorem
 from tubecert.conditions.problem import Wind
@@ -84,6 +84,8 @@ def problems(draw):
             bound=Fraction(1, 20), constants=WindConstants(**{name: point(draw(sizes)) for name in WIND})
         ),
     )
+    if draw(st.booleans()):
+        problem = replace(problem, gain=GainConstants(error=point(draw(st.floats(0.001, 0.9))), matched=True))
     level = Fraction(draw(st.integers(1, 60)), 100)
     bandwidth = draw(st.sampled_from([None, Fraction(2), Fraction(130, 100), Fraction(90)]))
     recipe = theorem.HardwareRecipe(
@@ -117,6 +119,7 @@ def own_reading(problem, recipe) -> tuple[Setting, MachineNumbers, Promise, Digi
         problem.rho,
         problem.rho_a,
         WindNumbers(*(ball(getattr(w.constants, name)) for name in WIND), exact(w.bound)),
+        gain=None if problem.gain is None else ball(problem.gain.error),
     )
     known = {name: ball(value) for name, value, _ in m.constants.items()} | {
         "plan_defect": ball(c.plan_defect)

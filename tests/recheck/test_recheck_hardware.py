@@ -16,6 +16,7 @@ from tubecert.recheck.claims import of_certified
 MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
 WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
 TURNING = (CONFIGS / "state_dependent_input.yaml").read_text("utf-8")
+GAIN = SMALL.replace("  f: [", "  parameters: {m: [0.97, 1.03]}\n  f: [").replace("[1]]", '["1/m"]]', 1)
 KINDS = {
     "a clean machine": SMALL + "hardware: {rate: 500}\n",
     "noise per state and wind": SMALL + MACHINE + WIND,
@@ -29,6 +30,11 @@ KINDS = {
     + "hardware: {rate: 300, feedback_rate: 1000, bandwidth: 20}\ndisturbance: {bound: largest}\n",
     "the largest delay, slow feedback": SMALL
     + "hardware: {rate: 1000, delay: largest, feedback_rate: 110}\n",
+    "an uncertain gain": GAIN.replace('"-y + 0.3*sin(x)"', '"-y + 0.3*m*sin(x)"').replace(
+        "input: [0]", "input: [0.01]"
+    )
+    + MACHINE.replace("0.0005, y: 0.001", "0.0002, y: 0.0002")
+    + WIND.replace("bound: 0.01", "bound: 0.005, rate: 1"),
     "B and the metric turn": TURNING + "hardware: {rate: 500, noise: 0.0001}\n",
     "declared bounds": SMALL.replace('h: ["0.1*sin(t) + 0.05*x"]', "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")
     + MACHINE,
