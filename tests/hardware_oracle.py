@@ -124,18 +124,19 @@ def theorem(g: Given) -> dict[str, Any]:
         "t_a": t_a,
         "push": push,
         "extra": acts * max(g.H0 - g.S, 0),
-        "omega": omega_of(g),
         "delta_1": delta_1,
         "delta_2": delta_2,
     }
     q["ultimate"] = push / lam
+    if omega_of(g) is not None:
+        q["omega"] = omega_of(g)
     return q
 
 
 def needed(g: Given) -> Any:
     """max(d0, f0, d1, sup D)."""
     q = theorem(g)
-    forgets = Given(g.values | {"omega": q["omega"]})
+    forgets = Given(g.values | {"omega": q.get("omega")})
     return max(g.d0, g.f0, q["d1"], supremum(forgets, q["d1"], q["push"], q["extra"]))
 
 

@@ -83,3 +83,13 @@ def test_the_filter_forgets_at_that_rate(omega, late):
         )
         assert now <= S + (H0 - S) * np.exp(-rate * k * float(Ts)) + 1e-12
     assert now < S + 0.02 or omega == 20
+
+
+def test_the_search_finds_the_least_bias():
+    own, problem = recipe(), with_gain(alive_machine(), 0.2)
+    p, loop = plant(problem, own.clip_radius), loop_of(own)
+    zero = 0 * loop.S
+    first = hardware.estimate(p, replace(loop, S=zero, N=zero))
+    least = gains.settled(p, first.bias, first.ripple)
+    again = hardware.estimate(p, replace(loop, S=least, N=first.ripple))
+    assert float(again.bias.hi) == pytest.approx(float(least.hi), rel=1e-12)

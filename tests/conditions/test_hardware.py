@@ -149,6 +149,7 @@ def numbers(problem, own):
         "ell1": x.loss.ell1,
         "V_d": x.loss.V_d,
         "d1": run.d1,
+        "omega": run.omega,
         "ultimate": run.bound.ultimate(),
         "needed": run.supremum(),
     }
