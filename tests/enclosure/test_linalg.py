@@ -205,6 +205,15 @@ def test_midrad_covers_its_interval(seed, n):
         assert Fraction(m) + Fraction(r) >= Fraction(high)
 
 
+@pytest.mark.parametrize(("lo", "hi"), [(1 + 2.0**-52, 1 + 2.0**-51), (1.0, 1 + 2.0**-52)])
+def test_a_midpoint_that_is_rounded_to_an_end_is_as_far_from_the_other(lo, hi):
+    """No float lies between them: the middle is one of both, the upper or the lower one."""
+    mid, rad = midrad(Interval(np.array([lo]), np.array([hi])))
+    assert mid[0] in (lo, hi)
+    assert Fraction(mid[0]) - Fraction(rad[0]) <= Fraction(lo)
+    assert Fraction(mid[0]) + Fraction(rad[0]) >= Fraction(hi)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_unknown_entries_leave_eigenvalues_and_norms_unbounded(bad):
     m = np.eye(3)[None].repeat(2, axis=0)

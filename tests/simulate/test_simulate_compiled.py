@@ -77,6 +77,7 @@ def test_every_file_with_a_kernel_counts_for_the_cache():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_an_interruption_ends_runs_that_would_take_minutes():
     """The lanes resolve 2e4 rad/s over 1000 s; Ctrl-C comes after a moment."""
     model = ControlAffineModel(
