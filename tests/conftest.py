@@ -5,6 +5,11 @@ import signal
 
 import pytest
 import shared
+from hypothesis import HealthCheck, settings
+
+# how long an example takes is the machine's affair, and its other users'
+settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tests")
 
 
 @pytest.fixture(scope="session", autouse=True)

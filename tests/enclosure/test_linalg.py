@@ -271,6 +271,14 @@ def lies(honest, rng):
     yield changed(values, np.full_like(honest[values], np.inf))
     yield changed(values, np.zeros_like(honest[values]))
     for k in vectors:
+        for c in (
+            1.1,
+            1 / 1.1,
+            2.0,
+        ):  # vectors of another length, and values so that their product is the matrix
+            long = list(changed(k, honest[k] * c))
+            long[values] = honest[values] / (c if len(vectors) == 2 else c**2)
+            yield tuple(long)
         yield changed(k, honest[k] * (1 + 1e-6))
         yield changed(k, honest[k] + 1e-4 * rng.standard_normal(honest[k].shape))
         yield changed(k, rng.standard_normal(honest[k].shape))
@@ -340,6 +348,23 @@ def exact_product(seed):
     rng = np.random.default_rng(seed)
     a, b = rng.standard_normal((3, 3)), rng.standard_normal((3, 3))
     return covers(balls(a) * balls(b), *product((a, np.zeros_like(a)), (b, np.zeros_like(b))))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_products_of_single_matrices_are_covered_in_their_last_digits(seed):
+    assert exact_congruence(seed)
+    assert exact_product(seed)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-200])
+@pytest.mark.parametrize("seed", range(20))
+def test_radii_of_products_are_not_less_than_what_they_are_summed_from(seed, scale):
+    rng = np.random.default_rng(seed)
+    a, ra, rb = (scale * np.abs(rng.standard_normal((3, 3))) for _ in range(3))
+    _, rad = product((a, ra), (np.zeros((3, 3)), rb))
+    for i, j in np.ndindex(3, 3):
+        terms = ((Fraction(a[i, k]) + Fraction(ra[i, k])) * Fraction(rb[k, j]) for k in range(3))
+        assert Fraction(rad[i, j]) >= sum(terms)
 
 
 def covers(exact, mid, rad):
