@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from tubecert.claims import MetricContraction, VariableForbidden
 from tubecert.cli.app import app
-from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import is_zero
@@ -24,7 +23,7 @@ from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis import cegis, routes, sos
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
-from tubecert.synthesis.ladder import Ladder, Request, shrunk
+from tubecert.synthesis.ladder import Ladder, Request, digits_below, shrunk
 from tubecert.synthesis.problem import Proposal
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, rounded, shortest_proven
 
@@ -126,8 +125,8 @@ def test_rounding_is_symmetric_and_as_near_as_its_digits(digits, entries):
 
 
 @given(st.floats(1e-6, 1e6), st.integers(1, 6))
-def test_what_is_rounded_down_is_below_by_less_than_a_digit(value, digits):
-    low = round_down(value, digits)
+def test_digits_below_are_below(value, digits):
+    low = digits_below(value, digits)
     assert 0 < low <= Fraction(value) <= low * (1 + Fraction(10) ** (1 - digits))
 
 

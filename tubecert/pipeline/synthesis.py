@@ -42,7 +42,6 @@ from tubecert.claims import (
     ShrinkSafeSet,
     TubeInSafeSet,
 )
-from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
@@ -63,7 +62,7 @@ from tubecert.stages.options import Options, Progress, Step
 from tubecert.stages.question import Question
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, suggested
-from tubecert.synthesis.ladder import Ladder, Request
+from tubecert.synthesis.ladder import Ladder, Request, digits_below
 from tubecert.synthesis.problem import FLOORS, Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.synthesis.routes import routes
@@ -222,7 +221,7 @@ class SynthesisRun:
     def _over_rates(self, last: Fraction) -> None:
         for k in range(_RATES):
             for floor in FLOORS:
-                self._compare(round_down(last / 2**k, 3), floor, full=True)
+                self._compare(digits_below(last / 2**k, 3), floor, full=True)
 
     def _compare(self, rate: Fraction, floor: Floor, full: bool) -> Row | None:
         """A row for a metric of this rate; None if there is none."""

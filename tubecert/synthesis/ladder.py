@@ -10,10 +10,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import inf, sqrt
+from math import floor, inf, isfinite, log10, sqrt
 
 from tubecert.claims import Outcome, Proven
-from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.coordinates import Choice
@@ -112,13 +111,13 @@ class Ladder:
             return None
         failed = None
         while failed is None and best.rate < _MOST:
-            found = self._within(round_down(best.rate * 2, 2), limit)
-            failed = round_down(best.rate * 2, 2) if found is None else None
+            found = self._within(two_digits(best.rate * 2), limit)
+            failed = two_digits(best.rate * 2) if found is None else None
             best = found or best
         if failed is None:
             return best
         while failed > best.rate * Fraction(sharp):
-            middle = round_down(sqrt(best.rate * failed), 4)
+            middle = digits_below(sqrt(best.rate * failed), 4)
             if not best.rate < middle < failed:
                 break
             found = self._within(middle, limit)
@@ -128,9 +127,9 @@ class Ladder:
     def lower_rate(self, rate: Fraction) -> Fraction | None:
         """A rate below one that does not work, found with few quick attempts; None if none of them works."""
         quick = self._quick()
-        factor = _largest(lambda f: quick._within(round_down(rate * f, 2), self.request.limit) is not None)
+        factor = _largest(lambda f: quick._within(two_digits(rate * f), self.request.limit) is not None)
         self.rounds += quick.rounds
-        return factor and round_down(rate * factor, 2)
+        return factor and two_digits(rate * factor)
 
     def smaller_box(self, rate: Fraction) -> Fraction | None:
         """A factor by which the box, shrunk about its centre, has a metric at `rate`; likewise."""
@@ -371,3 +370,19 @@ def shrunk(box: Sequence[tuple[Fraction, Fraction]], factor: Fraction) -> Box:
         centre, half = (low + high) / 2, (high - low) / 2 * factor
         result.append((centre - half, centre + half))
     return tuple(result)
+
+
+def digits_below(value: float | Fraction, digits: int) -> Fraction:
+    """The largest decimal of so many digits that does not exceed a positive value."""
+    assert isfinite(value)
+    assert value > 0
+    exponent = floor(log10(value))
+    if Fraction(10) ** exponent > value:  # the logarithm was rounded up
+        exponent -= 1
+    unit = Fraction(10) ** (exponent - digits + 1)
+    return (Fraction(value) // unit) * unit
+
+
+def two_digits(value: Fraction) -> Fraction:
+    """Two digits, rounded down."""
+    return digits_below(value, 2)
