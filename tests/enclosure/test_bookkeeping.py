@@ -76,6 +76,12 @@ def test_a_box_is_bounded_by_what_bounds_the_one_it_is_a_part_of():
     assert found.above == 1.0
 
 
+@pytest.mark.parametrize("left", [True, False])
+def test_both_parts_keep_the_bound_of_the_whole(left):
+    objective = Told(lambda x, w: np.where((w > 0.5) | ((x < 0.5) == left), 1.0, 0.1), lambda x: 0.0)
+    assert supremum(objective, Pieces(), FEW).above == 1.0
+
+
 def test_an_absolute_gap_suffices_where_the_supremum_is_nothing():
     objective = Told(lambda x, w: w**2, lambda x: 0.0)
     found = supremum(objective, Pieces(), Effort(absolute=0.1))
@@ -123,7 +129,7 @@ def test_a_point_that_is_worse_is_not_told():
 
 
 def test_points_of_which_nothing_is_known_hide_no_other():
-    objective = Told(lambda x, w: 1.0, lambda x: np.where(x < 0.5, np.nan, 1.0))
+    objective = Told(lambda x, w: 1.0, lambda x: np.where(x < 1.0, np.nan, 1.0))
     assert supremum(objective, Pieces(2), FEW).below == 1.0
 
 
