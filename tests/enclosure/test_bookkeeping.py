@@ -33,6 +33,16 @@ class Pieces:
         return hi - lo
 
 
+class Nothing(Pieces):
+    """Boxes that hold no point."""
+
+    def contract(self, variables, lo, hi):
+        return lo, hi, np.zeros(len(lo), dtype=bool)
+
+    def inside(self, variables, points):
+        return points[:0], points[:0]
+
+
 class Told:
     """`upper` of the lower ends and widths of boxes, `lower` of points."""
 
@@ -131,6 +141,11 @@ def test_a_point_that_is_worse_is_not_told():
 def test_points_of_which_nothing_is_known_hide_no_other():
     objective = Told(lambda x, w: 1.0, lambda x: np.where(x < 1.0, np.nan, 1.0))
     assert supremum(objective, Pieces(2), FEW).below == 1.0
+
+
+def test_of_no_points_there_is_no_supremum():
+    with pytest.raises(ValueError, match="the domain is empty"):
+        supremum(Told(lambda x, w: 1.0, lambda x: 0.0), Nothing(3), FEW)
 
 
 @pytest.mark.parametrize("budget", [1, 7, 50])
