@@ -80,7 +80,10 @@ class Distance:
         inside = 1 + z * D1
         if inside <= 0:
             return ends
-        weak = larger(self.d0, A1) + larger(C1, arb(0)) * kappa(self.rate, self.omega)
+        most = kappa(self.rate, self.omega)
+        weak = larger(self.d0, A1) + larger(C1, arb(0)) * most
+        # without its last part D is monotone: at most d0, or what it is in the end without that part
+        weak = smaller(weak, ends + 2 * abs(C1) * most)
         if not (inside > 0 and C1 > 0 and self.rate * start < C1):
             return larger(ends, weak)
         t1 = log_ratio(D1 / self.rate) / self.rate - z * log_ratio(z * D1)
