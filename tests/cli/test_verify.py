@@ -213,6 +213,17 @@ def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
     assert str(with_metric(spec, str(array)).metric.dual_metric[0][0].expression.fraction) == "1/10"
 
 
+def test_a_csv_of_numbers_alone_is_a_constant_dual_metric(folder):
+    spec = load_system(str(folder / "bent.yaml"))
+    found = with_metric(spec, str(_text(folder, "rows.csv", "1e0, -0.5\n-0.5,2\n")), 1)
+    assert [[str(e.expression.fraction) for e in row] for row in found.metric.dual_metric] == [
+        ["1", "-1/2"],
+        ["-1/2", "2"],
+    ]
+    with pytest.raises(SpecError, match="not symmetric"):
+        with_metric(spec, str(_text(folder, "rows.csv", "1,0.5\n-0.5,2\n")), 1)
+
+
 def test_an_asymmetry_of_rounding_is_mended_and_no_other(folder):
     spec = load_system(str(folder / "bent.yaml"))
     array = np.array([[1.0, -0.5], [-0.5 + 1e-15, 2.0]])

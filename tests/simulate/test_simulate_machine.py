@@ -11,6 +11,8 @@ from scipy.integrate import solve_ivp
 
 from tubecert.expression import ONE, ZERO, constant, cos, sin, symbol
 from tubecert.model import ControlAffineModel
+from tubecert.simulate import machine
+from tubecert.simulate.grid import measurements
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopProblem, MachineRun
 from tubecert.trajectory import Plan, constant_plan
@@ -275,6 +277,19 @@ def test_the_noise_that_costs_most_is_found():
     machine = MachineRun(sample_time=1e-2, delay=0.0, bandwidth=1e-6, radius=10.0)
     found = scalar(machine, -X / 100, {"choice": 2.0, "table": [[3e-2], [-5e-2], [1e-2]]}, start=0.5)
     assert found.k[0, 0, 0] == pytest.approx(-0.99 * 0.45)
+
+
+def test_what_an_adversary_decides_by_the_state_is_decided_once():
+    """Signs of a state near 0 differ between runs of other steps, and noise that costs as much: the first run says."""
+    decided, decide = np.full((3, 2), np.nan), machine.decide.py_func
+    assert decide(decided, 1, 0, 5.0) == decide(decided, 1, 0, 7.0) == decided[1, 0] == 5.0
+    assert np.isnan(np.delete(decided.ravel(), 2)).all()
+    assert decide(decided, 3, 0, 7.0) == 7.0  # beyond what is kept
+    slow = MachineRun(sample_time=1e-2, delay=5e-3, bandwidth=20.0, radius=10.0)
+    acting = Disturbance.from_expressions(None, TWO, 4).undecided(
+        measurements(problem(slow, np.array([0.0, 1.0])))
+    )
+    assert acting.of(np.array([2])).beside.decided.shape == (1, 101, 3)
 
 
 def test_a_machine_is_slower_than_its_delay():

@@ -47,6 +47,14 @@ def instants(problem: LoopProblem) -> list[Array]:
     return [_ticks(problem, period, 0.0), *[np.zeros(0)] * 3]
 
 
+def measurements(problem: LoopProblem) -> int:
+    """How often a machine measures."""
+    if problem.machine is None or not problem.terms.measures:
+        return 0
+    _, events = corners(problem)
+    return int(((events[EVENTS.index("sample")] >= 0) | (events[EVENTS.index("look")] >= 0)).sum())
+
+
 def _ticks(problem: LoopProblem, period: float | None, delay: float) -> Array:
     """Times a delay after the samples of a period."""
     if period is None:

@@ -107,10 +107,15 @@ class _Lanes:
     """Lanes on their way down the levels."""
 
     def __init__(self, problem: LoopProblem, starts: Array, disturbance: Disturbance) -> None:
+        from tubecert.simulate.grid import measurements
         from tubecert.simulate.layout import layout
         from tubecert.simulate.stepping import output
 
-        self.problem, self.starts, self.disturbance = problem, starts, disturbance
+        self.problem, self.starts, self.disturbance = (
+            problem,
+            starts,
+            disturbance.undecided(measurements(problem)),
+        )
         self.ladder = ladder(problem, disturbance.base)
         self.N, n = starts.shape
         self.found = output(self.N, len(problem.times), layout(n, len(problem.model.inputs)))
@@ -130,12 +135,9 @@ class _Lanes:
                 if number == 0:
                     raise
                 break  # no more steps: the error estimates say how far it came
-            done = self._compare(
-                lanes,
-                run(lane, self.ladder.point, self.starts[lanes], len(self.problem.times)),
-                number,
-                tolerance,
-            )
+            finer = run(lane, self.ladder.point, self.starts[lanes], len(self.problem.times))
+            self.disturbance.beside.decided[lanes] = lane.force.beside.decided
+            done = self._compare(lanes, finer, number, tolerance)
             self.steps[lanes] = len(lane.grid.start) - 1
             lanes = lanes[~done]
             if progress is not None:

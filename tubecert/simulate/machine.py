@@ -141,8 +141,20 @@ def _turn(beside: Beside, now: Moment, work: Work) -> None:
         for j in range(c.shape[0]):
             point.signal[0, j] = point.h[j]
             step = (c[j] if aims else along[j]) / max(size, 1e-300)
+            if aims:
+                step = decide(beside.decided[lane], work.notes.tally[0], 1 + j, step)
             point.signal[1, j] = rate * step if forwards else -rate * step
         point.since[0] = now.t
+
+
+@compiled
+def decide(decided: Array, count: int, place: int, value: float) -> float:
+    """What was decided at a measurement when the run had longer steps, or now: runs of other steps are comparable."""
+    if count >= decided.shape[0]:
+        return value
+    if np.isnan(decided[count, place]):
+        decided[count, place] = value
+    return float(decided[count, place])
 
 
 @compiled
@@ -163,6 +175,7 @@ def _measure(own: Lane, now: Moment, looks: bool, work: Work) -> int:
             loss = dot(kept.push, work.point.k)  # c'kappa at the state, of (H.14)
             if loss > most:
                 most, place = loss, q
+        place = int(decide(beside.decided[lane], kept.tally[0], 0, float(place)))
     square, room = 0.0, beside.most[lane] * (now.t - kept.then[0])
     for i in range(y.shape[0]):
         square += (sign * table[place, i] - kept.noise[i]) ** 2

@@ -173,7 +173,8 @@ class Beside(NamedTuple):
     E'B c. Both go forwards and backwards as square waves of frequency and phase say: `turning`, `gusting` (N, 2). Noise
     is an entry of `table` (N, Q, n), by `choice` (N,): 0 at random; 1 the first one, its sign changing every `period`
     (N,) measurements; 2 the one that costs the feedback most. It changes by `most` (N,) per second at most. `theta`
-    (N, p) are the parameters of which ranges are known.
+    (N, p) are the parameters of which ranges are known. `decided` (N, S, 1 + m): what an adversary that looks at the
+    state has decided at measurement s, the entry of `table` and the direction of the signal; nan where it has not yet.
     """
 
     ramp: Array
@@ -189,11 +190,12 @@ class Beside(NamedTuple):
     table: Array
     most: Array
     theta: Array
+    decided: Array
 
 
 def nothing_beside(N: int, n: int, m: int, k: int = 0) -> Beside:
     """No signal, no wind and no noise, for N lanes of n states, m inputs and k winds; all parameters are known."""
-    shapes = (), (m,), (m,), (2,), (), (), (k,), (2,), (), (), (1, n), (), (0,)
+    shapes = (), (m,), (m,), (2,), (), (), (k,), (2,), (), (), (1, n), (), (0,), (0, 1 + m)
     found = Beside(*(np.zeros((N, *shape)) for shape in shapes))
     return found._replace(period=found.period + 1, most=found.most + np.inf)
 
@@ -252,6 +254,11 @@ class Disturbance:
         own = ("amplitude", "frequency", "wave", "phase", "push", "radius")
         beside = Beside(*(part[lanes] for part in self.beside))
         return replace(self, beside=beside, **{name: getattr(self, name)[lanes] for name in own})
+
+    def undecided(self, measurements: int) -> Disturbance:
+        """The same, before anything was decided."""
+        shape = (self.lanes, measurements, self.beside.decided.shape[2])
+        return replace(self, beside=self.beside._replace(decided=np.full(shape, np.nan)))
 
     @classmethod
     def from_expressions(

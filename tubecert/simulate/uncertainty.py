@@ -238,6 +238,7 @@ def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
         table=sources.table,
         most=np.array(sources.noise_rate),
         theta=low + (high - low) * np.clip(_ENDS * (genes[last:] - 0.5) + 0.5, 0.0, 1.0),
+        decided=np.zeros((0, 1 + kind.m)),
     )
     return Beside(*(part[None] for part in lane))
 

@@ -3,7 +3,8 @@
 W(x) = sum_k g_k(x) W_k. A file has `coefficients` W_k, (K, n, n) or (n, n) - in a .mat file (n, n, K) -, and of the
 g_k either `monomials`, K texts in the grammar of specifications, or `powers`, (K, n) exponents of the states in the
 order of the specification; neither for a constant W. `rate` in 1/s may stand there as well. A CSV file has the columns
-monomial, row, column, value, counted from 1; of two entries across the diagonal one suffices.
+monomial, row, column, value, counted from 1, where of two entries across the diagonal one suffices; or it is a constant
+W itself, row by row.
 A float stands for its shortest decimal. Entries across the diagonal may differ by rounding; that above it counts.
 Trusted: what comes out is read as any metric file is, with its symmetry, and proven.
 """
@@ -115,9 +116,12 @@ def _csv(path: str, spec: Spec) -> Coefficients:
         rows = [row for row in csv.reader(io.StringIO(read(path, _KIND).decode("utf-8-sig"))) if row]
     except (UnicodeDecodeError, csv.Error) as error:
         _refuse(path, codes.WRONG_TYPE, f"this is no CSV: {error}", "")
-    if not rows or [cell.strip() for cell in rows[0]] != _COLUMNS:
-        _refuse(path, codes.WRONG_SHAPE, "the first line is not monomial,row,column,value", _help())
     n = len(spec.states)
+    if len(rows) == n and all(len(row) == n for row in rows) and rows[0][0].strip() != _COLUMNS[0]:
+        return _assembled(path, spec, {"coefficients": [[cell.strip() for cell in row] for row in rows]})
+    if not rows or [cell.strip() for cell in rows[0]] != _COLUMNS:
+        message = f"neither {n} rows of {n} numbers, nor a first line monomial,row,column,value"
+        _refuse(path, codes.WRONG_SHAPE, message, _help())
     entries: dict[str, dict[tuple[int, int], str]] = {}
     for number, row in enumerate(rows[1:], start=2):
         cells = [cell.strip() for cell in row]
