@@ -20,13 +20,25 @@ def windowed(bounded: Bounded) -> Bounded:
     count = len(windows_of(bounded.question.spec)) - 1
     if bounded.machine is None or count < 1:
         return bounded
-    radii: Sequence[Fraction] = [bounded.enclosed.tube.rho] * count
+    tried: list[Sequence[Fraction]] = [[bounded.enclosed.tube.rho] * count]
     for _ in range(_ROUNDS):
-        rough = with_windows(bounded, radii, gap=_ROUGH)
-        found = None if rough.machine is None else narrowed(rough.problem, rough.machine)
+        found = _narrowed(with_windows(bounded, tried[-1], gap=_ROUGH))
         if found is None:
             break
-        pays, radii = max(found) < _PAYS * max(radii), found
-        if not pays:
+        tried.append(found)
+        if max(found) > _PAYS * max(tried[-2]):
             break
-    return with_windows(bounded, radii)
+    return _first_that_serves(bounded, tried[::-1])
+
+
+def _first_that_serves(bounded: Bounded, tried: Sequence[Sequence[Fraction]]) -> Bounded:
+    """With the first radii that something is proven in; else with the last."""
+    for radii in tried[:-1]:
+        closely = with_windows(bounded, radii)
+        if _narrowed(closely) is not None:
+            return closely
+    return with_windows(bounded, tried[-1])
+
+
+def _narrowed(bounded: Bounded) -> list[Fraction] | None:
+    return None if bounded.machine is None else narrowed(bounded.problem, bounded.machine)

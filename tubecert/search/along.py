@@ -26,14 +26,14 @@ from tubecert.conditions.proposal import Proposal
 from tubecert.search.hardware import DEADBEAT, Lanes, Search, in_lanes, setting_at
 from tubecert.search.scan import serves
 
-_DIGITS, _ROOM = 5, 9
+_DIGITS, _ROOM = 6, 9
 _OMEGAS = 16
 _ROUNDS = 40  # of lowering the levels
-_STEP = 1.002  # above what is needed
+_STEP = 1.0002  # above what is needed
 _SETTLED = 1e-4
 _SPEEDS = 60
 _FLOORS = (1.0, 0.6, 0.35, 0.2, 0.1, 0.05, 0.02)  # of where both parts of delta are the same
-_WIDER = 1 + 1e-6  # of a radius
+_WIDER = 1 + 1e-4  # of a radius, so that levels can be rounded up
 _LEAST = 1e-15
 
 
@@ -164,19 +164,20 @@ class WindowSearch:
         """The levels and the lane of the bandwidth with the least tube at its widest; None where none serves."""
         lanes = self._lanes(None)
         levels = self.levels(lanes)
-        widest = self._widest(levels)
-        if not np.isfinite(widest).any():
-            return None
-        if self.setting.bandwidth is None and len(widest) > 1:
-            near = self._lanes(float(lanes.omega[int(np.argmin(widest))]))
-            closer = self.levels(near)
-            if np.min(self._widest(closer)) < np.min(widest):
-                levels, widest = closer, self._widest(closer)
-        return levels, int(np.argmin(widest))
+        if self.setting.bandwidth is None:
+            # around what comes nearest, which may serve where the grid does not
+            closer = self.levels(self._lanes(float(lanes.omega[int(np.argmin(self._score(levels)))])))
+            levels = min(levels, closer, key=lambda each: float(np.min(self._score(each))))
+        lane = int(np.argmin(self._score(levels)))
+        return (levels, lane) if levels.good[lane] else None
 
-    def _widest(self, levels: Levels) -> Array:
+    def _score(self, levels: Levels) -> Array:
+        """How wide the tube is at its widest; where the theorem does not hold, more than that of any which serves."""
         a = np.array([float(x.at.plant.n.a) for x in levels.found])[:, None]
-        return np.where(levels.good, np.max(levels.dhat / np.sqrt(a), axis=0), np.inf)
+        short = np.max(np.stack([x.supremum for x in levels.found]) / levels.dhat, axis=0)
+        widest = np.max(levels.dhat / np.sqrt(a), axis=0)
+        beyond = 1e6 * widest.max() * np.where(np.isfinite(short), 1 + short, 1e6)
+        return np.asarray(np.where(levels.good, widest, beyond))
 
     def _lanes(self, near: float | None) -> Lanes:
         """Bandwidths from lambda/4 to no filter; or around one."""
@@ -284,4 +285,5 @@ def narrowed(problem: TubeProblem, machine: Machine) -> list[Fraction] | None:
     """Radii that the constants might be bounded for anew: what the least levels need; None where nothing serves."""
     search = WindowSearch(problem, machine)
     found = search.chosen()
-    return None if found is None else search.radii(*found)
+    recipe = None if found is None else search.recipe(*found)
+    return None if found is None or recipe is None or not serves(problem, recipe) else search.radii(*found)
