@@ -32,6 +32,7 @@ from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
 from tubecert.report.figures_tube import Plane
 from tubecert.report.numbers import percent, up
+from tubecert.report.outline import Outline
 from tubecert.report.page_sections import page_of
 from tubecert.spec import load, load_text
 from tubecert.words.assumptions import assumed
@@ -336,27 +337,67 @@ def test_which_figures_there_are(orbit, regulated, outside):
             for f in block.figures
         }
 
-    gains = {"trade-off", "sample-time", "margins-a", "margins-b", "elasticities"}
-    assert keys(orbit) == gains | {"tube-0-1", "suprema-0-1"}
-    assert keys(regulated) == gains | {f"{w}-{p}" for w in ("tube", "suprema") for p in ("0-1", "0-2", "1-2")}
-    assert keys(outside) == {"tube-0-1", "tube-0-2", "tube-1-2"}
+    gains = {"trade-off", "sample-time"}
+    assert keys(orbit) == gains | {"tube-0-1", "suprema-0-1", "state-0", "state-1", "input-0"}
+    over_time = {"state-0", "state-1", "state-2", "input-0"}
+    planes = {f"{w}-{p}" for w in ("tube", "suprema") for p in ("0-1", "0-2", "1-2")}
+    assert keys(regulated) == gains | over_time | planes
+    assert keys(outside) == over_time | {"tube-0-1", "tube-0-2", "tube-1-2"}
 
 
-def test_the_tube_is_drawn_in_its_true_size(orbit):
+def swept(drawing):
+    """How far the shape that is swept along the plan goes in each direction, in viewport units."""
+    (group,) = (g for g in drawing.iter("g") if g.get("transform", "").startswith("matrix"))
+    a, b, c, d, *_ = map(float, group.get("transform")[7:-1].split())
+    radius = float(group[0].get("stroke-width")) / 2
+    return radius * math.hypot(a, c), radius * math.hypot(b, d)
+
+
+def units(drawing, page_certificate, names):
+    """Viewport units per unit of each of two states."""
+    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
+    ranges = [page_certificate["result"]["safe_set"][name] for name in names]
+    sizes = float(safe.get("width")), float(safe.get("height"))
+    return [size / (float(high) - float(low)) for size, (low, high) in zip(sizes, ranges, strict=True)]
+
+
+def test_the_tube_of_a_constant_metric_is_an_ellipse_as_wide_as_its_half_widths(orbit):
     drawing = pages.ET.fromstring(figure(orbit, "tube-0-1").svg)
-    (sweep,) = (x for x in drawing.iter("path") if "sweep" in x.get("class", ""))
     (plan,) = (x for x in drawing.iter("path") if "plan" in x.get("class", ""))
     (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
-    low, high = orbit["result"]["safe_set"]["x1"]
-    unit = float(safe.get("width")) / (high - low)  # viewport units per unit of x1
-    assert float(sweep.get("stroke-width")) / 2 == pytest.approx(
-        orbit["result"]["tube"]["rho"] * unit, rel=1e-2
-    )
+    low = orbit["result"]["safe_set"]["x1"][0]
+    unit = units(drawing, orbit, ("x1", "x2"))
+    widths = orbit["result"]["tube"]["half_widths"]
+    for reach, each, name in zip(swept(drawing), unit, ("x1", "x2"), strict=True):
+        assert reach == pytest.approx(widths[name] * each, rel=1e-4), "dbar sqrt(W_ii)"
     points = [tuple(map(float, p.split())) for p in re.findall(r"[-\d.]+ [-\d.]+", plan.get("d"))]
     x = [row[0] for row in orbit["result"]["plan"]["samples"]["x"]]
     assert len(points) == len(x)
     for place, value in zip(points, x, strict=True):
-        assert place[0] == pytest.approx(float(safe.get("x")) + (value - low) * unit, abs=0.02)
+        assert place[0] == pytest.approx(float(safe.get("x")) + (value - low) * unit[0], abs=0.02)
+
+
+def test_the_constants_are_bounded_over_the_whole_ball(orbit):
+    drawing = pages.ET.fromstring(figure(orbit, "suprema-0-1").svg)
+    rho = orbit["result"]["tube"]["rho"]
+    for reach, unit in zip(swept(drawing), units(drawing, orbit, ("x1", "x2")), strict=True):
+        assert reach == pytest.approx(rho * unit, rel=1e-4)
+
+
+def test_every_state_over_time_has_its_half_width(orbit):
+    result = orbit["result"]
+    for i, name in enumerate(("x1", "x2")):
+        drawing = pages.ET.fromstring(figure(orbit, f"state-{i}").svg)
+        (band,) = (x for x in drawing.iter("path") if x.get("class") == "tube")
+        (plan,) = (x for x in drawing.iter("path") if "plan" in x.get("class", ""))
+        y = [float(p.split()[1]) for p in re.findall(r"[-\d.]+ [-\d.]+", band.get("d"))]
+        curve = [float(p.split()[1]) for p in re.findall(r"[-\d.]+ [-\d.]+", plan.get("d"))]
+        x = [row[i] for row in result["plan"]["samples"]["x"]]
+        unit = (max(curve) - min(curve)) / (max(x) - min(x))
+        above, below = y[: len(x)], y[len(x) :][::-1]
+        for high, middle, low in zip(above, curve, below, strict=True):
+            assert middle - high == pytest.approx(result["tube"]["half_widths"][name] * unit, abs=0.03)
+            assert low - middle == pytest.approx(result["tube"]["half_widths"][name] * unit, abs=0.03)
 
 
 def test_an_obstacle_lies_where_it_is_whatever_the_order_of_its_states(orbit):
@@ -410,7 +451,7 @@ def test_one_state_is_drawn_against_time():
     del result["safe_set"]["speed"]
     result["plan"]["samples"] = {"t": [0.0], "x": [[0.0]]}
     result["constants"] = {}
-    assert figure(sealed(result), "tube-0").title == "angle over time"
+    assert figure(sealed(result), "state-0").title == "angle over time"
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6), st.booleans())
@@ -812,8 +853,7 @@ def test_a_tube_much_narrower_than_rho_can_be_seen():
         units=("", ""),
         index=(0, 1),
         plan=((1.0, 2.0),),
-        rho=0.3,
-        sides=(1e-3, 0.3),
+        tube=Outline(turn=((0.3, 0.0), (0.0, 0.3)), sides=(1e-3, 0.3)),
         safe=((-10.0, -10.0), (10.0, 10.0)),
     )
     x, y = plane.axes([])

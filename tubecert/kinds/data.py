@@ -49,15 +49,6 @@ class GainPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Around:
-    """Proven margins against the bandwidth, by condition, at the rate of the decisive gains; None where unknown."""
-
-    bandwidth: tuple[Fraction, ...]
-    adaptation_rate: Fraction
-    margins: Mapping[str, tuple[float | None, ...]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
     """A condition that is not proven, see `claims.ConditionHolds`; `missing` is what is needed beyond the allowed."""
 
@@ -89,10 +80,6 @@ class SectionData(ABC):
     def decisive(self, *, asked: bool) -> Pair | None:
         """The gains that the verdict is about."""
         return next(iter(self.pairs(asked=asked)), None)
-
-    def margins_along(self) -> Around | None:
-        """Margins against the bandwidth, if the section has them."""
-        return None
 
 
 # -- from what was proven

@@ -13,7 +13,6 @@ from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked, Judgement, judge
 from tubecert.kinds import DISTANCE
 from tubecert.kinds.data import (
-    Around,
     GainPoint,
     Pair,
     Role,
@@ -79,14 +78,6 @@ class DistanceData(SectionData):
     def points(self) -> tuple[tuple[float, float], ...]:
         """Bandwidth and adaptation rate."""
         return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in self.curve)
-
-    def margins_along(self) -> Around | None:
-        """The margin against the bandwidth."""
-        around = self.margins_around
-        if around is None:
-            return None
-        margins = {DISTANCE.key: around.margin}
-        return Around(bandwidth=around.bandwidth, adaptation_rate=around.adaptation_rate, margins=margins)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,6 @@ from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked, Judgement, judge
 from tubecert.kinds import RATES
 from tubecert.kinds.data import (
-    Around,
     GainPoint,
     Pair,
     SectionData,
@@ -103,15 +102,6 @@ class RatesData(SectionData):
     def points(self) -> tuple[tuple[float, float], ...]:
         """Bandwidth and adaptation rate."""
         return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in self.curve)
-
-    def margins_along(self) -> Around | None:
-        """The margins against the bandwidth."""
-        around = self.margins_around
-        if around is None:
-            return None
-        return Around(
-            bandwidth=around.bandwidth, adaptation_rate=around.adaptation_rate, margins=around.margins
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

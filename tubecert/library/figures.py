@@ -20,6 +20,7 @@ from tubecert.kinds import name_of
 from tubecert.report import figures_tube
 from tubecert.report.figures_tube import Plane
 from tubecert.report.gains import rows
+from tubecert.report.outline import widths
 from tubecert.report.sections import horizon
 
 if TYPE_CHECKING:
@@ -116,25 +117,16 @@ def _box(axes: Axes, chosen: Plane) -> None:
 
 
 def _tube(axes: Axes, result: Result, chosen: Plane) -> None:
-    """Sections of the tube along the plan: discs of radius rho, cut to the half-widths."""
+    """Sections of the tube along the plan."""
     from matplotlib.collections import PolyCollection
 
-    if chosen.rho is None or not chosen.plan:
+    if chosen.tube is None or not chosen.plan:
         return
     proven = result.tube is not None and result.tube.rho_r is not None
-    sections = [_outline(chosen.rho, chosen.sides) + point for point in _along(np.array(chosen.plan))]
+    sections = [chosen.tube.points() + point for point in _along(np.array(chosen.plan))]
     color, label = (TUBE, "tube") if proven else (UNPROVEN, "tube, not proven to stay in the safe set")
     drawn = PolyCollection(sections, facecolors=color, edgecolors="none", zorder=1, label=label)
     axes.add_collection(drawn, autolim=False)
-
-
-def _outline(rho: float, sides: tuple[float, float] | None) -> Array:
-    """A disc, cut to a box; the corners of the box where the disc covers it."""
-    if sides is not None and np.hypot(*sides) <= rho * (1 + 1e-9):
-        return np.array([[a * sides[0], b * sides[1]] for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
-    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
-    disc = rho * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return disc if sides is None else np.clip(disc, -np.array(sides), sides)
 
 
 def _along(plan: Array) -> Array:
@@ -149,13 +141,13 @@ def _over_time(result: Result, axes: Axes) -> Axes:
     low, high = map(float, result.safe_set[name])
     for side in (low, high):
         axes.axhline(side, color=_EDGE, lw=1.0, label="safe set" if side == low else None)
-    samples, widths = result.plan.samples, None if result.tube is None else result.tube.half_widths
+    samples, known = result.plan.samples, widths(result)
     if samples is not None:
         x = np.array([row[0] for row in samples.x])
         t = np.array(samples.t) if len(x) > 1 else np.array([0.0, float(horizon(result) or 1)])
         x = np.broadcast_to(x, t.shape)
-        if widths is not None:
-            axes.fill_between(t, x - widths[name], x + widths[name], color=TUBE, lw=0, label="tube")
+        if known is not None:
+            axes.fill_between(t, x - known[name], x + known[name], color=TUBE, lw=0, label="tube")
         axes.plot(t, x, color="black", lw=1.0, ls="--", label="plan")
     unit = result.spec.effective.system.units.get(name)
     axes.set_xlabel("t (s)")

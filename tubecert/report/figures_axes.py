@@ -126,19 +126,21 @@ class Chart:
         inner.plot = ET.SubElement(self.plot, "g", {"clip-path": f"url(#{name})"})
         return inner
 
-    def sweep(self, points: Sequence[Point], radii: Point, style: str) -> None:
-        """The union of the ellipses with these half axes around the points of a curve.
+    def sweep(self, points: Sequence[Point], turn: tuple[Point, Point], style: str) -> None:
+        """The union of ellipses, images of the unit disc under `turn`, around the points of a curve.
 
-        A stroke with round ends is the union of discs; the group squeezes these into the ellipses.
+        A stroke with round ends is the union of discs; the group turns these into the ellipses.
         """
-        if len(points) == 1:
-            self.ellipse(points[0], radii, style)
-            return
-        (x0, y0), (x1, y1) = self.at((0.0, 0.0)), self.at(radii)
-        squeeze = (y0 - y1) / (x1 - x0)
-        group = ET.SubElement(self.plot, "g", {"transform": f"scale(1 {number(squeeze)})"})
-        flat = [(px, py / squeeze) for px, py in map(self.at, points)]
-        width = {"stroke-width": number(2 * (x1 - x0))}
+        (x0, y0), (x1, y1) = self.at((0.0, 0.0)), self.at((1.0, 1.0))
+        (a, b), (c, d) = [(value * (x1 - x0)) for value in turn[0]], [value * (y1 - y0) for value in turn[1]]
+        size = math.sqrt(abs(a * d - b * c))
+        a, b, c, d = (value / size for value in (a, b, c, d))  # of determinant 1 or -1
+        det = a * d - b * c
+        places = points if len(points) > 1 else [points[0], points[0]]
+        flat = [((d * px - b * py) / det, (a * py - c * px) / det) for px, py in map(self.at, places)]
+        matrix = " ".join(f"{value:.6g}" for value in (a, c, b, d, 0, 0))
+        group = ET.SubElement(self.plot, "g", {"transform": f"matrix({matrix})"})
+        width = {"stroke-width": f"{2 * size:.6g}"}
         ET.SubElement(group, "path", {"class": f"sweep {style}", "d": path(flat), **width})
 
     def rule(self, value: float, style: str, *, across: bool = False) -> None:

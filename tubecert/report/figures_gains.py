@@ -5,21 +5,17 @@ In: `result` of a certificate. Out: figures. Curves and pairs are those of the c
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from fractions import Fraction
-from itertools import groupby
 
 from tubecert.certificate.result import Result
 from tubecert.kinds import HARDWARE, SAMPLED
-from tubecert.kinds.data import Around
 from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.sampled import SampledData
-from tubecert.report.figures_axes import WIDTH, Axis, Chart, Point, blank, number, text
+from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.gains import NAMES, Gains, rows
-from tubecert.report.numbers import exact, short
+from tubecert.report.numbers import exact
 from tubecert.report.page import Figure
-from tubecert.words.conditions import equation
 
 STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b", "sampled": "c", "hardware": "h"}
 _LOWEST = -0.5  # margins below are not drawn
@@ -32,8 +28,6 @@ def gain_figures(result: Result) -> list[Figure]:
         _trade_off(result),
         _sample_time(result),
         _levels(result),
-        *_margins(result),
-        _elasticities(result),
     )
     return [figure for figure in made if figure is not None]
 
@@ -130,100 +124,3 @@ def _curves(
 
 def _told(row: Gains) -> str:
     return f"{NAMES[row.section]}, {row.which}: {row.text()}"
-
-
-# -- margins
-
-
-def _margins(result: Result) -> Iterator[Figure]:
-    for key in NAMES:
-        section = result.sections.get(key)
-        around = None if section is None else section.margins_along()
-        if around is not None:
-            yield _margin_figure(result, key, around)
-
-
-def _margin_figure(result: Result, section: str, around: Around) -> Figure:
-    omegas = [float(w) for w in around.bandwidth]
-    known = [v for values in around.margins.values() for v in values if v is not None]
-    low, high = max(min([*known, -0.1]), _LOWEST), max([*known, 0.1])
-    title = f"Margins of {NAMES[section]} against bandwidth"
-    key = f"margins-{STYLES[section]}"
-    x = Axis.around(omegas, "bandwidth ω (rad/s)", log=True, pad=0.02)
-    chart = Chart(key, title, x, Axis.around([100 * low, 100 * high], "margin left (%)"))
-    chart.box((x.low, chart.y.low), (x.high, 0.0), "fails")
-    chart.rule(0.0, "zero", across=True)
-    legend = []
-    several = len(around.margins) > 1
-    for i, (condition, values) in enumerate(sorted(around.margins.items())):
-        style = f"m{i + 1}" if several else STYLES[section]
-        for part in _known(omegas, values):
-            chart.line(part, style)
-        legend.append((style, equation(condition) if several else NAMES[section]))
-    rate = around.adaptation_rate
-    row = next(r for r in rows(result) if r.section == section and r.pair.adaptation_rate == rate)
-    if row.pair.bandwidth is not None:
-        chart.rule(float(row.pair.bandwidth), "chosen")
-        legend.append(("chosen", f"{row.which}: ω = {exact(row.pair.bandwidth)} rad/s"))
-    legend.append(("fails", "does not hold"))
-    caption = (
-        f"With the adaptation rate kept at Γ = {exact(rate)}; each value is proven for its own bandwidth."
-    )
-    return Figure(key=key, title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
-
-
-def _known(omegas: list[float], values: Sequence[float | None]) -> list[list[Point]]:
-    """The stretches of a curve on which it is known, in per cent."""
-    points = zip(omegas, values, strict=True)
-    parts = (list(part) for known, part in groupby(points, key=lambda p: p[1] is not None) if known)
-    return [[(w, 100 * max(v, 4 * _LOWEST)) for w, v in part if v is not None] for part in parts]
-
-
-# -- what binds
-
-
-def _elasticities(result: Result) -> Figure | None:
-    """Bars: by how many per cent the least Gamma rises when a constant rises by one."""
-    slopes = {s: v for s, v in (result.elasticities or {}).items() if v}
-    largest: dict[str, float] = {}
-    for values in slopes.values():
-        for name, value in values.items():
-            largest[name] = max(largest.get(name, 0.0), abs(value))
-    names = sorted(largest, key=lambda name: (-largest[name], name))[:_MOST]
-    if not names:
-        return None
-    height = 24 * len(names) + 36
-    svg = blank("How the least adaptation rate reacts to each constant", height)
-    shown = [0.0, *(values.get(name, 0.0) for values in slopes.values() for name in names)]
-    low, high = min(shown), max(shown)
-    left, right = 92, WIDTH - 40
-    scale = (right - left - (34 if low < 0 else 0)) / (high - low)
-    zero = left + (34 if low < 0 else 0) - low * scale
-    for row, name in enumerate(names):
-        y = 24 * row + 6
-        symbol = result.constants[name].symbol if name in result.constants else name
-        text(svg, (left - 8, y + 14), symbol, "tick end")
-        for lane, (section, values) in enumerate(sorted(slopes.items())):
-            value = values.get(name, 0.0)
-            _bar(svg, (zero, y + 9 * lane), value * scale, STYLES[section], short(value, 2))
-    ET.SubElement(svg, "path", {"class": "curve zero", "d": f"M{number(zero)} 2V{24 * len(names) + 6}"})
-    text(
-        svg,
-        ((left + right) / 2, height - 10),
-        "% of the least Γ per 1 % of the constant",
-        "axis middle",
-    )
-    legend = tuple((f"{STYLES[s]} bar", NAMES[s]) for s in sorted(slopes))
-    caption = "The longest bars bind: a constant with a bar to the right would lower Γ if it were smaller."
-    drawing = ET.tostring(svg, encoding="unicode")
-    return Figure(key="elasticities", title="What binds", svg=drawing, legend=legend, caption=caption)
-
-
-def _bar(svg: ET.Element, start: Point, length: float, style: str, words: str) -> None:
-    if not length:
-        return
-    x = start[0] + min(length, 0.0)
-    size = {"x": number(x), "y": number(start[1]), "width": number(abs(length)), "height": "8"}
-    ET.SubElement(svg, "rect", {"class": f"bar {style}", **size})
-    end = start[0] + length + (3 if length > 0 else -3)
-    text(svg, (end, start[1] + 7.5), words, f"small {'start' if length > 0 else 'end'}")

@@ -13,8 +13,9 @@ from tubecert.certificate.effective import ObstacleView
 from tubecert.certificate.result import Result
 from tubecert.enclosure.constant import Witness
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
+from tubecert.report.outline import Outline, domain_outline, tube_outline
 from tubecert.report.page import Figure
-from tubecert.report.sections import horizon, point
+from tubecert.report.sections import point
 from tubecert.words.claims import title as title_of
 
 _NEAR = 0.25  # places closer than this part of rho share a number
@@ -23,14 +24,13 @@ _ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plane:
-    """What is known in the plane of two states: the plan, radius and half-widths of the tube, the safe set."""
+    """What is known in the plane of two states: the plan, the tube and its domain at one time, the safe set."""
 
     names: tuple[str, str]
     units: tuple[str, str]
     index: tuple[int, int]
     plan: tuple[Point, ...]
-    rho: float | None
-    sides: Point | None
+    tube: Outline | None
     safe: tuple[Point, Point]
 
     def of(self, x: Sequence[float]) -> Point:
@@ -39,25 +39,42 @@ class Plane:
 
     def axes(self, marks: Sequence[Point]) -> tuple[Axis, Axis]:
         """Axes that show the tube, the marks, and of the safe set as much as leaves the tube visible."""
-        return self._axis(0, [mark[0] for mark in marks]), self._axis(1, [mark[1] for mark in marks])
+        shown = [self._shown(i, [mark[i] for mark in marks]) for i in (0, 1)]
+        safe = [(self.safe[0][i], self.safe[1][i]) for i in (0, 1)]
+        near = all(map(is_near, shown, safe))
+        first, second = (view(shown[i], safe[i], self._label(i), near=near) for i in (0, 1))
+        return first, second
 
-    def _axis(self, i: int, marks: list[float]) -> Axis:
-        reach = min(self.rho or 0.0, self.sides[i] if self.sides else math.inf)
-        shown = [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
-        low, high = self.safe[0][i], self.safe[1][i]
-        near = not self.plan or high - low <= _ZOOM * (max(shown) - min(shown))
-        label = f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
-        return Axis.around([*shown, low, high] if near else shown, label, pad=0.06 if near else 0.25)
+    def _shown(self, i: int, marks: list[float]) -> list[float]:
+        reach = 0.0 if self.tube is None else self.tube.reach[i]
+        return [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
+
+    def _label(self, i: int) -> str:
+        return f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
+
+
+def is_near(shown: Sequence[float], safe: Point) -> bool:
+    """Whether values can be told apart beside the whole safe range."""
+    return not shown or safe[1] - safe[0] <= _ZOOM * (max(shown) - min(shown))
+
+
+def view(shown: Sequence[float], safe: Point, label: str, *, near: bool) -> Axis:
+    """An axis that shows some values, with or without the safe range."""
+    return Axis.around([*shown, *safe] if near else shown, label, pad=0.06 if near else 0.25)
 
 
 def planes(result: Result) -> list[Plane]:
-    """The planes to draw: all pairs of up to three states, else neighbours two by two."""
+    """The planes to draw: all pairs of up to three states, else neighbours two by two and those of obstacles."""
     states = list(result.spec.effective.system.states)
     n = len(states)
     if n <= 3:
         pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
     else:
         pairs = [(i, i + 1) if i + 1 < n else (i - 1, i) for i in range(0, n, 2)]
+    for obstacle in result.spec.effective.obstacles:
+        own = [i for i, name in enumerate(states) if name in obstacle.states]
+        if len(own) == 2 and (own[0], own[1]) not in pairs:
+            pairs.append((own[0], own[1]))
     return [plane(result, states, pair) for pair in pairs]
 
 
@@ -65,7 +82,6 @@ def plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
     """What is known in the plane of two states, by their places."""
     i, j = pair
     units = result.spec.effective.system.units
-    widths = None if result.tube is None else result.tube.half_widths
     samples = () if result.plan.samples is None else result.plan.samples.x
     low, high = zip(*(map(float, result.safe_set[states[k]]) for k in pair), strict=True)
     return Plane(
@@ -73,47 +89,14 @@ def plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
         units=(units.get(states[i], ""), units.get(states[j], "")),
         index=pair,
         plan=tuple((float(x[i]), float(x[j])) for x in samples),
-        rho=_reach(result, pair),
-        sides=(float(widths[states[i]]), float(widths[states[j]])) if widths else None,
+        tube=tube_outline(result, pair),
         safe=((low[0], low[1]), (high[0], high[1])),
     )
 
 
-def _reach(result: Result, pair: tuple[int, int]) -> float | None:
-    """The radius of a ball; what covers the half-widths, where these are what is known of a projection."""
-    tube = result.tube
-    if tube is None or tube.coordinates is None or tube.half_widths is None:
-        return None if tube is None else float(tube.rho)
-    states = result.spec.effective.system.states
-    return math.hypot(*(tube.half_widths[states[i]] for i in pair))
-
-
 def tube_figures(result: Result) -> list[Figure]:
     """The tube in each plane, with the obstacles that lie in it and the witnesses of what was refuted."""
-    if len(result.spec.effective.system.states) == 1:
-        return _over_time(result)
     return [_tube(result, plane) for plane in planes(result)]
-
-
-def _over_time(result: Result) -> list[Figure]:
-    """The tube of a single state against time; a plan without an end is drawn for one second."""
-    (name,) = result.spec.effective.system.states
-    samples, tube = result.plan.samples, result.tube
-    if samples is None or tube is None:
-        return []
-    end = float(horizon(result) or 1)
-    x = [float(row[0]) for row in samples.x]
-    plan = list(zip(samples.t, x, strict=True)) if len(x) > 1 else [(0.0, x[0]), (end, x[0])]
-    side = float((tube.half_widths or {}).get(name, float(tube.rho)))
-    low, high = map(float, result.safe_set[name])
-    time = Axis(label="t (s)", low=0.0, high=end)
-    chart = Chart("tube-0", f"Plan and tube of {name}", time, Axis.around([low, high], name, pad=0.06))
-    chart.box((time.low, chart.y.low), (time.high, chart.y.high), "outside")
-    chart.box((time.low, low), (time.high, high), "safe")
-    chart.area([*((t, v + side) for t, v in plan), *((t, v - side) for t, v in reversed(plan))], "tube")
-    chart.line(plan, "plan")
-    legend = (("safe", "safe set"), ("tube", "within the half-width"), ("plan", "plan"))
-    return [Figure(key=chart.key, title=f"{name} over time", svg=chart.text(), legend=legend)]
 
 
 def _tube(result: Result, plane: Plane) -> Figure:
@@ -149,9 +132,9 @@ def _scene(
     chart.box((x.low, y.low), (x.high, y.high), "outside")
     chart.box(*plane.safe, "safe")
     legend = [("safe", "safe set")]
-    if plane.plan and plane.rho is not None:
-        inner = chart if plane.sides is None else chart.clipped(plane.plan, plane.sides)
-        inner.sweep(plane.plan, (plane.rho, plane.rho), "tube" if proven else "unproven")
+    if plane.plan and plane.tube is not None:
+        inner = chart if plane.tube.sides is None else chart.clipped(plane.plan, plane.tube.sides)
+        inner.sweep(plane.plan, plane.tube.turn, "tube" if proven else "unproven")
         legend.append(
             ("tube", "tube") if proven else ("unproven", "tube, not proven to stay in the safe set")
         )
@@ -202,7 +185,8 @@ def suprema_figures(result: Result) -> list[Figure]:
         if not plane.plan:
             continue
         key = f"suprema-{plane.index[0]}-{plane.index[1]}"
-        chart, _ = _scene(key, replace(plane, sides=None), [plane.of(x) for x in symbols])
+        domain = replace(plane, tube=domain_outline(result, plane.index))
+        chart, _ = _scene(key, domain, [plane.of(x) for x in symbols])
         for place, found in _close(chart, plane, list(symbols)).items():
             words = "; ".join(f"{numbers[x]}: {', '.join(symbols[x])}" for x in found)
             chart.dot(place, "numbered", 8, words)

@@ -1,4 +1,4 @@
-"""The machine of certificate H on the page: what it is, what is proven for it, and what fills its tube."""
+"""The machine of certificate H on the page: what it is, and what is proven for it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from tubecert.report.machine import (
     half_widths,
     inputs,
     section_of,
-    shares,
     start_share,
 )
 from tubecert.report.numbers import percent, up
@@ -68,7 +67,7 @@ def _windows(result: Result, own: HardwareData) -> Iterator[Block]:
 
 
 def machine_blocks(result: Result) -> Iterator[Block]:
-    """Facts about the machine, and the shares of its tube by cause; empty without certificate H."""
+    """Facts about the machine; empty without certificate H."""
     own = section_of(result)
     if own is None or own.sample_time is None:
         return
@@ -85,14 +84,3 @@ def machine_blocks(result: Result) -> Iterator[Block]:
             facts.append(("the start", Cell(text=f"{percent(start)} of the proven tube")))
     yield Facts(facts=tuple(facts))
     yield from _windows(result, own)
-    if own.budget is None:
-        return
-    yield Table(
-        columns=("what fills the tube", "share"),
-        rows=tuple(
-            (Cell(text=each.cause), Cell(text=percent(each.share), kind="number", share=min(1.0, each.share)))
-            for each in shares(own.budget)
-        ),
-        note="Shares of what the contraction can make good at the edge of the proven tube. Better hardware helps where "
-        "the share is large.",
-    )

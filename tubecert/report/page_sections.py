@@ -13,11 +13,13 @@ from tubecert.certificate.result import Bound, Certificate, InputData, MetricDat
 from tubecert.kinds import HARDWARE
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
+from tubecert.report.figures_time import input_figures, state_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.machine import proven as proven_machine
 from tubecert.report.mathml import matrix, named
 from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
+from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import (
     Block,
     Cell,
@@ -36,16 +38,28 @@ from tubecert.report.page_conditions import conditions
 from tubecert.report.page_machine import machine_blocks
 from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_trust import declared, proven
+from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
 from tubecert.words.claims import message, title
 
-_TUBE = (
-    "The tube projected on each plane: the state is within rho of the plan in the Euclidean norm, and each coordinate "
-    "within its half-width."
+_ELLIPSE = (
+    "The tube in each plane: the projection of the states whose Riemannian distance to the plan stays below the proven "
+    "bound, an ellipse around every point of the plan."
 )
-_SIDES = "The tube projected on each plane: each coordinate is within its half-width of the plan."
+_CUT = (
+    "The tube in each plane: what the proven radius and the half-widths leave, around every point of the plan. The "
+    "metric depends on the state, so the states that are nearer than the proven distance are fewer than what is drawn."
+)
+_SHARES = (
+    "Shares of what the contraction can make good at the edge of the proven tube, from above. What has a large share "
+    "makes the tube wide; a better plan, model, sensor or computer helps there. What is missing to 100 % is the "
+    "margin. The gains of each certificate were chosen by themselves, so columns need not agree."
+)
+_NO_LIMITS = (
+    "The specification gives no limits of the inputs, so nothing is claimed of them: the curve is the plan's."
+)
 
 
 def page_of(certificate: Certificate) -> Page:
@@ -107,12 +121,14 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
     if machine := tuple(machine_blocks(result)):
         yield Section(key="machine", title="Machine", blocks=machine)
+    if blocks := tuple(_filled(result)):
+        yield Section(key="fills", title="What fills the tube", blocks=blocks)
     if blocks := tuple(_tube(result)):
         yield Section(key="tube", title="Safe set" if result.tube is None else "Tube", blocks=blocks)
-    if result.inputs:
-        yield Section(key="inputs", title="Inputs", blocks=tuple(_inputs(result)))
+    if blocks := tuple(_inputs(result)):
+        yield Section(key="inputs", title="Inputs", blocks=blocks)
     if result.sections:
-        yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
+        yield Section(key="conditions", title="Conditions and margins", blocks=tuple(conditions(result)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
     if result.metric is not None:
         yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric, result.tube)))
@@ -176,8 +192,7 @@ def _gains(result: Result) -> Iterator[Block]:
     if (limit := sections.sample_time_limit(result)) is not None:
         yield Words(text=f"However large the bandwidth, C needs a sample time below {down(limit)} s.")
     yield from _reasons(result, certified=True)
-    curves = tuple(f for f in gain_figures(result) if not f.key.startswith(("margins", "elasticities")))
-    if curves:
+    if curves := tuple(gain_figures(result)):
         yield Figures(figures=curves)
 
 
@@ -194,11 +209,23 @@ def _gains_row(row: Gains) -> tuple[Cell, ...]:
     )
 
 
-def _conditions(result: Result) -> Iterator[Block]:
-    yield from conditions(result)
-    figures = tuple(f for f in gain_figures(result) if f.key.startswith(("margins", "elasticities")))
-    if figures:
-        yield Figures(figures=figures)
+def _filled(result: Result) -> Iterator[Block]:
+    """What fills the tube of every kind that is certified, a column each."""
+    found = filled(result)
+    causes = dict.fromkeys(each.cause for kind in found for each in kind.shares)
+    told = [{each.cause: each.share for each in kind.shares} for kind in found]
+    if found:
+        yield Table(
+            columns=("cause", *(NAMES[kind.key] for kind in found)),
+            rows=tuple((Cell(text=cause), *(_share(own.get(cause)) for own in told)) for cause in causes),
+            note=_SHARES,
+        )
+
+
+def _share(share: float | None) -> Cell:
+    if share is None:
+        return Cell(text="", kind="number")
+    return Cell(text=f"{up(100 * share, 3)} %", kind="number", share=min(1.0, share))
 
 
 def _tube(result: Result) -> Iterator[Block]:
@@ -207,8 +234,16 @@ def _tube(result: Result) -> Iterator[Block]:
     figures = tuple(tube_figures(result))
     if figures:
         yield Figures(figures=figures)
-        if result.tube is not None and result.tube.half_widths is not None:
-            yield Words(text=_TUBE if result.tube.coordinates is None else _SIDES)
+        yield from _drawn(result)
+    if figures := tuple(state_figures(result)):
+        yield Figures(figures=figures)
+
+
+def _drawn(result: Result) -> Iterator[Block]:
+    """What the outline of the tube is."""
+    outline = tube_outline(result, (0, 1))
+    if outline is not None and widths(result) is not None:
+        yield Words(text=_ELLIPSE if outline.sides is None else _CUT)
 
 
 def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
@@ -220,8 +255,12 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
             Cell(text="z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states"),
         )
         yield "epsilon, by state", Cell(text=sections.in_states(result, tube, tube.epsilon, "epsilon"))
-    if tube.half_widths:
-        yield "half-widths", Cell(text=sections.half_widths(result, tube.half_widths))
+    known = widths(result)
+    if known and known != tube.half_widths:
+        yield "proven half-widths", Cell(text=sections.half_widths(result, known))
+        yield "constants bounded over", Cell(text=sections.half_widths(result, tube.half_widths or {}))
+    elif known:
+        yield "half-widths", Cell(text=sections.half_widths(result, known))
     for line in sections.clearances(result):
         yield "obstacles", Cell(text=line)
     yield "claimed", Cell(text=sections.span(result))
@@ -230,9 +269,18 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
 
 
 def _inputs(result: Result) -> Iterator[Block]:
+    if result.inputs:
+        yield _input_table(result)
+    if figures := tuple(input_figures(result)):
+        yield Figures(figures=figures)
+        if not result.inputs and proven_machine(result) is None:
+            yield Words(text=_NO_LIMITS)
+
+
+def _input_table(result: Result) -> Table:
     loops = [(own, key) for own in result.inputs for key in _loops(own)]
     columns = ("input", "limits", "verdict", "on the plan", "loop of", "stays within", "used")
-    yield Table(
+    return Table(
         columns=(*columns, "feedback", "adaptation"),
         rows=tuple(_input_row(result, own, key) for own, key in loops),
         note="Proven for every uncertainty of the class: what the plan needs, and what feedback and adaptation add at "

@@ -1,0 +1,38 @@
+"""What fills the tube: the causes make up the whole, and each is what it is called."""
+
+import pytest
+from proven import proven
+
+from tubecert.certificate.result import Certificate
+from tubecert.report.shares import filled
+
+WINDY = """
+tubecert: 1
+name: windy
+system: {states: [x], inputs: [u], f: ["-x"], B: [[1]]}
+safe_set: {x: [-2, 2]}
+uncertainty: {h: ["0.4*sin(t)"]}
+disturbance: {E: [[1]], bound: 0.05}
+trajectory: {kind: equilibrium, at: [0], input: [0], horizon: 20}
+tube: {epsilon: 0.7, rho_a: 0.1}
+metric: {dual_metric: [[1]], rate: 1}
+conditions: {decides: B}
+"""
+
+
+def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
+    sealed = proven(WINDY)
+    result = Certificate.from_json(sealed).result
+    told = {each.key: {part.cause: part.share for part in each.shares} for each in filled(result)}
+    assert set(told) == {"no_adaptation", "distance", "sampled"}, "A compares other quantities"
+    for key, causes in told.items():
+        total, margin = sum(causes.values()), result.sections[key].decisive(asked=False).margins[key]
+        assert 1 - margin.above - 1e-6 <= total <= 1 - margin.below + 1e-3
+        # W = 1: beta = 1, dbar = rho = .8, lambda = 1
+        assert causes["wind that pushes"] == pytest.approx(0.05 / 0.8, rel=1e-6)
+    assert told["no_adaptation"]["the uncertainty, which nothing compensates"] == pytest.approx(
+        0.4 / 0.8, rel=1e-2
+    )
+    assert told["sampled"]["wind that the estimate takes for uncertainty"] == pytest.approx(
+        0.05 / 0.8, rel=1e-6
+    )

@@ -1,0 +1,138 @@
+"""The tube in the plane of two states at one time: an ellipse, cut to half-widths where that is all that is proven.
+
+In: `result` of a certificate. Out: the outline relative to the plan, in floats, to be drawn; nothing is decided here.
+
+For a constant W the state stays in {d(x*, x) < level}, whose projection is an ellipse with the block of W in the plane.
+For any other metric what is proven is |S (x - x*)| < radius and every half-width.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.certificate.result import Result, TubeData
+from tubecert.coordinates import inverse
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import Expression, ExpressionError, free_symbols, parse, symbol
+from tubecert.kinds import HARDWARE
+from tubecert.report.machine import proven
+
+Pair = tuple[float, float]
+Matrix = tuple[Pair, Pair]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outline:
+    """The image of the unit disc under `turn`, cut to `sides` on both sides of each coordinate, if any."""
+
+    turn: Matrix
+    sides: Pair | None = None
+
+    @property
+    def reach(self) -> Pair:
+        """How far it goes in each coordinate."""
+        first, second = (math.hypot(*row) for row in self.turn)
+        return (
+            (first, second) if self.sides is None else (min(first, self.sides[0]), min(second, self.sides[1]))
+        )
+
+    def points(self, number: int = 72) -> Array:
+        """Points (number, 2) around it."""
+        angle = np.linspace(0.0, 2 * np.pi, number + 1)[:-1]
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.array(self.turn).T
+        sides = np.array((np.inf, np.inf) if self.sides is None else self.sides)
+        return np.asarray(np.clip(around, -sides, sides))
+
+
+def widths(result: Result) -> dict[str, float] | None:
+    """The half-width of every state by what decides the verdict, in the order of the states; None if none is known."""
+    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
+    found = (
+        machine.half_widths
+        if machine is not None
+        else None
+        if result.tube is None
+        else result.tube.half_widths
+    )
+    if not found:
+        return None
+    return {name: found[name] for name in result.spec.effective.system.states}
+
+
+def tube_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
+    """What the state stays in, by what decides the verdict; None where there is no tube."""
+    tube = result.tube
+    if tube is None:
+        return None
+    level, W = _level(result, tube), _constant(result)
+    if level is not None and W is not None:
+        return Outline(turn=_root(level**2 * W[np.ix_(pair, pair)]))
+    names, known = result.spec.effective.system.states, widths(result)
+    sides = None if known is None else (known[names[pair[0]]], known[names[pair[1]]])
+    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
+    radius = float(tube.rho) if machine is None or machine.radius is None else machine.radius
+    return Outline(turn=_ball(tube, radius, pair), sides=sides)
+
+
+def domain_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
+    """The set |S (x - x*)| < rho over which every constant is bounded."""
+    tube = result.tube
+    return None if tube is None else Outline(turn=_ball(tube, float(tube.rho), pair))
+
+
+def _level(result: Result, tube: TubeData) -> float | None:
+    """The distance that is not reached: what H proves where it decides, else dbar = sqrt(a) rho."""
+    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
+    if machine is not None and machine.level is not None:
+        return float(machine.level)
+    a = None if result.metric is None else result.metric.lower
+    return None if a is None or tube.rho_r is None or a.below <= 0 else math.sqrt(a.below) * float(tube.rho)
+
+
+def _ball(tube: TubeData, radius: float, pair: tuple[int, int]) -> Matrix:
+    """The projection of |S y| < radius: y_i reaches sqrt of the diagonal of S^-1 S^-T."""
+    if tube.coordinates is None:
+        return (radius, 0.0), (0.0, radius)
+    rows = inverse([[Fraction(entry) for entry in row] for row in tube.coordinates])
+    back = np.array([[float(entry) for entry in row] for row in rows])
+    return _root(radius**2 * (back @ back.T)[np.ix_(pair, pair)])
+
+
+def _root(shape: Array) -> Matrix:
+    """L with L L' = shape, (2, 2): the unit disc becomes {y: y' shape^-1 y < 1}; never quite flat, to be seen."""
+    values, vectors = np.linalg.eigh(shape)
+    least = max(1e-12 * float(values[-1]), 1e-300)
+    (a, b), (c, d) = (vectors * np.sqrt(np.maximum(values, least))).tolist()
+    return (a, b), (c, d)
+
+
+def _constant(result: Result) -> Array | None:
+    """W where it is the same everywhere, (n, n)."""
+    metric, states = result.metric, result.spec.effective.system.states
+    if metric is None:
+        return None
+    found = [number_of(entry, states) for row in metric.dual_metric for entry in row]
+    known = [value for value in found if value is not None]
+    return np.array(known).reshape(len(states), -1) if len(known) == len(found) == len(states) ** 2 else None
+
+
+def number_of(text: str, names: Sequence[str]) -> float | None:
+    """The value of an expression that depends on nothing."""
+    found = expression_of(text, names)
+    if found is None or free_symbols([found]):
+        return None
+    return float(Tape([found], ()).run_floats([], ())[0])
+
+
+def expression_of(text: str, names: Sequence[str]) -> Expression | None:
+    """A text of the certificate as an expression of these names; None if it is none."""
+    try:
+        return parse(text, symbols={name: symbol(name) for name in names}, kinks=True).expression
+    except ExpressionError:
+        return None

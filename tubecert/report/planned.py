@@ -1,0 +1,70 @@
+"""The plan against time, to be drawn: states as the certificate samples them, inputs from what it says of them.
+
+In: `result` of a certificate. Out: curves in floats. Nothing is decided here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from tubecert.certificate.result import KnotTexts, Result
+from tubecert.enclosure.tape import Tape
+from tubecert.model import TIME
+from tubecert.report.figures_axes import Point
+from tubecert.report.outline import expression_of
+from tubecert.report.sections import horizon
+
+_SAMPLES = 201
+_FOR_EVER = 1.0  # s that are drawn of a plan without an end
+_TEXTS = {"equilibrium": "input", "expressions": "u"}  # where the specification holds u*
+
+
+def states(result: Result) -> list[list[Point]]:
+    """x*_i against t for every state; empty where no points are known."""
+    samples = result.plan.samples
+    if samples is None or not samples.x:
+        return []
+    rows = samples.x if len(samples.x) > 1 else (samples.x[0],) * 2
+    t = samples.t if len(samples.x) > 1 else (0.0, end(result))
+    return [list(zip(t, column, strict=True)) for column in zip(*rows, strict=True)]
+
+
+def inputs(result: Result) -> list[list[Point]]:
+    """u*_j against t for every input; empty where nothing is known of them."""
+    knots = result.plan.knots
+    if knots is not None:
+        return [_through(knots, j, held=result.plan.interpolation == "hold") for j in range(len(knots.u[0]))]
+    texts = result.spec.effective.part("trajectory").get(_TEXTS.get(result.plan.kind, ""), ())
+    return [] if isinstance(texts, str) else _of_time(result, texts)
+
+
+def end(result: Result) -> float:
+    """The time up to which a plan is drawn, in s."""
+    return float(horizon(result) or _FOR_EVER)
+
+
+def _of_time(result: Result, texts: Sequence[str]) -> list[list[Point]]:
+    known = [found for text in texts if (found := expression_of(text, [TIME])) is not None]
+    if len(known) != len(result.spec.effective.system.inputs):
+        return []
+    t = np.linspace(0.0, end(result), _SAMPLES)
+    values = Tape(known, [TIME]).run_floats([t], t.shape)
+    return [list(zip(t.tolist(), row.tolist(), strict=True)) for row in values]
+
+
+def _through(knots: KnotTexts, j: int, *, held: bool) -> list[Point]:
+    """A curve through knots: straight lines between them, or steps."""
+    points = [(_float(t), _float(u[j])) for t, u in zip(knots.t, knots.u, strict=False)]
+    if not held:
+        return points
+    last = (_float(knots.t[-1]), points[-1][1])
+    corners = [corner for one, other in pairwise([*points, last]) for corner in (one, (other[0], one[1]))]
+    return [*corners, last]
+
+
+def _float(text: str) -> float:
+    top, _, bottom = text.partition("/")
+    return float(top) / float(bottom or 1)

@@ -1,0 +1,144 @@
+"""What fills the tube, by cause, for every kind that is certified: shares of what the contraction can make good.
+
+In: `result` of a certificate. Out: shares, each an upper bound by outward-rounded arithmetic from the printed constants
+and the printed recipe. No claim rests on them.
+
+At the edge of the tube contraction shortens the distance by lambda dbar per second. The causes lengthen it by what
+they are told here (theory 4, 4a, 4b, 7, and 8 for H); what is left is for the start, until the filter has learned the
+uncertainty, and for the margin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.bounds.meanings import EVERY
+from tubecert.certificate.result import Result
+from tubecert.conditions.alone import NoGains
+from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.obstacles import reach
+from tubecert.conditions.problem import FIELDS, Numbers
+from tubecert.conditions.sampled import SampledRecipe, ages
+from tubecert.conditions.theorem import Recipe
+from tubecert.conditions.wind import taken, turning
+from tubecert.enclosure.interval import Interval
+from tubecert.kinds.hardware import HardwareData
+from tubecert.report.machine import Share, shares
+from tubecert.verdict import Verdict
+
+_LEAST = 5e-5  # a smaller share is not told
+_CAUSES: Mapping[str, str] = {
+    "plan": "the plan's own defect",
+    "parameters": "what unknown parameters do that no input reaches",
+    "wind": "wind that pushes",
+    "uncertainty": "the uncertainty, which nothing compensates",
+    "bias": "the filter's lag behind the uncertainty",
+    "adaptation": "the error of the adaptation",
+    "sampling": "the estimate's age: it is renewed once per sample",
+    "wind_estimate": "wind that the estimate takes for uncertainty",
+}
+_START = "the start, until the filter has learned the uncertainty"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filled:
+    """What fills the tube of one kind, by the key of the kind; the largest share first."""
+
+    key: str
+    shares: tuple[Share, ...]
+
+
+def filled(result: Result) -> list[Filled]:
+    """Every kind that is certified and whose causes are known: 0, B, C, H."""
+    found = (Filled(key=key, shares=tuple(_of_kind(result, key))) for key in result.sections)
+    return [each for each in found if each.shares]
+
+
+def _of_kind(result: Result, key: str) -> list[Share]:
+    section, recipe = result.sections[key], result.proof.of.get(key)
+    if section.verdict is not Verdict.CERTIFIED or recipe is None:
+        return []
+    if isinstance(section, HardwareData):
+        return [] if section.budget is None else shares(section.budget)
+    pair = section.decisive(asked=result.asked)
+    n = _numbers(result)
+    if n is None or pair is None:
+        return []
+    whole = n.lam * reach(n)
+    causes = {name: push / whole for name, push in _pushes(result, n, recipe)}
+    if not causes:
+        return []
+    parts = [Share(cause=_CAUSES[name], share=float(each.hi)) for name, each in causes.items()]
+    used = 1 - min(margin.below for margin in pair.margins.values())
+    start = used - float(sum(causes.values(), Interval.of(0)).lo)
+    told = [each for each in [*parts, Share(cause=_START, share=start)] if each.share > _LEAST]
+    return sorted(told, key=lambda each: -each.share)
+
+
+def _pushes(result: Result, n: Numbers[Interval], recipe: Recipe) -> Iterator[tuple[str, Interval]]:
+    """What lengthens the distance once the filter has learned what it can, in units of distance per second."""
+    match recipe:
+        case NoGains():
+            yield "uncertainty", n.beta * n.Dh
+        case DistanceRecipe(uncertainty=S, prediction_error=e):
+            yield "bias", n.beta * Interval.of(S)
+            yield "adaptation", n.beta * (Interval.of(e) - taken(n))
+            yield "wind_estimate", n.beta * taken(n)
+        case SampledRecipe(speed=Y):
+            yield from _of_samples(n, recipe, Interval.of(Y))
+        case _:
+            return
+    yield "plan", n.delta
+    yield "parameters", _constant(result, "residual_push") or Interval.of(0)
+    yield "wind", n.wind_push if n.wind_push is not None else Interval.of(0)
+
+
+def _of_samples(n: Numbers[Interval], recipe: SampledRecipe, Y: Interval) -> Iterator[tuple[str, Interval]]:
+    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
+    age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
+    s1 = n.Dht + n.Dhx * Y
+    turned = n.DBpx * n.DB if n.DBpx.hi * n.DB.hi < n.DBp.hi * n.DBx.hi else n.DBp * n.DBx
+    yield "bias", n.beta * s1 * age.w
+    yield "sampling", n.beta * age.m * (s1 + turned * n.Dh * Y + turning(n) * Y)
+    yield "wind_estimate", n.beta * taken(n)
+
+
+def _numbers(result: Result) -> Numbers[Interval] | None:
+    """The constants of a certificate on the side that its theorems use; None where one is missing."""
+    known = {symbol: _constant(result, name) for symbol, name in FIELDS.items()}
+    named = {symbol: value for symbol, value in known.items() if value is not None}
+    if len(named) != len(known) or result.metric is None or result.tube is None:
+        return None
+    tube = result.tube
+    zero = Interval.of(0)
+    wind = result.claim.wind
+    size = None if wind is None or wind.bound is None else Interval.of(Fraction(wind.bound))
+    return Numbers(
+        **named,
+        R=zero,
+        lam=Interval.of(result.metric.rate),
+        rho=Interval.of(tube.rho),
+        rho_a=Interval.of(tube.rho_a),
+        rho_r=Interval.of(tube.rho - tube.rho_a),
+        offset=zero,
+        horizon=None,
+        wind_push=_times(_constant(result, "wind_push"), size),
+        wind_speed=_times(_constant(result, "wind_size"), size),
+        wind_error=_times(_constant(result, "wind_explained"), size),
+        rest_speed=_constant(result, "residual_size"),
+    )
+
+
+def _times(value: Interval | None, size: Interval | None) -> Interval | None:
+    return None if value is None or size is None else value * size
+
+
+def _constant(result: Result, name: str) -> Interval | None:
+    """A constant on its safe side."""
+    item, meaning = result.constants.get(name), EVERY.get(name)
+    if item is None:
+        return None
+    side = item.below if meaning is not None and meaning.side == "below" else item.above
+    return None if side is None else Interval.exact(side)
