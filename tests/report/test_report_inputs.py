@@ -74,7 +74,8 @@ def test_an_input_that_may_go_too_far_is_told_with_what_takes_it_there():
 def test_the_page_has_a_row_for_every_loop():
     page = page_of(certificate_of(ONE + "limits: {u: [-1, 1]}\n"))
     section = next(section for section in page.sections if section.key == "inputs")
-    (table,) = section.blocks
+    table, figures = section.blocks
+    assert [figure.key for figure in figures.figures] == ["input-0"]
     assert [row[4].text for row in table.rows] == ["0 no adaptation", "A (26)", "B distance", "C sampled"]
     assert table.rows[0][6].text == "20.1 %"
     text = render_page(page)

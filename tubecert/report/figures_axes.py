@@ -134,6 +134,8 @@ class Chart:
         (x0, y0), (x1, y1) = self.at((0.0, 0.0)), self.at((1.0, 1.0))
         (a, b), (c, d) = [(value * (x1 - x0)) for value in turn[0]], [value * (y1 - y0) for value in turn[1]]
         size = math.sqrt(abs(a * d - b * c))
+        if not 0 < size < math.inf:  # too flat or too large for any drawing
+            return
         a, b, c, d = (value / size for value in (a, b, c, d))  # of determinant 1 or -1
         det = a * d - b * c
         places = points if len(points) > 1 else [points[0], points[0]]
