@@ -1,4 +1,4 @@
-"""`explain`: one page about a finding code, a constant or an equation."""
+"""`explain`: one page about a word of a report, a finding code, a constant or an equation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ def run(topic: str | None) -> None:
 
 
 def _index() -> Iterator[str]:
-    yield "Finding codes"
+    yield "Words of reports"
+    yield from (f"  {word:<16} {page.title}" for word, page in pages.words().items())
+    yield "\nFinding codes"
     yield from (f"  {code}  {page.title}" for code, page in pages.codes().items())
     yield "\nConstants (by name or symbol)"
     yield from (f"  {name:<20} {page.symbol:<14} {page.words}" for name, page in pages.constants().items())

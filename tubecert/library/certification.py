@@ -23,6 +23,7 @@ from tubecert.kinds.data import Pair, SectionData
 from tubecert.library.specification import File, Specification
 from tubecert.records import FormError
 from tubecert.report import gains as report_gains
+from tubecert.report.outline import widths
 from tubecert.report.page import Reason
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
@@ -195,10 +196,11 @@ class Certification:
 
     @property
     def half_widths(self) -> Mapping[str, float]:
-        """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set."""
-        tube = self.result.tube
-        widths = {} if tube is None or tube.half_widths is None else tube.half_widths
-        return MappingProxyType({name: widths[name] for name in self.states if name in widths})
+        """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set.
+
+        Where certificate H decides, what H proves, which is less than what the constants are bounded over.
+        """
+        return MappingProxyType(widths(self.result) or {})
 
     @property
     def constants(self) -> Mapping[str, Bound]:

@@ -12,7 +12,7 @@ from tubecert.claims import InputWithinLimits
 from tubecert.report import sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled
-from tubecert.report.numbers import up
+from tubecert.report.outline import widths
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 
@@ -52,8 +52,8 @@ def verdict_line(result: Result) -> Text:
     line.append(f" {name(result)}: ", style="bold")
     if verdict is Verdict.CERTIFIED:
         chosen = deciding(result)
-        measured = sections.extent(result) != up(sections.radius(result))
-        numbers = [sections.extent(result) if measured else f"rho = {up(sections.radius(result))}"]
+        extent = sections.extent(result)
+        numbers = [f"rho = {extent}" if sections.is_radius(result) else extent]
         numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))
     else:
@@ -96,8 +96,16 @@ def _promise(result: Result) -> Text:
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
         f"With this metric, {loops}, the state stays within {sections.extent(result)} of "
-        f"{sections.plan_words(result)} {sections.span(result)}, under the assumptions below."
+        f"{sections.plan_words(result)} {sections.span(result)}, under the assumptions below.{_by_state(result)}"
     )
+
+
+def _by_state(result: Result) -> str:
+    """What a radius over several states, whose units may differ, says of each of them."""
+    known = widths(result)
+    if known is None or len(known) == 1 or not sections.is_radius(result):
+        return ""
+    return f" State by state: {sections.half_widths(result, known)}."
 
 
 def _tube_is_known(result: Result) -> bool:

@@ -138,10 +138,13 @@ class Chart:
             return
         a, b, c, d = (value / size for value in (a, b, c, d))  # of determinant 1 or -1
         det = a * d - b * c
-        places = points if len(points) > 1 else [points[0], points[0]]
-        flat = [((d * px - b * py) / det, (a * py - c * px) / det) for px, py in map(self.at, places)]
+        flat = [((d * px - b * py) / det, (a * py - c * px) / det) for px, py in map(self.at, points)]
         matrix = " ".join(f"{value:.6g}" for value in (a, c, b, d, 0, 0))
         group = ET.SubElement(self.plot, "g", {"transform": f"matrix({matrix})"})
+        if len(flat) == 1:
+            circle = {"cx": number(flat[0][0]), "cy": number(flat[0][1]), "r": f"{size:.6g}"}
+            ET.SubElement(group, "circle", {"class": style, **circle})
+            return
         width = {"stroke-width": f"{2 * size:.6g}"}
         ET.SubElement(group, "path", {"class": f"sweep {style}", "d": path(flat), **width})
 

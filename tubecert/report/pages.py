@@ -1,4 +1,4 @@
-"""The pages of `explain`: finding codes, constants and equations, each with meaning, formula and source.
+"""The pages of `explain`: words of reports, finding codes, constants and equations, with meaning and source.
 
 What a code or an equation means is data of this package (`tubecert/pages/*.toml`); names, symbols and units of the
 constants come from the table that reports read.
@@ -80,7 +80,24 @@ class ConstantPage:
         return "\n\n".join(parts)
 
 
-Page = CodePage | EquationPage | ConstantPage
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WordPage:
+    """A word of the reports: what it means, its unit if it is a number, other spellings, where to read on."""
+
+    word: str
+    title: str
+    meaning: str
+    see: str
+    unit: str = ""
+    also: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """The page."""
+        parts = [f"{self.word}: {self.title}", _filled(self.meaning)]
+        return "\n\n".join([*parts, *([f"Unit: {self.unit}"] if self.unit else []), f"Source: {self.see}"])
+
+
+Page = CodePage | EquationPage | ConstantPage | WordPage
 
 
 def _data(name: str) -> Mapping[str, Any]:
@@ -118,17 +135,33 @@ def constants() -> Mapping[str, ConstantPage]:
     }
 
 
+@cache
+def words() -> Mapping[str, WordPage]:
+    """The pages of the words of reports."""
+    return {
+        word: WordPage(word=word, also=tuple(page.pop("also", ())), **page)
+        for word, page in _data("words").items()
+    }
+
+
+def _spelled() -> Mapping[str, WordPage]:
+    return {also: page for page in words().values() for also in page.also}
+
+
 def find(topic: str) -> Page | None:
-    """The page of a code, an equation's tag, or a constant's name or symbol; case matters only where it has to."""
-    wanted = topic.strip()
+    """The page of a word, a code, an equation's tag, or a constant; case matters only where it has to."""
+    wanted = " ".join(topic.split())
+    if wanted in words():  # A, B, C and H are certificates before they are constants
+        return words()[wanted]
     wanted = wanted[1:-1] if wanted.startswith("(") else wanted
     wanted = re.sub(r"^C([123])$", r"CCM_\1", wanted, flags=re.IGNORECASE)  # as reports call them
     tables: tuple[Mapping[str, Page], ...] = (codes(), constants(), equations())
     symbols: Mapping[str, Page] = {page.symbol: page for page in constants().values()}
-    for table in (*tables, symbols):
+    searched = (*tables, symbols, words(), _spelled())
+    for table in searched:
         if wanted in table:
             return table[wanted]
-    for table in (*tables, symbols):
+    for table in searched:
         folded = [page for key, page in table.items() if key.lower() == wanted.lower()]
         if len(folded) == 1:
             return folded[0]
@@ -137,7 +170,8 @@ def find(topic: str) -> Page | None:
 
 def topics() -> list[str]:
     """Everything that has a page."""
-    return [*codes(), *constants(), *(page.symbol for page in constants().values()), *equations()]
+    symbols = (page.symbol for page in constants().values())
+    return [*words(), *_spelled(), *codes(), *constants(), *symbols, *equations()]
 
 
 def _filled(text: str) -> str:

@@ -15,6 +15,7 @@ from tubecert.certificate.result import Result
 from tubecert.claims import Claim
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
+from tubecert.report.outline import widths
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS, condition_name
 
@@ -94,8 +95,8 @@ def _of_tube(result: Result) -> Iterator[Quantity]:
     if tube is not None:
         for name in ("epsilon", "rho_a", "rho", "rho_r"):
             yield Quantity(name=name, value=getattr(tube, name))
-        for state in result.spec.effective.system.states if tube.half_widths is not None else ():
-            yield Quantity(name=f"half_width.{state}", value=(tube.half_widths or {})[state])
+        for state, width in (widths(result) or {}).items():
+            yield Quantity(name=f"half_width.{state}", value=width)
     for index, found in enumerate(result.clearance):
         yield Quantity(name=f"clearance.{index}", value=found.clearance.below)
 

@@ -197,6 +197,8 @@ def _limit(result: Result) -> list[Text]:
 
 def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     lines = [f"rho = {radii(tube)}; epsilon = {short(tube.epsilon)}"]
+    if tube.coordinates is None and len(result.spec.effective.system.states) > 1:
+        lines[0] += " (Euclidean norm over all states)"
     if result.claim.plans is not None:
         lines.append(f"around every plan with {family_words(result.claim.plans)}")
     if tube.half_widths:
@@ -231,14 +233,26 @@ def excursion(result: Result) -> Iterator[str]:
             yield f"between its knots the plan takes {name} {beyond:.3g} beyond all of them, which are in {span}"
 
 
+def is_radius(result: Result) -> bool:
+    """Whether the radius of the tube is a length in the states, and is what is proven."""
+    decides = hardware_proven(result) is not None and result.decided_by == (HARDWARE.key,)
+    return not decides and (result.tube is None or result.tube.coordinates is None)
+
+
 def extent(result: Result) -> str:
     """How far the state may be from the plan: the radius, or the half-widths of a tube measured by the metric."""
     tube, own = result.tube, hardware_proven(result)
-    if own is not None and result.decided_by == (HARDWARE.key,):
-        return f"the half-widths {hardware_widths(result, own)}"
-    if tube is None or tube.coordinates is None or tube.half_widths is None:
-        return up(radius(result))
-    return f"the half-widths {half_widths(result, tube.half_widths)}"
+    if is_radius(result) or tube is None or tube.half_widths is None:
+        return f"{up(radius(result))} {_unit(result)}".rstrip()
+    decides = own is not None and result.decided_by == (HARDWARE.key,)
+    return f"the half-widths {half_widths(result, own.half_widths if own and decides else tube.half_widths)}"
+
+
+def _unit(result: Result) -> str:
+    """The unit of a length over all states, if they have one."""
+    system = result.spec.effective.system
+    units = {system.units.get(name, "") for name in system.states}
+    return units.pop() if len(units) == 1 else ""
 
 
 def in_states(result: Result, tube: TubeData, length: Fraction, name: str) -> str:
