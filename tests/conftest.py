@@ -33,7 +33,8 @@ def cache_of_the_tests(request, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(run / "cache"))
         patch.setenv("XDG_STATE_HOME", str(_notes(request.config, run)))
-        patch.delenv("TUBECERT_CACHE_KEY", raising=False)
+        for name in ("TUBECERT_CACHE_KEY", "COLUMNS"):
+            patch.delenv(name, raising=False)
         shared.keep_in(run / "shared")
         yield
         shared.keep_in(None)

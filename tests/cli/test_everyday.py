@@ -170,7 +170,7 @@ def test_every_page_has_meaning_formula_and_source(topic):
 @pytest.mark.parametrize(
     ("asked", "head"),
     [
-        *[("tc302", "TC302"), ("du", "feedback_gain (du)"), ("A", "upper (A)"), ("a", "lower (a)")],
+        *[("tc302", "TC302"), ("du", "feedback_gain (du)"), ("A", "A: certificate A"), ("a", "lower (a)")],
         *[("(26c)", "26c"), ("ccm_2", "CCM_2"), ("C2", "CCM_2"), ("f(X)", "F(x)")],
     ],
 )
@@ -188,7 +188,7 @@ def test_what_is_not_known_gets_a_suggestion():
 
 def test_the_list_of_topics():
     shown = run("explain").stdout
-    for topic in [*pages.codes(), *pages.constants(), *pages.equations()]:
+    for topic in [*pages.words(), *pages.codes(), *pages.constants(), *pages.equations()]:
         assert re.search(rf"^  {re.escape(topic)} ", shown, re.MULTILINE), topic
 
 

@@ -238,7 +238,9 @@ def test_when_to_colour(stream, color, environment, colored):
 
 
 def test_pipes_have_a_fixed_width():
-    assert Terminal.of(StringIO(), None, {"COLUMNS": "40"}).width == 100
+    assert Terminal.of(StringIO(), None, {}).width == 100
+    for columns, width in (("72", 72), ("5", 40), ("9" * 5000, 120), ("0", 100), ("-5", 100), ("wide", 100)):
+        assert Terminal.of(StringIO(), None, {"COLUMNS": columns}).width == width
 
 
 # progress

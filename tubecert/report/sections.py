@@ -20,7 +20,6 @@ from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
-from tubecert.report.machine import half_widths as hardware_widths
 from tubecert.report.machine import lines as machine_lines
 from tubecert.report.machine import proven as hardware_proven
 from tubecert.report.machine import section_of

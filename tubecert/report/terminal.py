@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 PIPE_WIDTH = 100
 MOST_WIDTH = 120  # longer lines are hard to read
+LEAST_WIDTH = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,11 +52,11 @@ class Terminal:
         interactive = bool(stream is not None and not stream.closed and stream.isatty())
         wanted = interactive and not environment.get("NO_COLOR") and environment.get("TERM") != "dumb"
         colored = color == "always" or (color != "never" and wanted)
-        width = min(_terminal_width(stream), MOST_WIDTH) if interactive else PIPE_WIDTH
+        width = _asked_width(environment) or (_terminal_width(stream) if interactive else PIPE_WIDTH)
         return cls(
             stream=stream,
             colored=colored,
-            width=width,
+            width=min(width, MOST_WIDTH),
             interactive=interactive,
             environment=dict(environment),
         )
@@ -116,6 +117,13 @@ def _line(line: list[Segment], colors: ColorSystem | None) -> str:
         segment.style.render(segment.text, color_system=colors) if segment.style else segment.text
         for segment in kept
     )
+
+
+def _asked_width(environment: Mapping[str, str]) -> int:
+    """The width that COLUMNS asks for, 0 if it asks for none that could be."""
+    text = environment.get("COLUMNS", "")[:9]
+    asked = int(text) if text.isascii() and text.isdigit() else 0
+    return max(asked, LEAST_WIDTH) if asked else 0
 
 
 def _terminal_width(stream: TextIO | None) -> int:
