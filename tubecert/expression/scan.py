@@ -84,7 +84,7 @@ _FOREIGN = {
     ">": "an expression compares nothing",
     "=": "an expression assigns nothing; write the right-hand side only",
     "^": "write ** for a power",
-    "%": "there is no remainder operation",
+    "%": "5 % is 0.05; there is no remainder operation",
     "@": "write products entry by entry",
     "&": "there are no bit operations",
     "|": "write abs(x) for an absolute value (in h only)",
@@ -94,7 +94,7 @@ _FOREIGN = {
     "]": "an entry is one scalar expression; group with parentheses",
     "{": "group with parentheses",
     "}": "group with parentheses",
-    "'": "an expression contains no text in quotes",
+    "'": "an expression contains no quotes; f lists the derivatives, an entry names none",
     '"': "an expression contains no text in quotes",
     ";": "write one expression",
     ":": "write one expression",
@@ -104,6 +104,9 @@ _FOREIGN = {
     "?": "remove it",
     "$": "remove it",
 }
+_EQUATION = re.compile(r"[:=!<>]?=")
+_SYMBOLS = "m mm cm km s ms us min h Hz kHz N Nm kN kg g V mV A mA W kW J Pa bar K C F rpm percent"
+_UNITS = frozenset(_SYMBOLS.split())
 _LOOKALIKES = {
     "\u2212": "-", "\u2010": "-", "\u2011": "-", "\u2012": "-", "\u2013": "-", "\u2014": "-", "\ufe63": "-",
     "\uff0d": "-", "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u2217": "*", "\u2219": "*", "\u2022": "*",
@@ -133,6 +136,8 @@ def scan(text: str, vocabulary: Vocabulary) -> None:
         )
     if not text.strip():
         raise ExpressionError("the expression is empty", help="write 0 if zero is meant")
+    if found := _EQUATION.search(text):  # before its left side is taken for an unknown name
+        raise _foreign(text, found.start())
     walk = _Walk(vocabulary)
     for token in _tokens(text):
         walk.step(token)
@@ -198,6 +203,8 @@ def _glued(token: _Token, tail: str) -> ExpressionError:
         )
     if tail[0] == "." or tail[0].isdigit():
         return whole.error(f"{whole.text} is not a number", "write one decimal point")
+    if tail in _UNITS:
+        return whole.error("a number has no unit", _without(token.text, tail))
     return whole.error(f"{whole.text} lacks a multiplication sign", f"write {token.text}*{tail}")
 
 
@@ -326,7 +333,7 @@ class _Walk:
         shown = ", ".join(listed[:20]) + (", ..." if len(listed) > 20 else "")
         return (
             "".join(f"did you mean {word}? " for word in meant)
-            + f"names: {shown}; functions: {' '.join(functions)}"
+            + f"names: {shown}; functions: {' '.join(functions)}; a constant of your own goes into system.parameters"
         )
 
     def _uncalled(self) -> ExpressionError:
@@ -338,11 +345,18 @@ class _Walk:
         assert self.last is not None
         left = self.last.text if self.last.text != ")" else "(...)"
         right = token.text if token.text != "(" else "(...)"
+        if self.last.kind == "number" and token.text in _UNITS:
+            return token.error("a number has no unit", _without(left, right))
         if self.last.kind == "name" and token.text == "(":
             message = f"{left} is not a function; for a product a sign is missing"
         else:
             message = "a multiplication sign or another operator is missing"
         return token.error(message, f"write {left}*{right}")
+
+
+def _without(number: str, unit: str) -> str:
+    """What to write for a number with a unit behind it."""
+    return f"write {number}, in the units of the other numbers; if {unit} is a parameter: {number}*{unit}"
 
 
 _ANGLES = {

@@ -221,7 +221,9 @@ def read(text: str, file: str) -> Node:
         )
     except json.JSONDecodeError as error:
         at = Location(file=file, line=error.lineno, column=error.colno)
-        raise wrong("TC600", f"not JSON: {error.msg}", "write the certificate again", at) from None
+        raise wrong(
+            "TC600", f"not JSON: {error.msg}", "give a file that tubecert certify wrote", at
+        ) from None
     except ValueError as error:
         raise wrong("TC600", f"{file}: {error}", "write the certificate again") from None
     known = data.get("format") if isinstance(data, dict) else None

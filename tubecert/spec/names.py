@@ -18,6 +18,7 @@ from tubecert.expression import (
     constant,
     free_symbols,
     is_name,
+    suggestion,
     symbol,
     topological,
 )
@@ -193,6 +194,11 @@ def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
             f"{name[:60]!r} is not a name",
             "after a decimal comma it would be a key: write a decimal point",
         )
+    if "=" in name:
+        before, _, after = name.partition("=")
+        return f"{name[:60]!r} is not a name", f"write {before.strip()[:60]}: {after.strip()[:60]}"
+    if " " in name:
+        return f"{name[:60]!r} is not a name", f"separate names by commas: {', '.join(name.split())[:60]}"
     if not is_name(name):
         rule = f"a name is a letter followed by letters, digits and _ (at most {MAX_NAME_LENGTH})"
         return f"{name[:60]!r} is not a name", rule
@@ -305,7 +311,9 @@ def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]
     for key, node in field.pairs("of names to units") or []:
         unit = field.child(key, node).text("a unit")
         if key.text not in (*names.states, *names.inputs):
-            _key_field(field, key).fail(codes.UNKNOWN_KEY, f"{key.text[:60]} is neither a state nor an input")
+            message = f"{key.text[:60]} is neither a state nor an input"
+            help = suggestion(key.text, [*names.states, *names.inputs])
+            _key_field(field, key).fail(codes.UNKNOWN_KEY, message, help)
         elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
             field.child(key, node).fail(
                 codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters"

@@ -57,8 +57,66 @@ _OTHER_KEYS = {
     **dict.fromkeys(
         ("constraints", "domain", "bounds_x"), "the box that the tube must stay in is the key safe_set"
     ),
+    **dict.fromkeys(
+        ("rho", "radius", "width"),
+        "how wide the tube is follows from epsilon and rho_a, or is given by state: half_widths: {NAME: 0.1}",
+    ),
+    **dict.fromkeys(("W", "dual", "matrix"), "the inverse of the metric is the key dual_metric"),
+    "M": "the metric is given by its inverse, dual_metric",
+    **dict.fromkeys(("lambda", "lam", "decay"), "the contraction rate is the key rate, in 1/s"),
+    **dict.fromkeys(("synthesize", "synthesis", "synth"), "to have a metric found write synthesise: {}"),
+    **dict.fromkeys(("g", "G"), "the matrix of the inputs is the key B"),
+    **dict.fromkeys(("title", "system_name"), "the name of the specification is the key name"),
+    **dict.fromkeys(("version", "format"), "the version of the format is the key tubecert: 1"),
+    **dict.fromkeys(("frequency", "freq", "hz", "Hz"), "the sample rate is the key rate, in Hz"),
+    **dict.fromkeys(
+        ("Gamma", "omega", "bandwidth", "adaptation_rate", "gains"),
+        "gains are found; certify --bandwidth W --adaptation-rate G proves some of your own",
+    ),
+    **dict.fromkeys(("circle", "sphere", "ball"), "a round obstacle is a disc: {center: [...], radius: ...}"),
+    **dict.fromkeys(("d", "delta", "matched"), "the uncertainty is the key h, an expression per input"),
+    "file": "the file of a metric is given by --metric FILE, that of a plan by kind: csv",
 }
 """Keys that other formats have, and what there is of them here."""
+
+_PLACES = {
+    **dict.fromkeys(("epsilon", "rho_a", "half_widths"), "tube"),
+    **dict.fromkeys(("states", "inputs", "parameters", "definitions", "f", "B"), "system"),
+    "dual_metric": "metric",
+    "h": "uncertainty",
+    "horizon": "trajectory",
+}
+"""Where keys belong that are often written elsewhere."""
+
+_MEANT = {
+    "W": ("dual_metric",),
+    "lambda": ("rate",),
+    "g": ("B",),
+    "title": ("name",),
+    "version": ("tubecert",),
+    **dict.fromkeys(("synthesize", "synthesis", "synth", "file"), ("dual_metric", "rate")),
+}
+"""Required keys that a key of another format stands for: they are not called missing as well."""
+
+_OTHER_WORDS = {
+    **dict.fromkeys(("regulation", "setpoint", "point", "constant", "hover"), "equilibrium"),
+    **dict.fromkeys(("tracking", "trajectory", "expression", "function", "analytic"), "expressions"),
+    **dict.fromkeys(("table", "file", "spline", "waypoints", "samples"), "csv"),
+    **dict.fromkeys(("optimal", "planner", "plan", "ddp", "lqr"), "ilqr"),
+    **dict.fromkeys(("proven", "proved", "yes", "ok"), "certified"),
+}
+"""Words that other formats have for a choice."""
+
+_EXAMPLES = {
+    "horizon": "5, in s",
+    "rate": "1, in 1/s",
+    "file": "plan.csv",
+    "tubecert": "1",
+    "target": "[...], one number per state",
+    "at": "[...], one number per state",
+    "input": "[...], one number per input",
+}
+"""Values of keys that are missing, where that says more than dots."""
 
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
@@ -170,7 +228,10 @@ class Field:
         reserved: Sequence[str] = (),
     ) -> dict[str, Field] | None:
         """The values of the known keys; unknown, reserved and missing keys are findings."""
-        pairs = self.pairs(f"with the keys {', '.join([*(required or optional)][:8])}")
+        keys = [*(required or optional)]
+        pairs = self.pairs(
+            f"with the keys {', '.join(keys[:8])}", ", ".join(f"{key}: ..." for key in keys[:2])
+        )
         if pairs is None:
             return None
         known = [*required, *optional]
@@ -185,17 +246,17 @@ class Field:
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
             message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
-            help = f"add {', '.join(f'{key}: ...' for key in missing)}"
+            help = "add " + ", ".join(f"{key}: {_EXAMPLES.get(key, '...')}" for key in missing)
             if self.key is None:
                 self.fail(codes.MISSING_KEY, message, help)
             else:
                 self._at(codes.MISSING_KEY, self.key, message, help)
         return fields
 
-    def pairs(self, purpose: str = "") -> list[tuple[Scalar, Node]] | None:
+    def pairs(self, purpose: str = "", shown: str = "NAME: ...") -> list[tuple[Scalar, Node]] | None:
         """The keys and values of a mapping, without keys that occur twice."""
         if not isinstance(self.node, MappingNode):
-            self._wrong_type(f"a mapping {purpose}".strip())
+            self._wrong_type(f"a mapping {purpose}".strip(), f"write {{{shown}}}")
             return None
         seen: dict[str, Scalar] = {}
         for key, _ in self.node.pairs:
@@ -215,7 +276,9 @@ class Field:
     def items(self, count: int | None = None, what: str = "entries", help: str = "") -> list[Field] | None:
         """The items of a list; another number of them than `count` is a finding."""
         if not isinstance(self.node, ListNode):
-            self._wrong_type(f"a list of {f'{count} ' if count is not None else ''}{what}", help)
+            self._wrong_type(
+                f"a list of {f'{count} ' if count is not None else ''}{what}", help or self._listed(count)
+            )
             return None
         if count is not None and len(self.node.items) != count:
             self._wrong_count(len(self.node.items), count, what, help)
@@ -241,7 +304,9 @@ class Field:
                 codes.NOT_YET, f"{self.path}: {word} is not yet supported", f"use {' or '.join(choices)}"
             )
         else:
-            help = suggestion(word, choices, what="choices")
+            other = _OTHER_WORDS.get(word.lower())
+            meant = f"here it is {other}; " if other in choices else ""
+            help = meant + suggestion(word, choices, what="choices")
             self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
         return None
 
@@ -330,7 +395,7 @@ class Field:
     def terms(self, count: int, scope: Scope, what: str = "expressions") -> tuple[Term, ...] | None:
         """A list of expressions; the ones that are there are read even if their number is wrong."""
         if not isinstance(self.node, ListNode):
-            self._wrong_type(f"a list of {what}")
+            self._wrong_type(f"a list of {what}", self._listed(count))
             return None
         nodes = self.node.items[: 2 * count + 8]
         found = [self.item(i, node).term(scope) for i, node in enumerate(nodes)]
@@ -371,7 +436,19 @@ class Field:
     def _name(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key
 
+    def _listed(self, count: int | None) -> str:
+        """How a value would be written as a list."""
+        if isinstance(self.node, MappingNode):
+            return "write the values only, in brackets and in their order: [..., ...]"
+        text = self.node.text.strip() if isinstance(self.node, Scalar) else ""
+        plain = text and len(text) <= 40 and not set(text) & set("[]{}\n;")
+        if not plain or (count is not None and text.count(",") + 1 != count):
+            return f"write a list in brackets: [{', '.join(['...'] * min(count or 2, 8))}]"
+        return f'write ["{text}"]' if "(" in text else f"write [{text}]"
+
     def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
+        if found == 2 * wanted > 2 and what == "numbers":
+            help = help or "if a comma was meant as a decimal point, write the point"
         entries = "1 entry" if found == 1 else f"{found} entries"
         self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {wanted} {what}", help)
 
@@ -390,9 +467,12 @@ class Field:
                 codes.UNKNOWN_KEY, key, message, f"write `{name}: {value[:40]}`, with a blank after the colon"
             )
             return [name]
+        close = near(key.text, known)
         advice = _OTHER_KEYS.get(key.text) or suggestion(key.text, known, what="known keys")
+        if key.text in _PLACES and not close:
+            advice = f"it belongs to {_PLACES[key.text]}"
         self._at(codes.UNKNOWN_KEY, key, message, advice)
-        return [] if key.text in _OTHER_KEYS else near(key.text, known)
+        return list(_MEANT.get(key.text, ())) if key.text in _OTHER_KEYS else close
 
     def _wrong_type(self, wanted: str, help: str = "") -> None:
         if isinstance(self.node, BrokenNode):
