@@ -62,6 +62,7 @@ _REPORT_AFTER = """\b
 Examples:
   tubecert report plant.certificate.json
   tubecert report plant.certificate.json -o plant.html -o plant.md
+  tubecert report plant.certificate.json --simulation plant.simulation
 """
 
 app = typer.Typer(
@@ -174,13 +175,17 @@ def make_report(
             help="The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]",
         ),
     ] = None,
+    simulation: Annotated[
+        str | None,
+        typer.Option("--simulation", metavar="FOLDER", help="Show the figures that simulate drew for it."),
+    ] = None,
     how: Output,
 ) -> None:
     """Make a page from a certificate, without certifying anything again."""
     with guarded(how):
         from tubecert.cli.report import run
 
-        run(certificate, output, how)
+        run(certificate, output, simulation, how)
     raise typer.Exit(0)
 
 

@@ -14,21 +14,25 @@ from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
 from tubecert.files import STDIN
 from tubecert.library.certification import read
-from tubecert.library.pages import REMEDY, Report, require_page
+from tubecert.library.pages import REMEDY, Report, require_page, simulated_in
 from tubecert.printable import printable_json, visible
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
+    from tubecert.report.page_simulation import Simulated
 
 
-def run(source: str, targets: Sequence[str] | None, output: Output) -> None:
-    """Write the pages of the certificate in `source`. Raises `TargetError`."""
+def run(source: str, targets: Sequence[str] | None, simulation: str | None, output: Output) -> None:
+    """Write the pages of the certificate in `source`, with the figures in a folder of `simulate`.
+
+    Raises `TargetError`.
+    """
     if source == STDIN and not targets:
         raise refused("a certificate on stdin has no name that the page could have", "give -o FILE.html")
     pages = list(targets) if targets else [_beside(source)]
     check_pages(pages, {"certificate": source})
     told = read(source).certificate
-    write_pages(pages, told)
+    write_pages(pages, told, None if simulation is None else simulated_in(simulation, told))
     if output.json:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
@@ -50,10 +54,10 @@ def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) ->
         kept[f"page {page}"] = page
 
 
-def write_pages(pages: Sequence[str], sealed: Certificate) -> None:
+def write_pages(pages: Sequence[str], sealed: Certificate, simulated: Simulated | None = None) -> None:
     """Write the pages of a certificate. Raises `TargetError`."""
     for page in pages:
-        Report(certificate=sealed).save(page)
+        Report(certificate=sealed, simulated=simulated).save(page)
 
 
 def _beside(source: str) -> str:

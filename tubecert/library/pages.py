@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import dataclass, field
 from html import escape
 from typing import Final
 
+from tubecert import files
 from tubecert.certificate.file import write_text
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.certification import Certification, read
 from tubecert.library.specification import File
+from tubecert.records import OPEN, FormError, from_json
+from tubecert.report.page_simulation import TITLES, Simulated
 
 HTML, MARKDOWN = (".html", ".htm"), (".md", ".markdown")
+_FOLDER: Final = files.Kind(
+    most=20_000_000,
+    unreadable="TC600",
+    too_large="TC600",
+    help="give a folder that tubecert simulate --certificate wrote for this certificate",
+)
 REMEDY: Final = "give a file FILE.html or FILE.md in a folder that exists"
 
 
@@ -23,13 +33,14 @@ class Report:
     """The page of a certificate; the same for the same certificate."""
 
     certificate: Certificate = field(repr=False)
+    simulated: Simulated | None = field(default=None, repr=False)
 
     @property
     def html(self) -> str:
         """The page as one HTML file that needs nothing else."""
         from tubecert.report import html
 
-        return html.render(self.certificate)
+        return html.render(self.certificate, self.simulated)
 
     @property
     def markdown(self) -> str:
@@ -51,10 +62,43 @@ class Report:
         return f'<iframe srcdoc="{escape(self.html)}" style="{style}" title="tubecert certificate"></iframe>'
 
 
-def report(result: Certification | File) -> Report:
-    """The page of a certificate, or of the file of one: `tubecert report`. Raises `TargetError`."""
+def report(result: Certification | File, *, simulation: File | None = None) -> Report:
+    """The page of a certificate, or of the file of one: `tubecert report`. Raises `TargetError`.
+
+    `simulation` is a folder that `tubecert simulate` wrote for this certificate; its figures are shown in HTML.
+    """
     found = result if isinstance(result, Certification) else read(result)
-    return Report(certificate=found.certificate)
+    shown = None if simulation is None else simulated_in(os.fspath(simulation), found.certificate)
+    return Report(certificate=found.certificate, simulated=shown)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Summary:
+    """What is read of the summary of a simulation."""
+
+    outcome: str
+    certificate: str
+
+
+OPEN.add(_Summary)
+
+
+def simulated_in(folder: str, certificate: Certificate) -> Simulated:
+    """What a folder of `simulate` shows; raises `TargetError` for another folder, and for another certificate's."""
+    text = files.read(os.path.join(folder, "summary.json"), _FOLDER)
+    try:
+        summary = from_json(_Summary, json.loads(text), "summary")
+    except (ValueError, RecursionError, FormError):
+        raise _refused("TC601", f"{folder} holds no simulation of tubecert") from None
+    if summary.certificate != certificate.hash:
+        raise _refused("TC604", f"the simulation in {folder} was compared with another certificate")
+    names = ((name, os.path.join(folder, f"{name}.svg")) for name in TITLES)
+    figures = {name: files.read(path, _FOLDER) for name, path in names if os.path.exists(path)}
+    return Simulated(outcome=summary.outcome, figures=figures)
+
+
+def _refused(code: str, message: str) -> TargetError:
+    return TargetError([Finding(code=code, message=message, help=_FOLDER.help)])
 
 
 def require_page(target: str) -> None:

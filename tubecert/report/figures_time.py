@@ -9,7 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from tubecert.certificate.result import InputData, Result
+from tubecert.kinds import HARDWARE
 from tubecert.report import planned
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_tube import is_near, view
@@ -69,7 +72,7 @@ def state_figures(result: Result) -> list[Figure]:
             name=name,
             unit=units.get(name, ""),
             curve=curve,
-            band=None if known is None else _around(curve, known[name], known[name]),
+            band=None if known is None else _state_band(result, name, known[name], curve),
             limits=_range(result.safe_set[name]),
             words=words,
         )
@@ -98,6 +101,31 @@ def input_figures(result: Result) -> list[Figure]:
         )
     ]
     return [drawing.figure("tube") for drawing in drawings]
+
+
+def _state_band(
+    result: Result, name: str, width: float, curve: Sequence[Point]
+) -> tuple[list[Point], list[Point]]:
+    """The half-width around x*, window by window where the machine has windows."""
+    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
+    windows = () if machine is None else machine.windows
+    if not windows or not all(name in window.half_widths for window in windows):
+        return _around(curve, width, width)
+    parts = [
+        _around(
+            _within(curve, float(each.begin), float(each.end)), each.half_widths[name], each.half_widths[name]
+        )
+        for each in windows
+    ]
+    below, above = ([point for part in parts for point in part[side]] for side in (0, 1))
+    return below, above
+
+
+def _within(curve: Sequence[Point], begin: float, end: float) -> list[Point]:
+    """The part of a curve between two times."""
+    t, v = zip(*curve, strict=True)
+    ends = [(at, float(np.interp(at, t, v))) for at in (begin, end)]
+    return [ends[0], *(point for point in curve if begin < point[0] < end), ends[1]]
 
 
 def _range(ends: tuple[Fraction, Fraction]) -> Point:

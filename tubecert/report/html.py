@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 from tubecert.certificate.result import Certificate
 from tubecert.report.page import Page, typeset
 from tubecert.report.page_sections import page_of
+from tubecert.report.page_simulation import Simulated
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def render(certificate: Certificate) -> str:
+def render(certificate: Certificate, simulated: Simulated | None = None) -> str:
     """The page of a certificate."""
-    return render_page(page_of(certificate))
+    return render_page(page_of(certificate, simulated))
 
 
 def render_page(page: Page) -> str:

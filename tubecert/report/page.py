@@ -91,6 +91,22 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """An image as a data URI, with what it shows."""
+
+    title: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pictures:
+    """Images that were drawn elsewhere."""
+
+    block: ClassVar[str] = "pictures"
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reason:
     """Why a claim holds or not; `at` is the witness, `relax` what would help."""
 
@@ -102,7 +118,7 @@ class Reason:
     relax: str = ""
 
 
-Block = Words | Items | Facts | Table | Listing | Figures | Reason
+Block = Words | Items | Facts | Table | Listing | Figures | Pictures | Reason
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

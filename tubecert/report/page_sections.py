@@ -37,6 +37,7 @@ from tubecert.report.page import (
 from tubecert.report.page_conditions import conditions
 from tubecert.report.page_machine import machine_blocks
 from tubecert.report.page_origin import check_again, provenance, system
+from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
@@ -62,7 +63,7 @@ _NO_LIMITS = (
 )
 
 
-def page_of(certificate: Certificate) -> Page:
+def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
     """The page of a certificate, whatever its verdict; the same before it is written and after it is read back."""
     result = certificate.result
     line = console.verdict_line(result).plain
@@ -72,7 +73,7 @@ def page_of(certificate: Certificate) -> Page:
         summary=line.partition(": ")[2],
         meaning=console.meaning(result).plain,
         tiles=tuple(_tiles(result)),
-        sections=tuple(_sections(certificate)),
+        sections=tuple(_sections(certificate, simulated)),
     )
 
 
@@ -113,7 +114,7 @@ def _sizes(result: Result) -> Iterator[Tile]:
             yield Tile(symbol=name, value=up(widths[name]), unit=units.get(name, ""), words="half-width")
 
 
-def _sections(certificate: Certificate) -> Iterator[Section]:
+def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
     result = certificate.result
     if reasons := _reasons(result, certified=False):
         yield Section(key="why", title="Not certified", blocks=reasons)
@@ -129,6 +130,8 @@ def _sections(certificate: Certificate) -> Iterator[Section]:
         yield Section(key="inputs", title="Inputs", blocks=blocks)
     if result.sections:
         yield Section(key="conditions", title="Conditions and margins", blocks=tuple(conditions(result)))
+    if simulated is not None:
+        yield Section(key="simulation", title="Simulation", blocks=tuple(simulated_blocks(simulated)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
     if result.metric is not None:
         yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric, result.tube)))

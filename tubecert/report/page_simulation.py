@@ -1,0 +1,43 @@
+"""The figures of a simulation on the page of the certificate that it was compared with. They prove nothing.
+
+In: what a folder of `simulate` holds. Out: blocks. A picture is shown as an image, in which nothing runs.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from tubecert.report.page import Block, Picture, Pictures, Words
+
+TITLES: Mapping[str, str] = {
+    "states": "States over time",
+    "plane": "The plane",
+    "inputs": "Inputs over time",
+    "tube_use": "How much of the tube the loops use",
+    "monte_carlo": "Random runs",
+}
+_PROVES_NOTHING = (
+    "Outcome: {outcome}. A simulation can falsify a certificate; that it did not proves nothing: the loops that are "
+    "drawn met the uncertainties that were tried, the certificate is about all of them."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulated:
+    """What is shown of a simulation: its outcome, and figures (SVG) by name."""
+
+    outcome: str
+    figures: Mapping[str, bytes]
+
+
+def simulated_blocks(found: Simulated) -> Iterator[Block]:
+    """What came of it, and the figures."""
+    yield Words(text=_PROVES_NOTHING.format(outcome=found.outcome))
+    yield Pictures(
+        pictures=tuple(
+            Picture(title=TITLES[name], source=f"data:image/svg+xml;base64,{b64encode(data).decode()}")
+            for name, data in found.figures.items()
+        )
+    )
