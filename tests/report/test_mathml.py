@@ -4,7 +4,7 @@ import math
 import xml.etree.ElementTree as ET
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tubecert.report import mathml
@@ -69,6 +69,14 @@ def grown(inner):
     )
 
 
+@example("x1*(x2 + q)")
+@example("(x2 + q)*x1")
+@example("x1 - (x2 - q)")
+@example("x1*(x2/q)")
+@example("x1/(x2/q)")
+@example("(x1*x2)**2")
+@example("(-x1)**2")
+@example("2*-x1")
 @given(st.recursive(LEAF, grown, max_leaves=8))
 def test_what_is_shown_has_the_value_of_the_text(text):
     shown = mathml.expression(text)

@@ -28,6 +28,9 @@ def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
     for key, causes in told.items():
         total, margin = sum(causes.values()), result.sections[key].decisive(asked=False).margins[key]
         assert 1 - margin.above - 1e-6 <= total <= 1 - margin.below + 1e-3
+        assert not any(cause.startswith("the start") for cause in causes), (
+            "the start is long over when D is largest"
+        )
         # W = 1: beta = 1, dbar = rho = .8, lambda = 1
         assert causes["wind that pushes"] == pytest.approx(0.05 / 0.8, rel=1e-6)
     assert told["no_adaptation"]["the uncertainty, which nothing compensates"] == pytest.approx(
