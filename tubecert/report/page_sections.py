@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
-from tubecert.kinds import HARDWARE
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
@@ -101,17 +100,13 @@ _MOST_TILES = 4  # half-widths that are shown first
 
 
 def _sizes(result: Result) -> Iterator[Tile]:
-    """How wide the tube is: its radius, or half-widths where that is a length in the metric."""
-    machine = proven_machine(result) if result.decided_by == (HARDWARE.key,) else None
-    tube, units = result.tube, result.spec.effective.system.units
-    if tube is None or tube.coordinates is None:
-        radius = sections.radius(result) if machine is None else machine.radius
-        yield Tile(symbol="ρ", value=up(radius), unit="", words="radius of the tube")
+    """How wide the tube is: its radius, or half-widths where that is no length in the states, or is not proven."""
+    units, known = result.spec.effective.system.units, widths(result)
+    if sections.is_radius(result) or known is None:
+        yield Tile(symbol="ρ", value=up(sections.radius(result)), unit="", words="radius of the tube")
         return
-    widths = (tube.half_widths or {}) if machine is None else machine.half_widths
-    for name in result.spec.effective.system.states[:_MOST_TILES]:
-        if name in widths:
-            yield Tile(symbol=name, value=up(widths[name]), unit=units.get(name, ""), words="half-width")
+    for name, width in list(known.items())[:_MOST_TILES]:
+        yield Tile(symbol=name, value=up(width), unit=units.get(name, ""), words="half-width")
 
 
 def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
