@@ -109,6 +109,7 @@ def test_what_only_the_ellipse_may_meet_is_undecided():
     assert found.inside is None
 
 
+@pytest.mark.slow
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 1), st.floats(0.01, 0.5), st.integers(0, 2**31))
 def test_no_state_of_the_tube_is_nearer(x, y, r, reach, seed):
     found = clearance(CIRCLE, disc(repr(x), repr(y), repr(r)), section(reach), EFFORT)
@@ -137,5 +138,6 @@ class Unbounded:
         return Interval(x, x), Interval(x[:, :1], x[:, :1])
 
 
+@pytest.mark.slow
 def test_where_the_plan_is_not_bounded_nothing_is_proven():
     assert clearance(Unbounded(), disc(5, 0, 1), section(), EFFORT).below <= 0

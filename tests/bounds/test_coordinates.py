@@ -83,6 +83,7 @@ def points(coordinates: Coordinates, rho: float, sides: np.ndarray, count: int, 
 # -- exact algebra
 
 
+@pytest.mark.slow
 @given(st.lists(st.fractions(-3, 3, max_denominator=7), min_size=9, max_size=9))
 def test_the_inverse_is_exact(values):
     own = tuple(tuple(values[3 * i : 3 * i + 3]) for i in range(3))
@@ -257,6 +258,7 @@ def _dual(x):
     return W
 
 
+@pytest.mark.slow
 def test_what_is_proposed_is_not_believed():
     """Half-widths that are too narrow are raised, those that are too wide are lowered, until they are proven."""
     own = model()
@@ -278,6 +280,7 @@ def test_half_widths_that_leave_the_safe_set_are_refused():
     assert (found.contained.state, found.contained.side) == ("x2", "lower")
 
 
+@pytest.mark.slow
 def test_the_least_level_holds_the_start_and_the_radii():
     own, x0 = model(), (Fraction(3, 10), Fraction(-1, 10), Fraction(1, 20))
     apart = np.array(x0, dtype=float) - CENTRE

@@ -205,6 +205,7 @@ def unknown(drift, ranges, h=None, coordinates=None, rho=RHO):
 MASS = (("m", (Fraction(9, 10), Fraction(11, 10))),)
 
 
+@pytest.mark.slow
 def test_what_inputs_reach_of_a_parameter_joins_h_and_the_rest_pushes():
     """f_2 gains (m - 1) 3 x1: in closed form at the corners of m."""
     s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*m*x1 + 4*x2"), MASS)
@@ -243,6 +244,7 @@ def test_a_parameter_that_the_middle_knows_exactly_adds_nothing():
     assert not Beside(s.fields).joins_uncertainty
 
 
+@pytest.mark.slow
 def test_wider_ranges_never_need_less():
     previous = 0.0
     for half in ("1/100", "1/20", "1/5"):
@@ -253,6 +255,7 @@ def test_wider_ranges_never_need_less():
         previous = push.above
 
 
+@pytest.mark.slow
 def test_in_coordinates_the_residual_is_what_is_sampled():
     S = Coordinates(((Fraction(2), Fraction(1)), (Fraction(0), Fraction(3))))
     s = unknown(("-m*x1 + 2*x2", "-0.25*x2**3 - 3*x1*m + 4*x2"), MASS, coordinates=S)

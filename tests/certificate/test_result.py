@@ -74,6 +74,7 @@ def test_values_have_types():
     assert certified.spec.effective.system.units["angle"] == "rad"
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     where=ANY_PLACE, value=st.sampled_from([None, 7, -1.5, True, "text", [], {}, {"a": 1}, [1, 2], "absent"])

@@ -344,6 +344,7 @@ def test_junit_a_case_per_claim(certified):
     assert all(case.is_passed for case in cases)
 
 
+@pytest.mark.slow
 @given(st.text(), st.text())
 def test_junit_is_well_formed_whatever_the_text(message, path):
     finding = Finding(code="TC101", message=message)
@@ -559,6 +560,7 @@ def test_a_plan_file_that_changes_is_noticed(folder):
     assert "TC403" in codes(run(path, "--json"))
 
 
+@pytest.mark.slow
 def test_what_is_known_needs_no_numerics(certified):
     cache._program.cache_clear()
     path = spec()

@@ -114,6 +114,7 @@ def test_a_metric_that_is_not_positive_or_depends_on_the_wrong_state(folder):
     assert found["largest_rate"][0] > 1.4  # of C2, which is decided all the same
 
 
+@pytest.mark.slow
 def test_a_rank_that_is_lost_is_said(folder):
     (folder / "own.yaml").write_text((SYSTEM + OWN).replace('[["0.5"], [-2]]', '[["x1"], ["x1*x2"]]'))
     done = run(folder / "own.yaml")
@@ -277,6 +278,7 @@ def _text(folder, name, text):
     return folder / name
 
 
+@pytest.mark.slow
 def test_what_is_no_such_file_is_one_located_error(folder):
     for why, path in _bad(folder):
         done = run(folder / "system.yaml", path)

@@ -203,6 +203,7 @@ def test_a_tube_that_is_left_at_the_start_is_refuted_for_every_machine():
     assert judged(problem).verdict is Verdict.REFUTED
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_curve")
 def test_a_wind_is_searched_for():
     problem = any_wind(orbit(largest="wind"), None)
@@ -219,6 +220,7 @@ def test_without_a_machine_there_is_no_section():
         kind_of("H").section(problem, propose_hardware(problem, Asked()))
 
 
+@pytest.mark.slow
 def test_the_section_is_what_is_read_back():
     found = judged(orbit(noise=F(1, 1000)))
     told = to_json(found)
@@ -226,6 +228,7 @@ def test_the_section_is_what_is_read_back():
     assert to_json(from_json(HardwareData, told, "hardware")) == told
 
 
+@pytest.mark.slow
 def test_a_ripple_that_is_nothing_but_rounding_is_none_of_the_budget():
     assert judged(orbit()).budget.noise_estimate == 0
     assert searching.DIGITS == 4

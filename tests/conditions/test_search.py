@@ -356,6 +356,7 @@ def test_least_speed_of_c_is_the_least_fixed_point():
 # --- gains asked for
 
 
+@pytest.mark.slow
 def test_gains_asked_for_are_judged_as_given():
     problem = alive()
     pair = judged_26(problem).pair
@@ -376,6 +377,7 @@ def test_gains_asked_for_are_judged_as_given():
     assert low.least_adaptation is not None
 
 
+@pytest.mark.slow
 def test_a_gap_in_the_constants_leaves_gains_undecided():
     values = {
         k: (x * 0.99, x) if k not in ("lower", "input_gain_least") else (x, x * 1.01)
@@ -448,6 +450,7 @@ def test_no_uncertainty_needs_next_to_no_gain():
         assert result.verdict is Verdict.CERTIFIED
 
 
+@pytest.mark.slow
 def test_results_are_json_and_recipes_are_decimals():
     for problem in (alive(), alive(A_m=None), alive(values={"initial_distance": 0.9})):
         for result in (judged_26(problem), judged_distance(problem), judged_sampled(problem)):

@@ -208,6 +208,7 @@ def test_where_b_turns_c_feels_every_wind():
 # -- verdicts
 
 
+@pytest.mark.slow
 def test_more_wind_never_needs_less():
     rates, times = [], []
     for bound in ("0", "0.01", "0.05", "0.1"):

@@ -341,6 +341,7 @@ def test_any_number_of_vertices_contains(data, kept):
         assert sign * p(point) <= support(e, 0, {(0, 0): Fraction(sign)})
 
 
+@pytest.mark.slow
 @given(data=st.data(), order=st.sampled_from([0, 1, 2]))
 @QUICK
 def test_fixed_variables_enter_with_their_whole_range(data, order):

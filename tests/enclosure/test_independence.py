@@ -40,6 +40,7 @@ def test_independent_columns_are_proven(rows: list[list[str]]) -> None:
     assert verdict(rows) == "certified"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "rows",
     [

@@ -50,6 +50,7 @@ def nobody_is_left() -> bool:
     return not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", [Serial(), Processes(2)])
 def test_results_are_in_the_order_of_the_items(executor):
     assert executor.map(slow_first, range(5)) == [0, 1, 4, 9, 16]
@@ -60,6 +61,7 @@ def test_results_are_in_the_order_of_the_items(executor):
     assert nobody_is_left()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", [Serial(), Processes(2)])
 def test_an_exception_of_a_piece_is_raised(executor):
     with pytest.raises(ZeroDivisionError, match="of a worker"):

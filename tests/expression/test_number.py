@@ -25,6 +25,7 @@ def ball(q: Fraction) -> arb:
     return arb(q.numerator) / q.denominator
 
 
+@pytest.mark.slow
 @given(
     p=st.fractions(max_denominator=10**6).filter(bool),
     n=st.integers(-6, 6).filter(bool),

@@ -19,6 +19,7 @@ MOST = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_there_are_not_more_of_them(kind):
     assert counted()[kind] <= MOST[kind]

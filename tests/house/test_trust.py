@@ -156,6 +156,7 @@ TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant,
 }
 
 
+@pytest.mark.slow
 def test_floats_are_taken_as_exact_where_they_are():
     """A float that was computed, measured or sampled says nothing of its error, and bounds nothing."""
     found = {

@@ -249,6 +249,7 @@ def test_certify_says_what_the_command_says(tmp_path, monkeypatch):
     assert library == command
 
 
+@pytest.mark.slow
 def test_what_is_saved_is_read_back(tmp_path):
     result = certified()
     result.save(tmp_path / "x.json")
@@ -288,6 +289,7 @@ def test_the_radius_is_rounded_up(rho):
     assert rho <= Fraction(repr(told)) < rho + Fraction(1, 10**15)
 
 
+@pytest.mark.slow
 def test_what_is_not_certified_has_no_gains_to_use():
     result = tc.certify(DATA, bandwidth=1, adaptation_rate=10)
     assert not result.certified
@@ -313,6 +315,7 @@ def test_results_are_frozen():
         result.verdict = tc.Verdict.UNDECIDED
 
 
+@pytest.mark.slow
 def test_progress_is_told():
     told = []
     tc.certify(DATA, progress=told.append)
@@ -416,6 +419,7 @@ def test_a_certificate_is_examined_again(tmp_path):
     assert tc.recheck(tmp_path / "x.json").found == found.found
 
 
+@pytest.mark.slow
 def test_a_certificate_that_lies_is_not_confirmed():
     honest = certified()
     data = json.loads(honest.text)
@@ -459,6 +463,7 @@ def test_a_simulation(tmp_path):
     assert "not falsified" in found._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_plan_in_a_file_is_looked_for_beside_its_specification(tmp_path, monkeypatch):
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path / "there")
@@ -621,6 +626,7 @@ omega: str = tc.read("x.json").omega
     assert errors == ["wrong.py:3", "wrong.py:4", "wrong.py:5", "wrong.py:6"], said
 
 
+@pytest.mark.slow
 def test_keys_that_are_set_stand_in_place_of_those_of_the_specification():
     spec = tc.load(DATA, settings={"tube.rho_a": 0.3, "initial_state": {"at": [0, Fraction(1, 20)]}})
     assert spec == tc.load(changed(tube__rho_a=0.3, initial_state__at=[0, 0.05]))

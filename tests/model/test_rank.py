@@ -102,6 +102,7 @@ def affine(n: int, m: int) -> ControlAffineModel:
     return replace(model([["1"]]), states=states, inputs=inputs, f=(constant(0),) * n, B=B)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "m"), [(6, 5), (8, 6), (9, 7), (32, 16)])
 @pytest.mark.parametrize("half", ["1/1000", "1"])
 def test_the_rank_of_a_large_B_has_a_budget(n: int, m: int, half: str) -> None:

@@ -348,6 +348,7 @@ def test_what_depends_on_time_only_where_it_is_defined_needs_a_horizon(expressio
     assert run(edited(THREE, ("0.1*sin(2*t)", "0*(1/(sin(t) + 2)) + 0.1")))["verdict"] == "certified"
 
 
+@pytest.mark.slow
 def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
     result = run(edited(THREE, ("B: [[0], [0], [1]]", 'B: [[0], [0], ["x1 + x2 - 0.05"]]')))
     assert result["verdict"] == "refuted"

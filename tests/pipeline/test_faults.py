@@ -264,6 +264,7 @@ def test_gains_that_stand_for_others_prove_nothing():
         assert judgement.shortfalls
 
 
+@pytest.mark.slow
 def test_a_constant_without_a_bound_proves_nothing():
     machine = alive_machine().machine
     for kind in KINDS:

@@ -139,6 +139,7 @@ def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
     assert (done.exit_code, "u* goes 8.5" in done.output) == (1, True)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(a=st.integers(1, 140), w=st.integers(5, 20))
 def test_the_answer_is_that_of_dense_samples(a, w):

@@ -42,6 +42,7 @@ def radii(epsilon, rho_a):
     return Options(epsilon=Fraction(epsilon), rho_a=Fraction(rho_a))
 
 
+@pytest.mark.slow
 def test_other_radii_prove_neither_rank_nor_metric_again():
     memory = Memory()
     results = [
@@ -53,6 +54,7 @@ def test_other_radii_prove_neither_rank_nor_metric_again():
         assert result == certify(THREE, options).to_json()  # and what is recalled changes nothing
 
 
+@pytest.mark.slow
 def test_other_radii_plan_once(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     memory, spec = Memory(), load_text(PLANNED, "spec.yaml")
@@ -127,6 +129,7 @@ def test_only_sections_that_are_named_are_left_out_of_what_constants_rest_on():
     assert ground.keys() == canonical(set_in(ONE)).keys() - rest | {"gap", "budget"}
 
 
+@pytest.mark.slow
 def test_other_knots_of_a_file_are_another_plan(tmp_path):
     rows = "t,x,u\n0,0,0\n5,0,0\n10,{},0\n"
     text = ONE.replace("{kind: equilibrium, at: [0], horizon: 10}", "{kind: csv, file: plan.csv}")
@@ -139,6 +142,7 @@ def test_other_knots_of_a_file_are_another_plan(tmp_path):
     assert found[0]["tube"] != found[1]["tube"] or found[0]["constants"] != found[1]["constants"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -157,6 +161,7 @@ def test_another_system_metric_or_set_is_proven_anew(change):
     assert memory.computed["metric"] == 2
 
 
+@pytest.mark.slow
 def test_another_gap_or_budget_is_proven_anew():
     memory = Memory()
     for options in (Options(), Options(gap=Fraction(1, 50)), Options(budget=1_000_000)):

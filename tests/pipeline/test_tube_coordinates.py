@@ -127,6 +127,7 @@ tube: {TUBE}
 """
 
 
+@pytest.mark.slow
 def test_a_tube_whose_half_widths_fit_is_not_refused():
     """The ball of w's size leaves the safe set through q, which never moves so far."""
     refused = certify(load_text(PENDULUM.replace("TUBE", "epsilon: 0.4, rho_a: 0.4")), COARSE)
@@ -155,6 +156,7 @@ def test_half_widths_that_leave_the_safe_set_are_told_by_state():
     assert found.tube is None
 
 
+@pytest.mark.slow
 def test_a_radius_of_the_command_line_splits_the_tube():
     spec = load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}"))
     half = certify(spec, COARSE).tube
@@ -165,6 +167,7 @@ def test_a_radius_of_the_command_line_splits_the_tube():
         certify(spec, Options(epsilon=Fraction(1, 20)))
 
 
+@pytest.mark.slow
 def test_the_scale_of_the_metric_changes_no_gain():
     """W and 64 W are one metric: the same tube, the same gains."""
     base = PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")
@@ -177,6 +180,7 @@ def test_the_scale_of_the_metric_changes_no_gain():
     assert gains(other) == pytest.approx(own, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_start_takes_its_part_of_the_tube():
     at_rest = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.3}")), COARSE)
     moved = PENDULUM.replace("TUBE", "half_widths: {q: 0.3}") + "initial_state: {at: [0.1, 0]}\n"
@@ -194,6 +198,7 @@ def test_a_start_takes_its_part_of_the_tube():
     assert not beyond.proof.of
 
 
+@pytest.mark.slow
 def test_without_coordinates_certificates_are_as_they_were():
     result = certify(load_text(PENDULUM.replace("TUBE", "epsilon: 0.1, rho_a: 0.1")), COARSE).to_json()
     assert set(result["tube"]) == {"epsilon", "rho_a", "rho_r", "rho", "half_widths"}

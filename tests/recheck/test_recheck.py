@@ -42,6 +42,7 @@ def shipped():
     return lambda path: rechecked.shipped(path.stem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", [THREE, *(pytest.param(path, marks=pytest.mark.slow) for path in CONFIGS if path != THREE)]
 )
@@ -81,6 +82,7 @@ def test_a_changed_field_is_never_confirmed_unless_it_is_harmless(shipped, path,
     assert accepted  # harmless changes are not refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "count"),
     [(THREE, 200), pytest.param(TWO, 100, marks=pytest.mark.slow)],

@@ -97,6 +97,7 @@ def test_a_horizon_is_a_positive_number(plans, horizon):
     refused(document)
 
 
+@pytest.mark.slow
 def test_a_longer_horizon_than_was_examined_is_found(plans):
     """Both the specification and the claim say 300 s: the tube leaves nothing, but knots end, and words differ."""
 
@@ -119,6 +120,7 @@ CLAIMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", CLAIMS)
 def test_the_claim_is_derived_again(key):
     document = certified(SMALL)
@@ -142,6 +144,7 @@ def test_the_claim_is_derived_again(key):
     assert f"claim.{key} is missing" in refused(document)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("h", "why", "period"),
     [
@@ -172,6 +175,7 @@ def test_an_uncertainty_without_a_period_needs_a_horizon():
     ]
 
 
+@pytest.mark.slow
 def test_what_h_owes_is_owed_at_all_times():
     """0/(t - 2) is 0, and h does not depend on t but for what it owes: t = 2 lies within the horizon."""
     text = SMALL.replace(PLAN, PLAN.replace("}", ", horizon: 3}"))
@@ -240,6 +244,7 @@ def examples(plans):
     return {**plans, "small": certified(SMALL), "moving": plans["expressions"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["expressions", "csv", "ilqr", "small"])
 def test_an_unknown_member_is_refused_wherever_it_stands(plans, kind):
     """R3: constants.u_max and tube.x were ignored, and shown as facts."""

@@ -50,6 +50,7 @@ def test_what_folding_drops_is_owed_and_makes_another_system(where, owes, tmp_pa
     assert [name for name, _ in failing(found)] == ["f, B, W, h and the plan are smooth"]
 
 
+@pytest.mark.slow
 def test_a_metric_that_was_asked_for_is_not_any_metric(tmp_path):
     """R5: a certificate with a metric written by hand, at another rate, was taken for the one that was synthesised."""
     text = SMALL.replace(GIVEN, "metric: {synthesise: {rate: 0.5}}")
@@ -85,6 +86,7 @@ def names(found):
     return {name for name, _ in failing(found)}
 
 
+@pytest.mark.slow
 def test_a_plan_with_a_goal_ends_there():
     """R6: inputs from a forged cache gave a plan that ends elsewhere, and it was confirmed."""
     document = planned()
@@ -105,12 +107,14 @@ def test_inputs_that_do_not_lead_along_the_states_are_a_defect():
     assert "the plan serves its task" not in found
 
 
+@pytest.mark.slow
 def test_a_plan_begins_where_its_task_does():
     document = planned()
     document["result"]["spec"]["effective"]["trajectory"]["start"] = ["3.4", "-2.3"]
     assert "the plan serves its task" in names(examine(sealed(document), 20))
 
 
+@pytest.mark.slow
 def test_a_plan_spans_its_horizon():
     document = planned()
     knots = document["result"]["plan"]["knots"]
@@ -118,6 +122,7 @@ def test_a_plan_spans_its_horizon():
     assert "the plan serves its task" in names(examine(sealed(document), 20))
 
 
+@pytest.mark.slow
 def test_what_is_drawn_of_a_plan_lies_on_it():
     document = planned()
     document["result"]["plan"]["samples"]["x"][70][0] += 0.01
@@ -138,6 +143,7 @@ def test_margins_drawn_around_the_gains_are_proven():
         assert name.endswith("margins around")
 
 
+@pytest.mark.slow
 def test_a_contraction_that_exceeds_its_rate_is_confirmed():
     """R7: a largest eigenvalue may be negative; a true certificate was contradicted."""
     text = (
@@ -160,6 +166,7 @@ def test_the_hash_of_the_specification_is_compared():
     assert "the specification and what repeats it" in names(examine(document, 20))
 
 
+@pytest.mark.slow
 def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
     """R8: samples of a grid missed the extreme of the tube, and the bound was shared by them."""
     text = (

@@ -341,6 +341,7 @@ def test_no_random_change_of_what_is_stated_of_a_machine_is_confirmed(monkeypatc
     assert refusals > 90
 
 
+@pytest.mark.slow
 def test_outcomes_of_a_forged_certificate_are_not_those_of_another(honest):
     """A half-width that only a forged bound of the metric allows is not confirmed with the bound that is true."""
     document, memory = copy.deepcopy(honest[0]), dict(honest[1])

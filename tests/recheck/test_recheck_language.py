@@ -84,6 +84,7 @@ def test_a_wider_box_is_another_claim():
     assert any("initial_distance" in name for name in names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "box",
     [

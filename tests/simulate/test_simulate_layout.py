@@ -80,6 +80,7 @@ def rate(fast, y, h, B, dy):
     _rate(fast, False, y, h, B, dy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", [name for name in CONTROLLERS if DESIGNS[name].terms.filters])
 def test_both_forms_of_the_right_hand_sides_agree(controller):
     """The matrix of the exact flow and the rate that RK4 integrates, at random states."""

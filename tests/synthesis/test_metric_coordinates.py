@@ -86,6 +86,7 @@ def test_also_where_the_direction_of_the_input_turns():
     assert scaled_condition(TURNING, units, **wanted) == pytest.approx(reference, rel=0.01)
 
 
+@pytest.mark.slow
 def test_in_the_states_own_units_it_does():
     wanted = {"rate": Fraction(1), "degree": 0, "coordinates": "identity"}
     one, eight = (dict.fromkeys("ac", 1) | dict.fromkeys("bd", s) for s in (1, 8))

@@ -40,6 +40,7 @@ LIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIES)
 def test_what_is_written_is_what_was_proven(name, monkeypatch):
     original = ladder.shortest_proven

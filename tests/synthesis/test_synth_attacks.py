@@ -117,6 +117,7 @@ def test_repeated_modes_are_bounded_truly(order):
     assert at_origin(system, Fraction("0.99999999")) is None
 
 
+@pytest.mark.slow
 @given(
     entries=st.lists(st.integers(-3, 3), min_size=9, max_size=9), rate=st.fractions(-4, 4, max_denominator=9)
 )
@@ -163,6 +164,7 @@ def test_numbers_beyond_floats_are_passed_over():
         assert (mode is not None and mode.excludes(Fraction(1))) == found
 
 
+@pytest.mark.slow
 def test_a_lost_rank_is_named_with_its_point():
     text = small().replace('[["0"], ["1"]]', '[["0"], ["y"]]')
     found = pipeline.synthesise(

@@ -177,6 +177,7 @@ def test_the_tube_of_a_family_is_what_lies_within_rho_of_its_box():
     assert (np.linalg.norm(moved, axis=1) <= rho).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(low=RATIOS, width=RATIOS.map(abs), rho=RATIOS.map(lambda q: abs(q) + Fraction(1, 100)))
 def test_containment_is_exact_but_for_roundings(low, width, rho):
