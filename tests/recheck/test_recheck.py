@@ -119,6 +119,26 @@ def test_a_change_without_the_hash_is_contradicted(shipped):
     assert examine(document).failing.name == "the hash is that of the result"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "member",
+    [
+        {"at": {"x": [99.0, 99.0, 99.0]}},
+        {"relax": [{"id": "turn_knob", "knob": "epsilon", "now": 0.2, "value": 0.9}]},
+        {"relax": [{"id": "lessen_cause", "cause": "noise_estimate", "share": 7.5}]},
+    ],
+    ids=["at", "turn_knob", "lessen_cause"],
+)
+def test_what_is_certified_shows_no_point_and_advises_nothing_that_would_serve(shipped, member):
+    """A report would print it beside the verdict, and nobody has examined it."""
+    document, memory = copy.deepcopy(shipped(THREE)), {}
+    assert examine(sealed(document), 2_000, memory).exit_code == ExitCode.CERTIFIED
+    document["result"]["reasons"][0] |= member
+    found = examine(sealed(document), 2_000, memory)
+    assert found.exit_code == ExitCode.NOT_CERTIFIED
+    assert found.failing.name == "the verdict follows from the sections"
+
+
 # -- planted bugs ------------------------------------------------------------------------------------------------
 
 

@@ -180,6 +180,9 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
         own = next(kind.said(sections.by_key[kind.key]) for kind in KINDS if kind.key == named)
         same = all(value == own.get(key) for key, value in reason.parameters.items() if key != "section")
         yield same, f"a reason repeats {named} otherwise than it is"
+        yield reason.at is None, "a reason of what is certified names a point"
+        gains = set(reason.advice) <= {"halve_constant", "halve_hardware"}
+        yield gains, "a reason of what is certified advises what would serve"
 
 
 def _as_wanted(result: Result, deciding: tuple[str, ...]) -> bool:

@@ -16,6 +16,7 @@ NOT_EXAMINED = (
     "effort",
     "elasticities",
     "synthesis",
+    "reasons.relax",
     *(f"{kind.key}.{member}" for kind in KINDS for member in kind.unread),
 )
 """By path: members that are shown and not verified."""

@@ -23,12 +23,16 @@ Parameters = dict[str, object]
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """A claim by its id and parameters, its verdict, and the point that shows it: (time, if there is one; state)."""
+    """A claim by its id and parameters, its verdict, and the point that shows it: (time, if there is one; state).
+
+    `advice`: the ids of what is advised, of which no more is examined.
+    """
 
     claim: str
     parameters: Parameters
     verdict: str
     at: tuple[Fraction | None, Numbers] | None
+    advice: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +69,13 @@ def _read(
 def read_reason(node: Node, n: int) -> Reason:
     """One of `result.reasons`."""
     claim, parameters, own = _read(node, "claim", _CLAIMS, ("verdict", "at", "relax"))
-    own.get("relax", _advice)
-    return Reason(claim, parameters, own["verdict"].word(*VERDICTS), own.get("at", lambda at: _at(at, n)))
+    return Reason(
+        claim,
+        parameters,
+        own["verdict"].word(*VERDICTS),
+        own.get("at", lambda at: _at(at, n)),
+        own.get("relax", _advice) or (),
+    )
 
 
 def read_assumption(node: Node) -> Assumption:
@@ -91,9 +100,8 @@ def _claim(node: Node) -> str:
     return _read(node, "claim", _CLAIMS)[0]
 
 
-def _advice(node: Node) -> None:
-    for item in node.entries():
-        _read(item, "id", _RELAX)
+def _advice(node: Node) -> tuple[str, ...]:
+    return tuple(_read(item, "id", _RELAX)[0] for item in node.entries())
 
 
 def _texts(node: Node) -> object:
