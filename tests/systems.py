@@ -150,3 +150,17 @@ IN_WINDOWS = (
     + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0002, y: 0.0005}}\n"
     + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
 )
+
+# the smallest machine: a line that is known well, at 200 Hz
+SCALAR = """
+tubecert: 1
+name: scalar
+system: {states: [x], inputs: [u], f: ["-x + 0.1*sin(x)"], B: [[1]]}
+safe_set: {x: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.5, rho_a: 0.5}
+hardware: {rate: 200, noise: 0.001}
+conditions: {decides: H}
+"""

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import pytest
 from rechecked import certified, examine, failing
+from systems import SCALAR
 
 from tubecert.claims import EaseHardware, LessenCause
 from tubecert.pipeline import Options, certify
@@ -14,19 +15,6 @@ from tubecert.pipeline.design import narrowest, needed_of
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
-
-SCALAR = """
-tubecert: 1
-name: scalar
-system: {states: [x], inputs: [u], f: ["-x + 0.1*sin(x)"], B: [[1]]}
-safe_set: {x: [-2, 2]}
-uncertainty: {h: ["0.2*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0]}
-metric: {rate: 0.5, dual_metric: [[1]]}
-tube: {epsilon: 0.5, rho_a: 0.5}
-hardware: {rate: 200, noise: 0.001}
-conditions: {decides: H}
-"""
 
 RADIUS = Measure(units={})
 H = Options(conditions="hardware")  # where nothing rests on the other kinds

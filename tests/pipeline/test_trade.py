@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rechecked import examine, failing
+from systems import SCALAR
 from typer.testing import CliRunner
 
 from tubecert import certificate
@@ -19,19 +20,6 @@ from tubecert.pipeline import Options, certify, design, trade
 from tubecert.pipeline.width import Measure
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
-
-SCALAR = """
-tubecert: 1
-name: scalar
-system: {states: [x], inputs: [u], f: ["-x + 0.1*sin(x)"], B: [[1]]}
-safe_set: {x: [-2, 2]}
-uncertainty: {h: ["0.2*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0]}
-metric: {rate: 0.5, dual_metric: [[1]]}
-tube: {epsilon: 0.5, rho_a: 0.5}
-hardware: {rate: 200, noise: 0.001}
-conditions: {decides: H}
-"""
 
 
 def run(*arguments):

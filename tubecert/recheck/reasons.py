@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure, maybe
+from tubecert.recheck.kinds.hardware import OF_GAINS, SHARES
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specified.numbers import Numbers
@@ -110,18 +111,7 @@ def _texts(node: Node) -> object:
 
 _SIDE = _word("lower", "upper")
 _PART = _word("sample_time", "delay", "noise", "wind")
-_CAUSE = _word(
-    "plan",
-    "feedforward",
-    "wind",
-    "wind_estimate",
-    "bias",
-    "noise_estimate",
-    "lag",
-    "noise_feedback",
-    "sampling",
-    "gain",
-)
+_CAUSE = _word(*SHARES, *OF_GAINS)
 _KNOB = _word(
     "epsilon",
     "rho_a",
