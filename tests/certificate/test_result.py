@@ -12,16 +12,12 @@ from hypothesis import strategies as st
 
 import tubecert
 from tubecert.certificate.result import Result
-from tubecert.claims import (
-    Assumption,
-    Claim,
-    Failure,
-    MetricContraction,
-    Outcome,
-    PlanRemedy,
-    Relax,
-    TubeInSafeSet,
-)
+from tubecert.claims.advice import PlanRemedy
+from tubecert.claims.failures import Failure
+from tubecert.claims.family import Assumption, Claim, Relax
+from tubecert.claims.metric import MetricContraction
+from tubecert.claims.outcomes import Outcome
+from tubecert.claims.tube import TubeInSafeSet
 from tubecert.records import FormError, to_json
 from tubecert.verdict import Verdict
 from tubecert.words import advice as advice_words

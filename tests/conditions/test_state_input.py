@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tubecert.claims import MetricKilling
+from tubecert.claims.metric import MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.projected import ProjectedPencil

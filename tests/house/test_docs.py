@@ -14,7 +14,7 @@ import pytest
 import tubecert
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.sections import assumptions
-from tubecert.claims import UncertaintyAsGiven
+from tubecert.claims.assumptions import UncertaintyAsGiven
 from tubecert.model import build
 from tubecert.pipeline import Options, certify
 from tubecert.spec import load_text

@@ -23,7 +23,8 @@ from systems import (
     two_state,
 )
 
-from tubecert.claims import MetricContraction, MetricDefinite, MetricKilling, Reason
+from tubecert.claims.family import Reason
+from tubecert.claims.metric import MetricContraction, MetricDefinite, MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import constant, substitute
 from tubecert.metric.verify import verify_metric

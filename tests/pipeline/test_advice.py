@@ -8,7 +8,7 @@ import pytest
 from proven import proven
 
 from tubecert import certificate, pipeline
-from tubecert.claims import EnlargeSafeSet, NoKnobAlone, ReduceRadii, TurnKnob
+from tubecert.claims.advice import EnlargeSafeSet, NoKnobAlone, ReduceRadii, TurnKnob
 from tubecert.pipeline import Options, advice, certify
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import CertificateError, read

@@ -13,7 +13,7 @@ from problems import judged_26, judged_distance, judged_sampled, problem_of
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import seal
-from tubecert.claims import Reason
+from tubecert.claims.family import Reason
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.errors import SpecError

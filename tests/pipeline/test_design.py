@@ -9,7 +9,7 @@ import pytest
 from rechecked import certified, examine, failing
 from systems import SCALAR
 
-from tubecert.claims import EaseHardware, LessenCause
+from tubecert.claims.advice import EaseHardware, LessenCause
 from tubecert.pipeline import Options, certify
 from tubecert.pipeline.design import narrowest, needed_of
 from tubecert.pipeline.width import Measure, size_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tubecert.certificate.result import Result
-from tubecert.claims import TubeInSafeSet
+from tubecert.claims.tube import TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulate.compare import compare

@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 from tubecert import certificate, pipeline
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate, Result
-from tubecert.claims import Assumption
+from tubecert.claims.family import Assumption
 from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
 from tubecert.expression import to_text

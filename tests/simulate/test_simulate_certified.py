@@ -13,7 +13,8 @@ from simulated import CONFIGS, FLAT, certified, setting
 from tubecert import certificate, pipeline
 from tubecert.certificate import digest, dump, seal
 from tubecert.certificate.belonging import compared
-from tubecert.claims import MetricDefinite, Reason
+from tubecert.claims.family import Reason
+from tubecert.claims.metric import MetricDefinite
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, NAMES, words_of

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.claims import NoneCertified, NothingFound, TubeInSafeSet
+from tubecert.claims.failures import NoneCertified, NothingFound
+from tubecert.claims.tube import TubeInSafeSet
 from tubecert.cli.app import app
 from tubecert.model import build
 from tubecert.pipeline import Deadline, Options, Synthesised, synthesis

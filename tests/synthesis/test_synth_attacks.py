@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.claims import LowerDegree, NotProvenAsWritten, NotWritable, RankUnproven
+from tubecert.claims.advice import LowerDegree
+from tubecert.claims.failures import NotProvenAsWritten, NotWritable, RankUnproven
 from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, scan, symbol

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from systems import matrix_of
 from typer.testing import CliRunner
 
-from tubecert.claims import MetricContraction, VariableForbidden
+from tubecert.claims.failures import VariableForbidden
+from tubecert.claims.metric import MetricContraction
 from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape

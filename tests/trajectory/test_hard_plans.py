@@ -10,7 +10,7 @@ from math import prod
 import numpy as np
 import pytest
 
-from tubecert.claims import Reason
+from tubecert.claims.family import Reason
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.expression import constant, symbol

@@ -32,7 +32,7 @@ class Radius:
     """rho >= sqrt(A/a)|x0* - x0| + eps + rho_a, an exact decimal.
 
     `contained` tells whether O(rho) lies in the safe set; if not, there is no rho and the tube is refused. `obstacle`
-    says why the fixed point was not found, if it was not (see `claims.TubeRadius`). `sides`: what |x_i - x_i*| is at
+    says why the fixed point was not found, if it was not (see `TubeRadius`). `sides`: what |x_i - x_i*| is at
     most, where the tube has coordinates of its own.
     """
 

@@ -12,7 +12,8 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from tubecert.certificate.effective import Asked, Effective
-from tubecert.claims import Assumption, Outcome, Reason
+from tubecert.claims.family import Assumption, Reason
+from tubecert.claims.outcomes import Outcome
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.data import Pair, SectionData

@@ -22,8 +22,7 @@ from tubecert.certificate.result import (
     Samples,
     Start,
 )
-from tubecert.claims import (
-    Assumption,
+from tubecert.claims.assumptions import (
     ExactGeodesics,
     FirstOrderFilter,
     ForAllTime,
@@ -40,6 +39,7 @@ from tubecert.claims import (
     UpToHorizon,
     WindWithin,
 )
+from tubecert.claims.family import Assumption
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest

@@ -8,7 +8,8 @@ from fractions import Fraction
 from math import isfinite
 
 from tubecert.certificate.result import Result
-from tubecert.claims import METRIC_CLAIMS, MetricFound, Reason
+from tubecert.claims.family import Reason
+from tubecert.claims.metric import METRIC_CLAIMS, MetricFound
 from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location

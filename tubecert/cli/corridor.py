@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
-from tubecert.claims import HardwarePart
+from tubecert.claims.advice import HardwarePart
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.errors import ExitCode, SpecError

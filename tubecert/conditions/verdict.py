@@ -21,7 +21,7 @@ class Shortfall:
     `parameters`, `wind` where no gains can help; `wind_bound`, `wind_not_covered` where nothing follows for a wind;
     `gain_not_covered`, `gain_unmatched`, `gain_range` where nothing follows for an uncertain gain;
     `bounded` where `constant` has no finite bound; `corrected_formulas` where the formulas
-    themselves prove nothing; `proven_gains` where the search failed (see `claims.ConditionHolds`).
+    themselves prove nothing; `proven_gains` where the search failed (see `ConditionHolds`).
     """
 
     claim: str

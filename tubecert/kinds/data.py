@@ -50,7 +50,7 @@ class GainPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
-    """A condition that is not proven, see `claims.ConditionHolds`; `missing` is what is needed beyond the allowed."""
+    """A condition that is not proven, see `ConditionHolds`; `missing` is what is needed beyond the allowed."""
 
     condition: str
     constant: str | None = None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar, Generic
 
-from tubecert.claims import GainsSuffice
+from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from tubecert.claims import GainsSuffice
+from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions import rates
 from tubecert.conditions.predictor import Matrix
 from tubecert.conditions.problem import TubeProblem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from tubecert.claims import GainsSuffice
+from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions import sampled
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal, SampledProposal

@@ -10,7 +10,7 @@ from typing import Final, TypeAlias
 
 from tubecert import certificate, pipeline
 from tubecert.certificate.metric_file import MetricFile
-from tubecert.claims import Reason
+from tubecert.claims.family import Reason
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import SpecError

@@ -17,18 +17,9 @@ import numpy as np
 
 from tubecert.bounds.compute import uncertainty_bounds
 from tubecert.certificate.result import Result
-from tubecert.claims import (
-    Knob,
-    NoKnobAlone,
-    Reason,
-    ReduceInitialError,
-    ReduceRadii,
-    Relax,
-    ShrinkTube,
-    TubeInSafeSet,
-    TubeRadius,
-    TurnKnob,
-)
+from tubecert.claims.advice import Knob, NoKnobAlone, ReduceInitialError, ReduceRadii, ShrinkTube, TurnKnob
+from tubecert.claims.family import Reason, Relax
+from tubecert.claims.tube import TubeInSafeSet, TubeRadius
 from tubecert.conditions.problem import Formulas, TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.errors import TubecertError

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 from typing import Any
 
-from tubecert.claims import Claim
+from tubecert.claims.family import Claim
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall

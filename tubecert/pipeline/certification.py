@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from tubecert.certificate.result import Result
-from tubecert.claims import MendPlan, Reason
+from tubecert.claims.advice import MendPlan
+from tubecert.claims.family import Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES

@@ -16,7 +16,7 @@ from math import inf, sqrt
 import numpy as np
 
 from tubecert.certificate.result import RateLimit, RateLimits
-from tubecert.claims import TubeInSafeSet, TubeRadius
+from tubecert.claims.tube import TubeInSafeSet, TubeRadius
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
 from tubecert.pipeline.synthesised import Row

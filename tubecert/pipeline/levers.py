@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import isfinite, sqrt
 
-from tubecert.claims import Knob
+from tubecert.claims.advice import Knob
 from tubecert.conditions.decimals import round_down, round_up
 from tubecert.expression import Expression, to_text
 from tubecert.spec import Spec
@@ -31,7 +31,7 @@ _STEEPER = Fraction(1005, 1000)  # what a metric must support beyond its rate
 class Lever:
     """A knob that stands at `now`, the values to try until one serves, and the specification with it `turned`.
 
-    `input` and `term` as in `claims.TurnKnob`; `steps`: whether values in between mean anything; `same_tube`: whether
+    `input` and `term` as in `TurnKnob`; `steps`: whether values in between mean anything; `same_tube`: whether
     it changes nothing but h.
     """
 

@@ -13,21 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from tubecert.claims import (
-    ConditionHolds,
+from tubecert.claims.advice import (
     EaseHardware,
     HalveConstant,
     HalveHardware,
-    InputWithinLimits,
     LeavePlanRoom,
     LessenCause,
-    ObstacleCleared,
     RaiseBudget,
-    Reason,
     ReduceRadii,
-    Relax,
     ShrinkTube,
 )
+from tubecert.claims.family import Reason, Relax
+from tubecert.claims.gains import ConditionHolds
+from tubecert.claims.limits import InputWithinLimits, ObstacleCleared
 from tubecert.conditions.inputs import InputBound, JudgedInput, LimitedInput
 from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.enclosure.constant import Constant, Witness

@@ -17,31 +17,32 @@ from typing import Literal
 from tubecert.certificate.metric_file import metric_file
 from tubecert.certificate.result import SolverData
 from tubecert.certificate.sections import metric_data
-from tubecert.claims import (
+from tubecert.claims.advice import (
     AskForRateBelow,
     AskForRateUpTo,
-    ConditionNumber,
     EnlargeSafeSet,
-    Failure,
     GiveInput,
     HigherDegree,
     LowerDegree,
     LowerRate,
-    MetricFound,
+    OtherVariables,
+    RaiseBudget,
+    RaiseConditionNumber,
+    ReduceRadii,
+    ShrinkSafeSet,
+)
+from tubecert.claims.failures import (
+    ConditionNumber,
+    Failure,
     NoneCertified,
     NothingFound,
     NotProvenAsWritten,
     NotWritable,
-    OtherVariables,
-    RaiseBudget,
-    RaiseConditionNumber,
     RankUnproven,
-    Reason,
-    ReduceRadii,
-    Relax,
-    ShrinkSafeSet,
-    TubeInSafeSet,
 )
+from tubecert.claims.family import Reason, Relax
+from tubecert.claims.metric import MetricFound
+from tubecert.claims.tube import TubeInSafeSet
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError

@@ -13,7 +13,7 @@ from math import inf
 from typing import Final
 
 from tubecert.certificate.result import Result
-from tubecert.claims import HardwarePart
+from tubecert.claims.advice import HardwarePart
 from tubecert.pipeline import Options, Progress, certify
 from tubecert.pipeline.width import Measure, machine_of, size_of
 from tubecert.spec import Spec

@@ -13,7 +13,8 @@ from math import isfinite
 from tubecert.certificate.metric_file import MetricFile, metric_file
 from tubecert.certificate.result import SolverData
 from tubecert.certificate.sections import metric_data
-from tubecert.claims import MetricContraction, RankOfB, Reason
+from tubecert.claims.family import Reason
+from tubecert.claims.metric import MetricContraction, RankOfB
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval

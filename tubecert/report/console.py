@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.certificate.result import Certificate, Result
-from tubecert.claims import InputWithinLimits
+from tubecert.claims.limits import InputWithinLimits
 from tubecert.report import sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled

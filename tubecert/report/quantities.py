@@ -12,7 +12,7 @@ from fractions import Fraction
 from math import isfinite
 
 from tubecert.certificate.result import Result
-from tubecert.claims import Claim
+from tubecert.claims.family import Claim
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.report.outline import widths

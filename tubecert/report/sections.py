@@ -13,7 +13,7 @@ from rich.text import Text
 
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
-from tubecert.claims import Reason
+from tubecert.claims.family import Reason
 from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, HARDWARE, SAMPLED
 from tubecert.kinds.alone import AloneData

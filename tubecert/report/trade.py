@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
 
-from tubecert.claims import HardwarePart
+from tubecert.claims.advice import HardwarePart
 from tubecert.records import Json
 from tubecert.report import sections
 from tubecert.report.console import verdict_line

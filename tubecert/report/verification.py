@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from tubecert.claims import MetricKilling
+from tubecert.claims.metric import MetricKilling
 from tubecert.printable import printable_json, visible
 from tubecert.records import Json, to_json
 from tubecert.report.layout import indented

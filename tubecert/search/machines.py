@@ -13,7 +13,7 @@ from typing import Final, get_args
 
 import numpy as np
 
-from tubecert.claims import HardwareCause, HardwarePart
+from tubecert.claims.advice import HardwareCause, HardwarePart
 from tubecert.conditions.hardware import HardwareRecipe, told
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem

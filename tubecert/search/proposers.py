@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Final
 
-from tubecert.claims import HardwareCause, HardwarePart
+from tubecert.claims.advice import HardwareCause, HardwarePart
 from tubecert.conditions import hardware as theorem_h
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe

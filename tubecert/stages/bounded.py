@@ -13,13 +13,8 @@ from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.gains import gain_constants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
-from tubecert.claims import (
-    ConstantBounded,
-    DeclareUncertaintyBound,
-    RaiseBudget,
-    ShrinkTube,
-    UncertaintyBound,
-)
+from tubecert.claims.advice import DeclareUncertaintyBound, RaiseBudget, ShrinkTube
+from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.machine import Machine

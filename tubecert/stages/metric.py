@@ -7,17 +7,9 @@ from fractions import Fraction
 from math import isfinite
 from typing import Any
 
-from tubecert.claims import (
-    DeclareMetricBound,
-    LowerRate,
-    MetricBound,
-    MetricContraction,
-    MetricKilling,
-    OtherMetric,
-    RaiseBudget,
-    RankOfB,
-    Relax,
-)
+from tubecert.claims.advice import DeclareMetricBound, LowerRate, OtherMetric, RaiseBudget
+from tubecert.claims.family import Relax
+from tubecert.claims.metric import MetricBound, MetricContraction, MetricKilling, RankOfB
 from tubecert.enclosure.branch_and_bound import Decision
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.metric.verify import MetricProof, verify_metric

@@ -11,7 +11,7 @@ from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithi
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.result import SynthesisData
 from tubecert.certificate.sections import declared_metric, declared_uncertainty
-from tubecert.claims import Claim, Reason, Relax
+from tubecert.claims.family import Claim, Reason, Relax
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import Range

@@ -35,7 +35,7 @@ from tubecert.certificate.sections import (
     metric_data,
     plan_data,
 )
-from tubecert.claims import Reason
+from tubecert.claims.family import Reason
 from tubecert.conditions.inputs import JudgedInput
 from tubecert.expression import number_text
 from tubecert.letters import ALL, name_of

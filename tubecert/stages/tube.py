@@ -12,18 +12,15 @@ from tubecert.bounds.compute import Radius, least_radius
 from tubecert.bounds.constants import Witness
 from tubecert.bounds.level import Proposed, greatest_level, least_level
 from tubecert.bounds.suprema import Suprema
-from tubecert.claims import (
-    Claim,
+from tubecert.claims.advice import (
     DeclareMetricBound,
     EnlargeSafeSet,
-    PlanBounded,
     RaiseBudget,
     ReduceInitialError,
     ReduceRadii,
-    Side,
-    TubeInSafeSet,
-    TubeRadius,
 )
+from tubecert.claims.family import Claim, Side
+from tubecert.claims.tube import PlanBounded, TubeInSafeSet, TubeRadius
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval, sqrt

@@ -16,7 +16,7 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-from tubecert import claims
+from tubecert.claims import failures
 from tubecert.expression import Expression, constant, substitute
 from tubecert.expression.matrix import null_space
 from tubecert.model import ControlAffineModel
@@ -47,10 +47,10 @@ class UncontrollableMode:
         """Whether no metric has this rate; at the limit itself C2 may hold, with nothing to spare for a proof."""
         return rate > self.limit
 
-    def failure(self) -> claims.UncontrollableMode:
+    def failure(self) -> failures.UncontrollableMode:
         """It as the reason why there is no metric; six digits of the mode, which is known roughly."""
         imaginary = abs(self.mode.imag) if abs(self.mode.imag) > _REAL else 0.0
-        return claims.UncontrollableMode(
+        return failures.UncontrollableMode(
             mode=(float(f"{self.mode.real:.6g}"), float(f"{imaginary:.6g}")), limit=self.limit
         )
 

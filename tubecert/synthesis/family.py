@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import combinations_with_replacement
 
-from tubecert.claims import Failure, NoFrame, VariableForbidden
+from tubecert.claims.failures import Failure, NoFrame, VariableForbidden
 from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, sin, symbol, topological
 from tubecert.expression.matrix import Matrix, identity, multiply, null_space, transpose
 from tubecert.model import ControlAffineModel

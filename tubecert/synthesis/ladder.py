@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor, inf, isfinite, log10, sqrt
 
-from tubecert.claims import Outcome, Proven
+from tubecert.claims.outcomes import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.coordinates import Choice

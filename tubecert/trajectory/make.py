@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from tubecert.claims import CorrectPlan, MoreKnots, OtherInterpolation, PlanRemedy
+from tubecert.claims.advice import CorrectPlan, MoreKnots, OtherInterpolation, PlanRemedy
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import fraction_bounds
 from tubecert.errors import SpecError

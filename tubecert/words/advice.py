@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from tubecert.bounds.meanings import EVERY
-from tubecert.claims import (
+from tubecert.claims.advice import (
     AskForRateBelow,
     AskForRateUpTo,
     CorrectPlan,
@@ -38,11 +38,11 @@ from tubecert.claims import (
     RaiseConditionNumber,
     ReduceInitialError,
     ReduceRadii,
-    Relax,
     ShrinkSafeSet,
     ShrinkTube,
     TurnKnob,
 )
+from tubecert.claims.family import Relax
 from tubecert.words.digits import ceiling_text, floor_text
 from tubecert.words.machine import CAUSES, PARTS
 

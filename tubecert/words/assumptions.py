@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tubecert.claims import (
-    Assumption,
+from tubecert.claims.assumptions import (
     ExactGeodesics,
     FirstOrderFilter,
     ForAllTime,
@@ -20,6 +19,7 @@ from tubecert.claims import (
     UpToHorizon,
     WindWithin,
 )
+from tubecert.claims.family import Assumption
 from tubecert.words.digits import ceiling_text, floor_text
 
 _FIXED: dict[type[Assumption], str] = {

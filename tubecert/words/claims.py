@@ -7,40 +7,32 @@ from math import inf
 from typing import Any
 
 from tubecert.bounds.meanings import EVERY
-from tubecert.claims import (
-    Claim,
-    ConditionHolds,
+from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
+from tubecert.claims.failures import (
     ConditionNumber,
-    ConditionUnbounded,
-    ConstantBounded,
     Failure,
-    GainsSuffice,
-    InputWithinLimits,
+    NoFrame,
+    NoneCertified,
+    NothingFound,
+    NotProvenAsWritten,
+    NotWritable,
+    RankUnproven,
+    UncontrollableMode,
+    VariableForbidden,
+)
+from tubecert.claims.family import Claim, Reason
+from tubecert.claims.gains import ConditionHolds, GainsSuffice
+from tubecert.claims.limits import InputWithinLimits, ObstacleCleared
+from tubecert.claims.metric import (
     MetricBound,
     MetricContraction,
     MetricDefinite,
     MetricFound,
     MetricKilling,
-    NoFrame,
-    NoneCertified,
-    NoProposal,
-    NothingFound,
-    NotProven,
-    NotProvenAsWritten,
-    NotWritable,
-    ObstacleCleared,
-    Outcome,
-    PlanBounded,
     RankOfB,
-    RankUnproven,
-    Reason,
-    TubeInSafeSet,
-    TubeRadius,
-    UncertaintyBound,
-    UncontrollableMode,
-    VariableForbidden,
-    WrongShape,
 )
+from tubecert.claims.outcomes import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
+from tubecert.claims.tube import PlanBounded, TubeInSafeSet, TubeRadius
 from tubecert.spec.codes import CODES
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tubecert.claims import HardwareCause, HardwarePart
+from tubecert.claims.advice import HardwareCause, HardwarePart
 
 CAUSES: Mapping[HardwareCause | str, str] = {
     "plan": "the plan's own defect",

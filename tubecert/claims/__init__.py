@@ -1,0 +1,41 @@
+"""What can be claimed, assumed and advised: ids with parameters, never sentences. `words` makes sentences of them.
+
+In: what a room found. Out: `Reason`s and `Assumption`s, as they stand in a certificate. The ids and the names of the
+parameters are a contract: a reader of certificates decides by them. Trusted: yes.
+
+| module | what it holds |
+|---|---|
+| `family` | what a claim, an advice, an assumption and a reason are |
+| `metric`, `tube`, `bounds`, `gains`, `limits` | claims, in the order in which a certification meets them |
+| `failures`, `outcomes` | why no metric was found, and what became of each attempt |
+| `advice` | what would help |
+| `assumptions` | what is assumed |
+| `written` | points and enclosures as JSON |
+"""
+
+# All of them, in this order, wherever one is read: a family of records is whole only when its members are loaded.
+from tubecert.claims import (  # isort: skip
+    metric,
+    tube,
+    bounds,
+    gains,
+    limits,
+    failures,
+    outcomes,
+    advice,
+    assumptions,
+    written,
+)
+
+__all__ = [
+    "advice",
+    "assumptions",
+    "bounds",
+    "failures",
+    "gains",
+    "limits",
+    "metric",
+    "outcomes",
+    "tube",
+    "written",
+]
