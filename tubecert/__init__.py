@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tubecert.library.rechecking import Rechecked, recheck
     from tubecert.library.simulating import Simulation, simulate
     from tubecert.library.specification import Specification, load, specification
-    from tubecert.stages.options import Step
+    from tubecert.progress import Phase, Step, Unit
     from tubecert.verdict import Verdict
 
 __version__ = "0.1.0"
@@ -28,6 +28,7 @@ __all__ = [
     "Certification",
     "Exported",
     "Gains",
+    "Phase",
     "Rechecked",
     "Report",
     "Simulation",
@@ -37,6 +38,7 @@ __all__ = [
     "SynthesisedMetric",
     "TargetError",
     "TubecertError",
+    "Unit",
     "Verdict",
     "VerifiedMetric",
     "__version__",
@@ -71,7 +73,9 @@ _HOMES = {
     "SpecError": "errors",
     "TargetError": "errors",
     "TubecertError": "errors",
-    "Step": "stages.options",
+    "Phase": "progress",
+    "Step": "progress",
+    "Unit": "progress",
     "Verdict": "verdict",
 }
 _ROOMS = {

@@ -149,7 +149,7 @@ def test_the_budget_holds_when_many_boxes_are_taken_at_once():
 @pytest.mark.slow
 def test_a_long_queue_is_sorted_rarely():
     sweeps = []
-    effort = Effort(budget=120_000, progress=lambda boxes, below, above: sweeps.append(boxes))
+    effort = Effort(budget=120_000, progress=sweeps.append)
     found = decide(scalar(-((x - y) ** 2)), box(x=(-3, 2), y=(-3, 2)), 0.0, effort)
     assert found.boxes >= 120_000
     assert len(sweeps) < 60  # one batch at a time would take 117 sweeps, each as long as the queue

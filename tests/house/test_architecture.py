@@ -23,6 +23,7 @@ ROOMS = [
     "libraries",
     "verdict",
     "letters",
+    "progress",
     "expression",
     "records",
     "recheck",

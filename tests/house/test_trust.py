@@ -17,6 +17,7 @@ TRUSTED_ROOMS = {
     "records",
     "verdict",
     "letters",
+    "progress",
     "printable",
     "files",
     "expression",

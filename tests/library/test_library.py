@@ -22,6 +22,7 @@ import tubecert as tc
 from tubecert.cli.app import app
 from tubecert.letters import NAMES
 from tubecert.library import plain
+from tubecert.pipeline.counting import claims_of
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
@@ -321,9 +322,18 @@ def test_progress_is_told():
     tc.certify(DATA, progress=told.append)
     assert told
     assert all(isinstance(step, tc.Step) and step.name for step in told)
+    proven = [step for step in told if step.phase in (tc.Phase.CERTIFICATION, tc.Phase.PLAN, tc.Phase.GAINS)]
+    assert [step.done for step in proven] == sorted(step.done for step in proven)
+    assert {step.of for step in proven} == {len(claims_of(tc.specification(DATA).spec))}
+    assert {step.name for step in proven if step.phase is not tc.Phase.PLAN} <= {
+        *claims_of(tc.specification(DATA).spec)
+    }
+    assert proven[-1].phase is tc.Phase.GAINS
     told.clear()
-    tc.recheck(certified(), progress=told.append)
-    assert len(told) == len(tc.recheck(certified()).claims)
+    claims = tc.recheck(certified(), progress=told.append).claims
+    assert [(step.name, step.done, step.of) for step in told] == [
+        (claim.name, done, len(claims)) for done, claim in enumerate(claims)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -447,7 +457,7 @@ def test_a_page_is_that_of_the_command(tmp_path, monkeypatch):
 def test_a_simulation(tmp_path):
     told = []
     found = tc.simulate(certified(), runs=2, controllers="ccm,l1", progress=told.append)
-    assert told
+    assert {step.of for step in told if step.phase is tc.Phase.SIMULATION} == {2 + 2 * (2 + 256)}
     assert (found.outcome, found.falsified) == ("not falsified", False)
     assert found.controllers == ("ccm", "l1")
     assert found.run("l1").x.shape[0] == 1

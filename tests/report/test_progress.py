@@ -1,42 +1,187 @@
-"""How far a sweep is: a line every ten seconds in a log."""
+"""How far a command is: a line every ten seconds in a log, a bar on a terminal, the time that is left."""
 
 from __future__ import annotations
 
 import io
+import re
+from dataclasses import replace
+from pathlib import Path
 
-from tubecert.report.progress import counted
+import pytest
+
+from tubecert.kinds import NAMES
+from tubecert.pipeline.counting import Claims, claims_of
+from tubecert.progress import Phase, Step, Unit
+from tubecert.report.progress import Log, Pieces, Timed, shown
 from tubecert.report.terminal import Terminal
+from tubecert.spec import load
+from tubecert.words.progress import described
+
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def lines(steps):
-    """What a log holds after points that were finished at these times."""
-    stream, now = io.StringIO(), [0.0]
-    terminal = Terminal(stream=stream, colored=False, width=100, interactive=False)
-    with counted(terminal, wanted=True, clock=lambda: now[0]) as report:
-        assert report is not None
-        for at, done, fresh in steps:
-            now[0] = at
-            report(done, 60, fresh)
-    return stream.getvalue().splitlines()
+class Clock:
+    """A time that passes when it is told to."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+def pipe(width=100):
+    return Terminal(stream=io.StringIO(), colored=False, width=width, interactive=False)
+
+
+def lines(steps, width=100):
+    """What a log holds after steps at these times."""
+    terminal, clock = pipe(width), Clock()
+    log = Log(terminal, clock)
+    for at, step in steps:
+        clock.now = 100.0 + at
+        log.hear(step) if step is not None else log.beat()
+    return terminal.stream.getvalue().splitlines()
+
+
+def points(done):
+    return Step(phase=Phase.SWEEP, done=done, of=60)
 
 
 def test_a_log_has_a_line_every_ten_seconds_and_the_time_left():
-    steps = [(0.0, 20, False), *((float(i), 20 + i, True) for i in range(1, 41))]
+    steps = [(0.0, points(20)), *((float(i), points(20 + i)) for i in range(1, 41))]
     assert lines(steps) == [
-        "20 of 60 points",
-        "30 of 60 points, about 30 s left",
-        "40 of 60 points, about 20 s left",
-        "50 of 60 points, about 10 s left",
-        "60 of 60 points",
+        "30 of 60 points done; 10 s so far, about 30 s left; certifying points",
+        "40 of 60 points done; 20 s so far, about 20 s left; certifying points",
+        "50 of 60 points done; 30 s so far, about 10 s left; certifying points",
+        "60 of 60 points done; 40 s so far; certifying points",
     ]
 
 
+def test_a_run_that_ends_earlier_leaves_nothing_in_a_log():
+    assert lines([(i / 2, points(20 + i)) for i in range(20)]) == []
+    clock = Clock()
+    terminal = pipe()
+    with shown(terminal, wanted=True, clock=clock) as report:
+        report(points(1))
+    assert terminal.stream.getvalue() == ""
+
+
+def test_a_log_goes_on_where_nothing_is_told():
+    """One search may take minutes: the time that has passed is told, of what was told last."""
+    steps = [(1.0, points(20)), (9.0, points(22)), (10.0, None), (15.0, None), (20.5, None), (30.0, None)]
+    assert lines(steps) == [
+        "22 of 60 points done; 10 s so far, about 3 min left; certifying points",
+        "22 of 60 points done; 21 s so far, about 3 min left; certifying points",
+    ]
+    assert lines([(12.0, None)]) == []  # nothing is known yet
+
+
+def test_a_line_is_no_longer_than_the_terminal():
+    long = Step(phase=Phase.RECHECK, name="a claim with many words " * 9, done=3, of=7)
+    for width in (40, 72, 100):
+        (line,) = lines([(11.0, long)], width)
+        assert len(line) == width
+        assert line.startswith("3 of 7 claims done")
+        assert line.endswith("...")
+
+
+def test_what_a_name_holds_steers_no_terminal():
+    (line,) = lines([(11.0, Step(phase=Phase.CHECK, name="\x1b[2Jx\n::error::", done=1, of=2))])
+    assert "\x1b" not in line
+
+
 def test_long_times_are_told_in_minutes_and_hours():
-    assert lines([(120.0, 1, True)]) == ["1 of 60 points, about 2.0 h left"]
-    assert lines([(60.0, 1, True)]) == ["1 of 60 points, about 59 min left"]
+    for seconds, words in ((120.0, "about 2.0 h left"), (60.0, "about 59 min left")):
+        found = lines([(0.0, points(0)), (seconds, points(1))])
+        assert words in found[-1]
 
 
 def test_nothing_is_told_where_nothing_is_wanted():
-    terminal = Terminal(stream=io.StringIO(), colored=False, width=100, interactive=False)
-    with counted(terminal, wanted=False) as report:
+    with shown(pipe(), wanted=False) as report:
         assert report is None
+    with shown(replace(pipe(), interactive=True), wanted=False) as report:
+        assert report is None
+
+
+@pytest.mark.parametrize("width", [40, 100])
+def test_on_a_terminal_it_goes_away_when_it_is_done(width):
+    terminal = replace(pipe(width), interactive=True)
+    with shown(terminal, wanted=True) as report:
+        report(Step(phase=Phase.RECHECK, name="a claim of many words " * 9, done=3, of=7))
+    text = terminal.stream.getvalue()
+    assert text.endswith("\x1b[2K")  # the line is cleared
+    for line in re.split(r"[\r\n]", re.sub(r"\x1b\[[^a-zA-Z]*[a-zA-Z]", "", text)):
+        assert len(line) <= width
+
+
+def told(times_and_steps):
+    clock, found = Clock(), []
+    times = Timed(found.append, clock)
+    for at, step in times_and_steps:
+        clock.now = 100.0 + at
+        times(step)
+    return found
+
+
+def test_what_is_left_is_estimated_for_the_phase_from_what_was_done_in_it():
+    runs = [Step(phase=Phase.SIMULATION, done=done, of=100) for done in (0, 25, 100)]
+    found = told([(0, points(0)), (30, points(30)), (40, runs[0]), (50, runs[1]), (90, runs[2])])
+    assert [step.seconds for step in found] == [0, 30, 40, 50, 90]
+    assert [step.left for step in found] == [None, 30.0, None, 30.0, None]
+
+
+def test_what_has_no_end_has_no_time_left():
+    steps = [(i, Step(phase=Phase.DESIGN, done=i)) for i in range(3)]
+    assert [step.left for step in told(steps)] == [None, None, None]
+
+
+def test_claims_are_counted_in_their_order():
+    found = []
+    claims = Claims(found.append, ("metric", "plan", "f", "B"))
+    for name in ("metric", "f", "something", "metric"):
+        claims(Step(phase=Phase.CERTIFICATION, name=name, count=5))
+    claims(Step(phase=Phase.PLAN, name="defect"))
+    claims(Step(phase=Phase.CERTIFICATION, name="B"))
+    assert [step.done for step in found] == [0, 2, 2, 2, 2, 3]
+    assert {step.of for step in found} == {4}
+    assert found[0].count == 5
+
+
+def test_the_claims_of_a_specification_are_those_of_its_states_and_its_machine():
+    spec = load(CONFIGS / "two_state.yaml")
+    names = claims_of(spec)
+    assert names[:2] == ("metric", "plan")
+    assert {"half width of x1", "half width of x2"} <= {*names}
+    assert "noise_size" not in names
+    assert names[-len(NAMES) :] == tuple(name.key for name in NAMES)
+    assert len(names) == len({*names})
+
+
+def test_pieces_count_with_what_is_done_in_them():
+    found = []
+    pieces = Pieces(found.append, Phase.CHECK, 3)
+    pieces(Step(phase=Phase.CERTIFICATION, name="f", done=7, of=9))
+    pieces.ready()
+    assert [(step.phase, step.name, step.done, step.of) for step in found] == [
+        (Phase.CHECK, "f", 0, 3),
+        (Phase.CHECK, "", 1, 3),
+    ]
+
+
+def test_in_words():
+    step = Step(phase=Phase.CERTIFICATION, name="feedback_gain", count=12000, below=0.5, above=0.75)
+    assert described(step) == "proving feedback gain, 12,000 boxes, between 0.5 and 0.75"
+    step = replace(step, done=17, of=33, seconds=4.2, left=3.9)
+    assert described(step).startswith("17 of 33 claims done; 5 s so far, about 4 s left; proving feedback")
+    assert described(Step(phase=Phase.GAINS, name="distance", done=30, of=33)) == (
+        "30 of 33 claims done; gains of certificate B"
+    )
+    step = Step(phase=Phase.SYNTHESIS, name="rate 2, degree 0", count=3, unit=Unit.STEPS)
+    assert described(step) == "looking for a metric: rate 2, degree 0, 3 steps"
+    assert described(Step(phase=Phase.DESIGN, name="f", done=2)) == "2 tubes done; trying tubes: f"
+
+
+@pytest.mark.parametrize("phase", Phase)
+def test_every_phase_has_words(phase):
+    assert described(Step(phase=phase))

@@ -4,7 +4,6 @@ import re
 from decimal import Decimal
 from fractions import Fraction
 from io import StringIO
-from types import SimpleNamespace
 
 import pytest
 from certificates import certified, refuted_gains, refuted_metric, undecided
@@ -15,7 +14,7 @@ from rich.text import Text
 from tubecert.certificate import seal
 from tubecert.certificate.result import Certificate, Result
 from tubecert.findings import Finding, Location, Severity
-from tubecert.report import console, findings, progress
+from tubecert.report import console, findings
 from tubecert.report.numbers import down, end, exact, percent, short, up
 from tubecert.report.terminal import Terminal
 
@@ -241,29 +240,6 @@ def test_pipes_have_a_fixed_width():
     assert Terminal.of(StringIO(), None, {}).width == 100
     for columns, width in (("72", 72), ("5", 40), ("9" * 5000, 120), ("0", 100), ("-5", 100), ("wide", 100)):
         assert Terminal.of(StringIO(), None, {"COLUMNS": columns}).width == width
-
-
-# progress
-
-
-def test_progress_is_silent_in_a_pipe():
-    with progress.shown(Terminal.of(StringIO(), None, {}), wanted=True) as report:
-        assert report is None
-
-
-def test_progress_goes_away_when_it_is_done():
-    screen = Screen()
-    with progress.shown(Terminal.of(screen, "never", {}), wanted=True) as report:
-        report(SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75, unit="boxes"))
-    with progress.shown(Terminal.of(screen, None, {}), wanted=False) as report:
-        assert report is None
-
-
-def test_progress_in_words():
-    step = SimpleNamespace(name="feedback_gain", boxes=12000, below=0.5, above=0.75, unit="boxes")
-    assert progress.describe(step) == "feedback gain: 12,000 boxes, between 0.5 and 0.75"
-    step = SimpleNamespace(name="metric", boxes=3, below=float("-inf"), above=0.75, unit="boxes")
-    assert progress.describe(step) == "metric: 3 boxes"
 
 
 def test_an_end_of_a_range_is_exact_unless_it_is_a_multiple_of_pi():

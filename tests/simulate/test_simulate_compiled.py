@@ -14,7 +14,8 @@ from numba.core import caching
 
 from tubecert.expression import sin, symbol
 from tubecert.model import ControlAffineModel
-from tubecert.simulate.compiled import COMPILING, KERNELS, compiled, entry, told
+from tubecert.progress import Phase
+from tubecert.simulate.compiled import KERNELS, compiled, entry, told
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.trajectory.plan import constant_plan
@@ -54,13 +55,13 @@ def test_compilation_is_told(monkeypatch):
     nowhere(monkeypatch)
     heard = []
     kernel = fresh_kernel()
-    with told(lambda *words: heard.append(words)):
+    with told(heard.append):
         kernel(1.0)
         assert heard == []  # kernels of others do not count
         kernel.py_func.__module__ = f"{entry.__module__}.x"
         kernel(np.float32(1))
         kernel(1.0)
-    assert [words[:2] for words in heard] == [(COMPILING, 1)]
+    assert [(step.phase, step.done) for step in heard] == [(Phase.COMPILATION, 1)]
     kernel(np.int8(1))
     assert len(heard) == 1
     with told(None):

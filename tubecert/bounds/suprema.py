@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -36,6 +36,7 @@ from tubecert.expression import (
 )
 from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply
 from tubecert.model import TIME, ControlAffineModel
+from tubecert.progress import Progress
 from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.family import starred
@@ -43,7 +44,6 @@ from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
-Report = Callable[[str, int, float, float], None]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Suprema:
     rho: float
     time: Range | None
     effort: Effort
-    report: Report | None = None
+    report: Progress | None = None
     coordinates: Coordinates | None = None
     sides: tuple[float, ...] | None = None
 
@@ -344,7 +344,7 @@ class Suprema:
     def _run(self, name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
         if self.report is not None:
             report = self.report
-            effort = replace(effort, progress=lambda boxes, below, above: report(name, boxes, below, above))
+            effort = replace(effort, progress=lambda step: report(replace(step, name=name)))
         return supremum(objective, domain, effort)
 
     def _constant(self, found: Supremum) -> Constant:

@@ -16,7 +16,7 @@ from tubecert.kept import nothing_kept
 from tubecert.spec import Spec, load
 
 if TYPE_CHECKING:
-    from tubecert.pipeline import Progress
+    from tubecert.progress import Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Severity
 from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json
+from tubecert.progress import Phase
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
 
@@ -144,15 +145,15 @@ def _checked(files: Sequence[str], options: CheckOptions, jobs: int, output: Out
 
     from tubecert.checking import check
     from tubecert.executor import Serial, chosen
-
-    executor = chosen(jobs, len(files))
-    if not isinstance(executor, Serial):
-        return executor.map(partial(check, options=options), files)
     from tubecert.report import progress
 
-    terminal = Terminal.stderr(color=output.color)
+    executor, terminal = chosen(jobs, len(files)), Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
-        return executor.map(partial(check, options=options, progress=report), files)
+        told = None if report is None else progress.Pieces(report, Phase.CHECK, len(files))
+        inner = told if isinstance(executor, Serial) else None  # other processes do not tell
+        return executor.map(
+            partial(check, options=options, progress=inner), files, None if told is None else told.ready
+        )
 
 
 def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:

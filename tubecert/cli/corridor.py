@@ -26,8 +26,9 @@ from tubecert.spec.override import Setting
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Result
-    from tubecert.pipeline import Options, Progress
+    from tubecert.pipeline import Options
     from tubecert.pipeline.width import Measure
+    from tubecert.progress import Progress
     from tubecert.spec import Spec
 
 CORRIDOR: Final = "--corridor"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tubecert.cli.belonging import belongs
@@ -13,11 +11,11 @@ from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import text_of, verdict_line
+from tubecert.library.rechecking import text_of, told, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.certificate import read_certificate
-from tubecert.recheck.run import BUDGET, Recheck, Report, recheck
+from tubecert.recheck.run import BUDGET, Recheck, recheck
 
 
 def run(given: Mapping[str, Any], output: Output, controller: str | None = None) -> ExitCode:
@@ -29,7 +27,12 @@ def run(given: Mapping[str, Any], output: Output, controller: str | None = None)
     text = text_of(name)
     note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
     code = "" if controller is None else _controller(controller, text, name)
-    with _progress(output) as report:
+    from tubecert.report import progress
+    from tubecert.report.terminal import Terminal
+
+    terminal = Terminal.stderr(color=output.color)
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
+        report = None if show is None else told(show)
         found = recheck(text, name, BUDGET if budget is None else budget, report)
     notes = {"specification": note, "controller": code}
     shown = _as_json(found, name, notes) if output.json else _as_text(found, name, notes, output)
@@ -91,18 +94,3 @@ def _line(name: str, outcome: Any, *, verbose: bool) -> str:
     work = f"  ({outcome.boxes} boxes)" if verbose and outcome.boxes else ""
     why = "" if outcome.holds else f": {outcome.why}"
     return f"  {outcome.verdict:<12}  {name}{work}{why}"
-
-
-@contextlib.contextmanager
-def _progress(output: Output) -> Iterator[Report | None]:
-    """The claim that is being examined, on one line of stderr, if that is a terminal."""
-    if output.quiet or output.no_progress or not sys.stderr.isatty():
-        yield None
-        return
-    yield lambda name: _status(visible(name)[:78])
-    _status("")
-
-
-def _status(text: str) -> None:
-    sys.stderr.write(f"\r\x1b[K{text}")
-    sys.stderr.flush()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +14,6 @@ from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
 from tubecert.libraries import versions
-from tubecert.library.simulating import Report as Step
 from tubecert.library.simulating import (
     Wishes,
     campaign_of,
@@ -24,6 +22,8 @@ from tubecert.library.simulating import (
     simulation_numbers,
     wishes_of,
 )
+from tubecert.progress import Phase, Progress, Step
+from tubecert.report import progress
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -61,31 +61,18 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     require_plan(system)
     terminal = Terminal.stderr(color=output.color)
     wanted = not (output.no_progress or output.quiet)
-    with prepared(folder), _progress(terminal, wanted=wanted) as report:
+    with prepared(folder), progress.shown(terminal, wanted=wanted) as report:
         system, certified = _certificate(given, system, wishes, folder, report)
         campaign = campaign_of(system, certified.result, wishes, report)
         if report is not None:
-            report("figures and data", 0, 1)
+            report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
     _report(summary(campaign, certified.hash), folder, len(files), output)
     return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
 
 
-@contextmanager
-def _progress(terminal: Terminal, *, wanted: bool) -> Iterator[Step | None]:
-    """A callback that takes what is done, how many, of how many."""
-    from tubecert.pipeline import Step as Shown
-    from tubecert.report import progress
-
-    with progress.shown(terminal, wanted=wanted) as show:
-        if show is None:
-            yield None
-        else:
-            yield lambda name, done, total: show(Shown(name=name, boxes=done, unit=f"of {total}"))
-
-
 def _certificate(
-    given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Step | None
+    given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Progress | None
 ) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
     from tubecert.library.certification import certification_of, read
@@ -103,11 +90,7 @@ def _certificate(
     )
     _tell("no certificate is given: certifying first")
 
-    def show(step: pipeline.Step) -> None:
-        if report is not None:
-            report(f"certifying: {step.name}", step.boxes, step.boxes)
-
-    result = pipeline.certify(system, options, show)
+    result = pipeline.certify(system, options, report)
     sealed = certificate.seal(result.to_json(), {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)

@@ -74,7 +74,7 @@ def run(given: Given, output: Output) -> ExitCode:
     if cluster is not None:
         _require_paths(sweep)
     terminal = Terminal.stderr(color=output.color)
-    with progress.counted(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         sweep.run(cluster or chosen(jobs or 1, len(sweep.points)), report)
     table = told.SweepTable.of(Path(source.file).stem, axes, sweep.outcomes())
     files = write(folder, table, parquet=given.parquet)

@@ -15,6 +15,7 @@ from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
 from tubecert.library.asked import at_rate, verification_numbers
+from tubecert.progress import Phase
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -65,7 +66,12 @@ def run(given: Given, output: Output) -> ExitCode:
     found: list[tuple[str, Verified]] = []
     for case in cases:
         with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
-            verified = verify(case.spec, effort, show)
+            told = (
+                None
+                if show is None
+                else progress.Pieces(show, Phase.VERIFICATION, len(cases), done=len(found))
+            )
+            verified = verify(case.spec, effort, told)
         found.append((case.file, verified))
         if not output.json:  # one after the other: many metrics take their time
             one = [verification.line(case.file, verified)]

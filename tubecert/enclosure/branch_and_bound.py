@@ -6,7 +6,6 @@ proven for every box that may meet it. Which boxes are split, and where, is heur
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.progress import Phase, Progress, Step
 from tubecert.verdict import Verdict
 
 _BATCH: Final = 1024
@@ -71,7 +71,7 @@ class Effort:
     absolute: float = 1e-12
     budget: int = 2_000_000
     cheap: int = 4_000
-    progress: Callable[[int, float, float], None] | None = None
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,8 +148,9 @@ class _Search:
                 for old, new in zip((lo, hi, bound), zip(*children, strict=True), strict=True)
             )
             if self.effort.progress:
+                above = float(max(self.settled, bound.max(initial=-np.inf)))
                 self.effort.progress(
-                    self.count, self.below, float(max(self.settled, bound.max(initial=-np.inf)))
+                    Step(phase=Phase.CERTIFICATION, count=self.count, below=self.below, above=above)
                 )
         if self.below == self.settled == -np.inf and not len(
             lo

@@ -18,7 +18,9 @@ from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
-from tubecert.pipeline import Options, Progress, Result
+from tubecert.pipeline import Options, Result
+from tubecert.progress import Progress
+from tubecert.report.progress import timed
 from tubecert.spec import Spec
 from tubecert.stages.options import overridden
 
@@ -63,7 +65,7 @@ def certify(
     if metric is not None:
         whole, name = with_metric(whole, metric)
         options = replace(options, metric=Path(name))
-    return certified(whole, options, progress, seconds=seconds, command="tubecert.certify")
+    return certified(whole, options, timed(progress), seconds=seconds, command="tubecert.certify")
 
 
 def certified(

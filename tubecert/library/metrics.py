@@ -30,10 +30,11 @@ from tubecert.library.asked import (
 )
 from tubecert.library.plain import Data, Number, number_texts
 from tubecert.library.specification import File, Specifiable, Specification, spec_of
-from tubecert.pipeline import Progress
 from tubecert.pipeline.synthesised import Synthesised
 from tubecert.pipeline.verification import Verified
 from tubecert.pipeline.verification import verify as decided
+from tubecert.progress import Progress
+from tubecert.report.progress import timed
 from tubecert.spec import Spec, metric_file
 from tubecert.spec.synthesis import COORDINATES, OBJECTIVES, ROUTES
 from tubecert.verdict import Verdict
@@ -210,7 +211,9 @@ def verify(
     whole, name = spec_of(spec, alone=True), ""
     if metric is not None:
         whole, name = with_metric(whole, metric, wanted)
-    return VerifiedMetric(found=decided(at_rate(whole, wanted), effort, progress), name=name or whole.name)
+    return VerifiedMetric(
+        found=decided(at_rate(whole, wanted), effort, timed(progress)), name=name or whole.name
+    )
 
 
 def synthesise(
@@ -262,7 +265,7 @@ def synthesise(
         system,
         wanted_of(system, wishes, str),
         options_of(system, numbers),
-        progress,
+        timed(progress),
         table=table,
         deadline=None if seconds is None else pipeline.Deadline.after(float(seconds)),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tubecert.certificate.file import KIND, unreadable
@@ -13,9 +12,10 @@ from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import number_texts
 from tubecert.library.specification import File
-from tubecert.recheck.run import BUDGET, Examined, Recheck
+from tubecert.progress import Phase, Progress, Step
+from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
-from tubecert.stages.options import Progress, Step
+from tubecert.report.progress import timed
 
 WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
@@ -77,7 +77,8 @@ def recheck(
     else:
         name = os.fspath(result)
         text = text_of(name)
-    report = None if progress is None else _told(progress)
+    shown = timed(progress)
+    report = None if shown is None else told(shown)
     return Rechecked(found=examined(text, name, BUDGET if most is None else most, report), name=name)
 
 
@@ -95,5 +96,6 @@ def verdict_line(found: Recheck, name: str) -> str:
     return f"{WORDS[found.verdict]} {name}: the certificate says {found.stated}"
 
 
-def _told(progress: Progress) -> Callable[[str], None]:
-    return lambda claim: progress(Step(name=claim, boxes=0, unit="claims"))
+def told(progress: Progress) -> Report:
+    """What recheck, which shares no record with the rest, tells its progress to."""
+    return lambda claim, done, of: progress(Step(phase=Phase.RECHECK, name=claim, done=done, of=of))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -22,8 +22,9 @@ from tubecert.library.certification import Certification, read
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import File, Specifiable, spec_of
+from tubecert.progress import Progress
+from tubecert.report.progress import timed
 from tubecert.spec import Spec
-from tubecert.stages.options import Progress, Step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +38,6 @@ RUNS: Final = 100
 SEED: Final = 0
 _POSITIVE: Final = ("epsilon", "rho_a", "duration", "control_rate")
 GAINS: Final = ("bandwidth", "adaptation_rate", "sample_time")
-Report = Callable[[str, int, int], None]  # what is done, how many, of how many
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
 
 
@@ -172,7 +172,7 @@ def simulate(
     system = adopted(system, found.result)
     require_tube(found.result)
     wishes = wishes_of(system, numbers, chosen, gains)
-    campaign = campaign_of(system, found.result, wishes, None if progress is None else _told(progress))
+    campaign = campaign_of(system, found.result, wishes, timed(progress))
     return Simulation(campaign=campaign, compared_with=found.hash)
 
 
@@ -260,7 +260,7 @@ def wishes_of(system: Spec, numbers: Mapping[str, Any], chosen: tuple[str, ...],
     )
 
 
-def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Report | None) -> Campaign:
+def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress | None) -> Campaign:
     """Every loop that is wished for, integrated and attacked."""
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
@@ -277,7 +277,3 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Report | N
         return campaign(
             setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report
         )
-
-
-def _told(progress: Progress) -> Report:
-    return lambda name, done, total: progress(Step(name=name, boxes=done, unit=f"of {total}"))

@@ -6,6 +6,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 |---|---|
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | stage after stage, with what planners and searches propose |
+| `counting` | how many claims of how many are done |
 | `reasons` | why a verdict about gains is what it is |
 | `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
@@ -24,12 +25,14 @@ from tubecert.model import domain_findings
 from tubecert.pipeline.advice import Ledger, advised
 from tubecert.pipeline.certification import answer, result
 from tubecert.pipeline.checks import inspect, missing_parts, not_covered
+from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
 from tubecert.pipeline.synthesis import SynthesisRun
 from tubecert.pipeline.synthesised import Synthesised
+from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options, Progress, Step, overridden
+from tubecert.stages.options import Options, overridden
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Stage
 from tubecert.stages.time import time_of
@@ -39,9 +42,7 @@ __all__ = [
     "Deadline",
     "Memory",
     "Options",
-    "Progress",
     "Result",
-    "Step",
     "Synthesised",
     "certify",
     "inspect",
@@ -77,12 +78,12 @@ def _end(
     """How the certification ends."""
     question = question_of(spec, options, progress, memory)
     if question.spec.metric is not None or spec.synthesis is None:
-        return answer(question)
+        return answer(counted(question))
     found = synthesise(spec, spec.synthesis, options, progress, deadline=deadline)
     if found.cut == "interrupted":
         raise KeyboardInterrupt
     question = replace(question, spec=found.spec or question.spec, synthesis=found.data())
-    return answer(question) if found.reason is None else Stopped(at=question, reason=found.reason)
+    return answer(counted(question)) if found.reason is None else Stopped(at=question, reason=found.reason)
 
 
 def question_of(

@@ -38,13 +38,14 @@ from tubecert.pipeline.levers import (
     smaller_tube,
     wider_tube,
 )
+from tubecert.progress import Phase, Progress, Step
 from tubecert.search.proposers import PROPOSERS, Proposer
 from tubecert.spec import Spec
 from tubecert.stages.bounded import Bounded, Enclosed, bound, enclose
 from tubecert.stages.judged import Judged, deciding
 from tubecert.stages.memory import Memory
 from tubecert.stages.metric import ProvenMetric, prove_metric
-from tubecert.stages.options import Options, Progress, Step
+from tubecert.stages.options import Options
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Stage
 from tubecert.stages.tube import Planned
@@ -68,22 +69,27 @@ class Exhausted(Exception):  # noqa: N818 - an end, no error
 
 @dataclass(slots=True)
 class Ledger:
-    """What the searches of a certification cost, told by their progress; beyond `limit` it raises `Exhausted`."""
+    """What the searches of a certification cost, told by their progress; beyond `limit` it raises `Exhausted`.
+
+    `phase`: what they are for, where it is not what they say.
+    """
 
     shown: Progress | None = None
     work: int = 0
     limit: int | None = None
     last: tuple[str, int] = field(default=("", 0))
+    phase: Phase | None = None
 
     def __call__(self, step: Step) -> None:
         """Progress of a search: boxes so far."""
-        name, boxes = self.last
-        self.charge(
-            _ROUND + (step.boxes - boxes if step.name == name and step.boxes >= boxes else step.boxes)
-        )
-        self.last = step.name, step.boxes
+        if step.phase is not Phase.GAINS:  # these are counted by kinds
+            name, count = self.last
+            self.charge(
+                _ROUND + (step.count - count if step.name == name and step.count >= count else step.count)
+            )
+            self.last = step.name, step.count
         if self.shown is not None:
-            self.shown(step)
+            self.shown(step if self.phase is None else replace(step, phase=self.phase, done=0, of=None))
 
     def charge(self, work: int) -> None:
         """Counts it."""
@@ -112,6 +118,7 @@ def advised(
         told(result)
     spent = ledger.work + (0 if judged is None else _EXPLAINED)
     ledger.limit = ledger.work + max(spent, _CHEAP)
+    ledger.phase = Phase.ADVICE
     found = tuple(_Search(planned, judged, ledger, ask).run())
     return replace(result, reasons=_with(result.reasons, result.reason, found)) if found else result
 

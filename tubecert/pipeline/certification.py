@@ -17,6 +17,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
 from tubecert.kinds.table import kinds_of
+from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.pipeline.windows import windowed
 from tubecert.planner.propose import course_of, knots_of
@@ -27,7 +28,6 @@ from tubecert.spec import canonical
 from tubecert.stages.bounded import Bounded, bound, enclose
 from tubecert.stages.judged import Judged, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
-from tubecert.stages.options import Step
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Explanation, Stage, result_of
 from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tube, lay, radii, room_of
@@ -67,19 +67,12 @@ def plan(metric: ProvenMetric) -> Planned:
     spec, model, task, show = question.spec, question.model, question.spec.trajectory.task, question.progress
     if task is None:
         return lay(metric)
-    report = None
-    if show is not None:
-        told = show
-
-        def report(name: str, count: int, unit: str) -> None:
-            told(Step(name=name, boxes=count, unit=unit))
-
     whole = canonical(spec)
     depends_on = {key: whole[key] for key in ("system", "trajectory")}
-    course = question.memory.recall("plan", depends_on, lambda: course_of(spec, task, model, report))
+    course = question.memory.recall("plan", depends_on, lambda: course_of(spec, task, model, show))
     room = room_of(metric)
     knots = question.memory.recall(
-        "knots", question.ground, lambda: knots_of(spec, course, model, room, report)
+        "knots", question.ground, lambda: knots_of(spec, course, model, room, show)
     )
     return lay(metric, knots)
 
@@ -105,7 +98,11 @@ def tube(planned: Planned) -> TubeFound | Stopped:
 def judge(bounded: Bounded) -> Judged:
     """The verdict on what every search proposes."""
     problem, asked = bounded.problem, _asked(bounded.question)
-    return judge_all(bounded, {kind: each.propose(problem, asked) for kind, each in PROPOSERS.items()})
+    proposals = {}
+    for recipe, each in PROPOSERS.items():
+        tell_gains(bounded.question, recipe)
+        proposals[recipe] = each.propose(problem, asked)
+    return judge_all(bounded, proposals)
 
 
 def explain(judged: Judged) -> Explanation:

@@ -9,14 +9,16 @@ certification.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import Final
 
 from tubecert.certificate.result import Result
 from tubecert.conditions.decimals import round_up
-from tubecert.pipeline import Options, Progress, certify
+from tubecert.pipeline import Options, certify
 from tubecert.pipeline.width import Measure, machine_of, size_of
+from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
 from tubecert.stages.memory import Memory
 
@@ -60,7 +62,8 @@ def narrowest(
 
     def attempt(scale: Fraction) -> Attempt:
         if scale not in attempts:
-            result = certify(at(scale), options, progress, memory)
+            told = None if progress is None else partial(_told, progress, len(attempts))
+            result = certify(at(scale), options, told, memory)
             attempts[scale] = Attempt(scale=scale, result=result, size=size_of(result, measure))
         return attempts[scale]
 
@@ -84,6 +87,11 @@ def narrowest(
             break
         best = attempt(round_up(float(best.scale * needed * _ROOM), 5))
     return Design(attempts=tuple(attempts.values()))
+
+
+def _told(progress: Progress, done: int, step: Step) -> None:
+    """A step of one tube of nobody knows how many."""
+    progress(replace(step, phase=Phase.DESIGN, done=done, of=None))
 
 
 def _is_wider(found: Attempt, others: Iterable[Attempt]) -> bool:

@@ -20,9 +20,10 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, derivative
 from tubecert.model import TIME, ControlAffineModel, build
-from tubecert.pipeline import Options, Progress, Step, certify, question_of
+from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.climb import slow_scale
 from tubecert.pipeline.width import Measure, size_of
+from tubecert.progress import Phase, Progress, Step
 from tubecert.search.metrics import Proposed, Sampled, Surrogate, metrics, sampled_slopes
 from tubecert.spec import Spec
 from tubecert.spec.metric_file import FORMAT, with_metric_text
@@ -103,7 +104,7 @@ def search(
 def tell(progress: Progress | None, name: str) -> None:
     """A step without boxes."""
     if progress is not None:
-        progress(Step(name=name, boxes=0, unit="steps"))
+        progress(Step(phase=Phase.DESIGN, name=name))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -55,11 +55,12 @@ from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options, Progress, Step
+from tubecert.stages.options import Options
 from tubecert.stages.question import Question
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, suggested
@@ -103,7 +104,7 @@ class SynthesisRun:
         whole_way = wanted.objective in ("adaptation", "tube")
         budget = min(options.budget, _BOXES) if whole_way and wanted.rate is None else options.budget
         self.effort = Effort(
-            gap=float(options.gap), budget=budget, progress=lambda *bounds: self.deadline.check()
+            gap=float(options.gap), budget=budget, progress=lambda step: self.deadline.check()
         )
         self.limit = None if wanted.condition_number is None else float(wanted.condition_number)
         self.ladder = Ladder(
@@ -248,7 +249,7 @@ class SynthesisRun:
             spec = self._with(metric)
         except SpecError:  # too long to be written, see `_written`
             return row
-        self._tell(f"rate {float(metric.rate):.4g}: certifying")
+        self._say(f"rate {float(metric.rate):.4g}: certifying")
         options = replace(
             self.options,
             gap=max(self.options.gap, _GAP_OF_MACHINE if self._by_machine else _GAP),
@@ -376,12 +377,12 @@ class SynthesisRun:
         if self.wanted.degree is not None and suggested(self.model):
             remedies.append(HigherDegree(degree=self.wanted.degree))
         if rate is not None:
-            self._tell("looking for a rate that works")
+            self._say("looking for a rate that works")
             cheap = self.ladder.cheap()
             lower = cheap.lower_rate(rate)
             if lower is not None:
                 remedies.append(AskForRateUpTo(rate=lower))
-            self._tell("looking for a box that works")
+            self._say("looking for a box that works")
             box = cheap.smaller_box(rate)
             if box is not None:
                 remedies.append(ShrinkSafeSet(factor=float(box), rate=rate))
@@ -403,11 +404,14 @@ class SynthesisRun:
             if all(low <= q <= high for q, (low, high) in zip(p, spec.safe_set, strict=True))
         ]
 
-    def _tell(self, words: str) -> None:
+    def _say(self, words: str) -> None:
+        self._tell(Step(phase=Phase.SYNTHESIS, name=words))
+
+    def _tell(self, step: Step) -> None:
         self.deadline.check()
         if self.progress is not None:
             self.said += 1
-            self.progress(Step(name=f"synthesis, {words}", boxes=self.said, unit="steps"))
+            self.progress(replace(step, count=self.said, unit=Unit.STEPS))
 
 
 def _half_widths(spec: Spec) -> tuple[Fraction, ...]:

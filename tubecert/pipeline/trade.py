@@ -14,8 +14,9 @@ from typing import Final
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import HardwarePart
-from tubecert.pipeline import Options, Progress, certify
+from tubecert.pipeline import Options, certify
 from tubecert.pipeline.width import Measure, machine_of, size_of
+from tubecert.progress import Progress
 from tubecert.spec import Spec
 from tubecert.stages.memory import Memory
 from tubecert.verdict import Verdict

@@ -21,8 +21,8 @@ from tubecert.enclosure.interval import Interval
 from tubecert.expression import free_symbols
 from tubecert.metric.verify import MetricProof, supported_rate, verify_metric
 from tubecert.model import build, rank_decision
+from tubecert.progress import Phase, Progress
 from tubecert.spec import Spec
-from tubecert.stages.options import Progress, Step
 from tubecert.verdict import Verdict
 
 
@@ -107,10 +107,7 @@ def _told(effort: Effort, name: str, progress: Progress | None) -> Effort:
     if progress is None:
         return effort
     show = progress
-    return replace(
-        effort,
-        progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
-    )
+    return replace(effort, progress=lambda step: show(replace(step, phase=Phase.VERIFICATION, name=name)))
 
 
 def _file(spec: Spec, proof: MetricProof) -> MetricFile | None:

@@ -6,7 +6,6 @@ placed until the proven defect costs less than a thousandth of the tube.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -20,12 +19,11 @@ from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.planner import cache, ilqr
 from tubecert.planner.rollout import Dynamics
+from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.spec import Knots, Spec, Task, canonical
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import Room, misses
 from tubecert.trajectory.pieces import piecewise_plan
-
-Report = Callable[[str, int, str], None]  # what is done, how many, of what
 
 _DIGITS = 12
 _MOST_PIECES = 20_000
@@ -50,7 +48,7 @@ def course_of(
     spec: Spec,
     task: Task,
     model: ControlAffineModel,
-    report: Report | None = None,
+    report: Progress | None = None,
     *,
     substeps: int = ilqr.SUBSTEPS,
 ) -> Course:
@@ -67,12 +65,12 @@ def course_of(
     u = _planned(spec, course, dynamics, report)
     trouble = cache.write(name, tuple(tuple(map(number_text, row)) for row in u))
     if trouble and report is not None:
-        report(f"plan not kept ({trouble})", len(u), "knots")
+        report(Step(phase=Phase.PLAN, name=f"not kept ({trouble})", count=len(u), unit=Unit.KNOTS))
     return replace(course, u=u)
 
 
 def knots_of(
-    spec: Spec, course: Course, model: ControlAffineModel, room: Room, report: Report | None = None
+    spec: Spec, course: Course, model: ControlAffineModel, room: Room, report: Progress | None = None
 ) -> Knots:
     """Knots of the curve that a course steers, as many as its defect asks for; raises `SpecError` if it diverges."""
     try:
@@ -119,17 +117,21 @@ def _kept(name: str, course: Course, dynamics: Dynamics) -> Course | None:
 
 
 def _planned(
-    spec: Spec, course: Course, dynamics: Dynamics, report: Report | None
+    spec: Spec, course: Course, dynamics: Dynamics, report: Progress | None
 ) -> tuple[tuple[Fraction, ...], ...]:
     """The inputs at the planner's knots; raises `SpecError` if it finds none."""
     proposal = ilqr.plan(
         dynamics,
         _problem(course, dynamics),
-        report and (lambda i, cost: report(f"plan, cost {cost:.4g}", i, "steps")),
+        report and (lambda i, cost: report(_step(i, cost))),
     )
     if proposal.outcome is not ilqr.Outcome.FOUND:
         raise SpecError([_failure(spec, proposal)])
     return tuple(tuple(map(rounded, map(float, row))) for row in proposal.u)
+
+
+def _step(number: int, cost: float) -> Step:
+    return Step(phase=Phase.PLAN, name=f"cost {cost:.4g}", count=number, unit=Unit.STEPS)
 
 
 def _problem(course: Course, dynamics: Dynamics) -> ilqr.Problem:
@@ -181,7 +183,7 @@ def _diverged(spec: Spec) -> Finding:
 
 
 def _refined(
-    spec: Spec, model: ControlAffineModel, course: Course, room: Room, report: Report | None
+    spec: Spec, model: ControlAffineModel, course: Course, room: Room, report: Progress | None
 ) -> Knots:
     """The curve with as many sub-knots as its proven defect asks for (or as many as there may be)."""
     allowed, dynamics = room.allowed(model), Dynamics(model)
@@ -201,7 +203,7 @@ def _refined(
         if 2 * parts > most or not plan.defined:
             return knots
         if report is not None:
-            report("plan, defect", len(plan.pieces), "pieces")
+            report(Step(phase=Phase.PLAN, name="defect", count=len(plan.pieces), unit=Unit.PIECES))
         defect = Defect.of(plan, model, fraction_bounds(room.rho)[1], room.effort)
         if defect.in_metric().above < allowed:
             return knots

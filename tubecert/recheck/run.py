@@ -16,7 +16,7 @@ from tubecert.recheck.metric import stated
 from tubecert.recheck.orientation import NOT_EXAMINED
 
 BUDGET = 200_000
-Report = Callable[[str], None]  # the name of the claim that is being examined
+Report = Callable[[str, int, int], None]  # the claim that is examined now, how many are done, of how many
 
 _CODES = {
     "confirmed": ExitCode.CERTIFIED,
@@ -78,10 +78,11 @@ def recheck(
     `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed.
     """
     certificate = read_certificate(read(text, file))
-    found = []
-    for claim in _claims(certificate, budget):
+    found: list[Examined] = []
+    claims = tuple(_claims(certificate, budget))
+    for claim in claims:
         if report is not None:
-            report(claim.name)
+            report(claim.name, len(found), len(claims))
         found.append(Examined(claim.name, claim.outcome(memory)))
         if to_first_failure and not found[-1].outcome.holds:
             break

@@ -1,101 +1,158 @@
-"""What is being proven right now, on stderr, gone when it is done."""
+"""How far a command is, on stderr: a bar that goes away on a terminal, elsewhere a line every ten seconds."""
 
 from __future__ import annotations
 
 import contextlib
-import math
+import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
 
-from tubecert.report.numbers import short
+from tubecert.printable import visible
+from tubecert.progress import Phase, Progress, Step
+from tubecert.words.progress import described
 
 if TYPE_CHECKING:
-    from tubecert.pipeline import Step
     from tubecert.report.terminal import Terminal
 
-_EVERY = 10.0  # s between lines of a log
+EVERY: Final = 10.0  # s between lines of a log
+Clock = Callable[[], float]
 
 
-@contextlib.contextmanager
-def shown(terminal: Terminal, *, wanted: bool) -> Iterator[Callable[[Step], None] | None]:
-    """A callback that shows each step, or None where progress would only disturb (a pipe, a log)."""
-    if not (wanted and terminal.interactive):
-        yield None
-        return
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+@dataclass(slots=True)
+class Timed:
+    """Adds to every step the seconds since it was made, and how long what is left will take.
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=terminal.console(), transient=True) as bar:
-        task = bar.add_task("reading")
-        yield lambda step: bar.update(task, description=describe(step))
-
-
-def describe(step: Step) -> str:
-    """A step in words: what, how many boxes, and how far its bounds are apart."""
-    words = f"{step.name.replace('_', ' ')}: {step.boxes:,} {step.unit}"
-    if math.isfinite(step.below) and math.isfinite(step.above):
-        words += f", between {short(step.below)} and {short(step.above)}"
-    return words
-
-
-@contextlib.contextmanager
-def counted(
-    terminal: Terminal, *, wanted: bool, clock: Callable[[], float] = time.monotonic
-) -> Iterator[Callable[[int, int, bool], None] | None]:
-    """A callback for how many points of how many are done, and whether one was finished just now.
-
-    On a terminal a bar, elsewhere (a log, a cluster's job) a line every ten seconds at most.
+    The estimate is for the phase: the pieces that are left take as long as those that were finished since it began.
     """
+
+    shown: Progress
+    clock: Clock = time.monotonic
+    began: float = field(init=False)
+    whole: int | None = None
+    before: int = 0
+    since: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.began = self.since = self.clock()
+
+    def __call__(self, step: Step) -> None:
+        """A step, with its times."""
+        now = self.clock()
+        if step.of != self.whole or step.done < self.before:
+            self.whole, self.before, self.since = step.of, step.done, now
+        fresh, left = step.done - self.before, None
+        if step.of is not None and fresh > 0 and step.done < step.of:
+            left = (now - self.since) / fresh * (step.of - step.done)
+        self.shown(replace(step, seconds=now - self.began, left=left))
+
+
+@dataclass(slots=True)
+class Pieces:
+    """Tells how many pieces of all are done, with the steps of the piece that is worked on."""
+
+    shown: Progress
+    phase: Phase
+    of: int
+    done: int = 0
+
+    def __call__(self, step: Step) -> None:
+        """A step of a piece."""
+        self.shown(replace(step, phase=self.phase, done=self.done, of=self.of))
+
+    def ready(self) -> None:
+        """A piece is done."""
+        self.done += 1
+        self(Step(phase=self.phase))
+
+
+def timed(progress: Progress | None) -> Progress | None:
+    """The callback, given steps with their times."""
+    return None if progress is None else Timed(progress)
+
+
+@contextlib.contextmanager
+def shown(terminal: Terminal, *, wanted: bool, clock: Clock = time.monotonic) -> Iterator[Progress | None]:
+    """A callback that shows each step; None where nothing is wanted."""
     if not wanted:
         yield None
-        return
-    count = _Count(clock)
-    if not terminal.interactive:
-        yield (
-            lambda done, total, fresh: (
-                terminal.show(line) if (line := count.line(done, total, fresh)) else None
-            )
+    elif terminal.interactive:
+        with _bar(terminal) as bar:
+            yield Timed(bar, clock)
+    else:
+        log = Log(terminal, clock)
+        with log.beating():
+            yield log.hear
+
+
+@contextlib.contextmanager
+def _bar(terminal: Terminal) -> Iterator[Progress]:
+    """A bar where it is known how much there is, else something that turns; both go away."""
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn
+    from rich.progress import Progress as Rich
+    from rich.table import Column
+
+    words = Column(ratio=1, no_wrap=True, overflow="ellipsis")
+    columns = (
+        SpinnerColumn(),
+        BarColumn(bar_width=12),
+        TextColumn("{task.description}", table_column=words, markup=False),
+    )
+    with Rich(*columns, console=terminal.console(), transient=True, expand=True) as rich:
+        task = rich.add_task("reading", total=None)
+        yield lambda step: rich.update(
+            task, description=visible(described(step)), completed=step.done, total=step.of or None
         )
-        return
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    columns = (BarColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=terminal.console(), transient=True) as bar:
-        task = bar.add_task("reading")
-        yield lambda done, total, fresh: bar.update(
-            task, completed=done, total=total, description=count.words(done, total, fresh)
-        )
 
 
-class _Count:
-    """Points that are done, and the time that the others will take if they take as long."""
+class Log:
+    """A line every ten seconds, also while nothing is told: whoever reads a log sees that work goes on."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self.clock, self.started, self.told = clock, clock(), clock()
-        self.fresh = 0
+    def __init__(self, terminal: Terminal, clock: Clock = time.monotonic) -> None:
+        self.terminal, self.clock = terminal, clock
+        self.last = Step(phase=Phase.CERTIFICATION)
+        self.began = self.written = clock()
+        self.heard = False
+        self.lock = threading.Lock()
+        self.times = Timed(self._keep, clock)
 
-    def line(self, done: int, total: int, fresh: bool) -> str:
-        """A line for a log, empty where the last one is younger than ten seconds."""
-        words = self.words(done, total, fresh)
-        if fresh and done < total and self.clock() - self.told < _EVERY:
-            return ""
-        self.told = self.clock()
-        return words
+    def hear(self, step: Step) -> None:
+        """A step: what the next line says."""
+        self.times(step)
+        self.beat()
 
-    def words(self, done: int, total: int, fresh: bool) -> str:
-        """How far it is."""
-        self.fresh += fresh
-        words = f"{done} of {total} points"
-        if not self.fresh or done == total:
-            return words
-        left = (self.clock() - self.started) / self.fresh * (total - done)
-        return f"{words}, about {_duration(left)} left"
+    def beat(self) -> None:
+        """Writes a line if the last one, or the beginning, is ten seconds ago."""
+        with self.lock:
+            now = self.clock()
+            if not self.heard or now - self.written < EVERY:
+                return
+            self.written = now
+            words = described(replace(self.last, seconds=now - self.began))
+        self.terminal.show(cropped(visible(words), self.terminal.width))
+
+    @contextlib.contextmanager
+    def beating(self) -> Iterator[None]:
+        """Beats from a thread of its own until the end."""
+        over = threading.Event()
+
+        def work() -> None:
+            while not over.wait(EVERY / 10):
+                self.beat()
+
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _keep(self, step: Step) -> None:
+        self.last, self.heard = step, True
 
 
-def _duration(seconds: float) -> str:
-    """A time as one reads it."""
-    if seconds < 100:
-        return f"{math.ceil(seconds)} s"
-    minutes = seconds / 60
-    return f"{round(minutes)} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+def cropped(text: str, width: int) -> str:
+    """One line, no longer than this."""
+    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -12,10 +12,11 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.clearance import Clearance, of_curve, of_tube
 from tubecert.simulate.compare import Comparison, check_class, compare
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.monte_carlo import Case, Progress, Sample, attack, case, disturbance_of, monte_carlo
+from tubecert.simulate.monte_carlo import ATTACKS, Case, Sample, attack, case, disturbance_of, monte_carlo
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
@@ -103,6 +104,19 @@ def _exits(found: Comparison) -> int:
     return sum(lane in found.outside for lane, _, _ in found.failures)
 
 
+@dataclass(slots=True)
+class _Whole:
+    """Tells how many runs of all are done, `before` of them before the part that is told of."""
+
+    shown: Progress | None
+    of: int
+    before: int = 0
+
+    def __call__(self, step: Step) -> None:
+        if self.shown is not None:
+            self.shown(replace(step, done=self.before + step.done, of=self.of))
+
+
 def simulate(
     setting: Setting,
     loops: Sequence[Loop],
@@ -119,14 +133,17 @@ def simulate(
     The loops are drawn under the specification's h, or as random run `replay`. Raises `TubecertError` if the
     specification's h leaves its class while the state is in the tube.
     """
+    whole = _Whole(
+        report, len(loops) + sum(loop.tested for loop in loops) * (count + ATTACKS if count else 0)
+    )
     if setting.h is None and replay is None:
         replay = 0
     words = SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed)
     drawn = []
     for loop in loops:
-        if report is not None:
-            report(f"{loop.controller}, {words}", 0, 1)
+        whole(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, {words}"))
         drawn.append(_drawn(setting, loop, *_uncertainty(setting, loop, seed, replay)))
+        whole.before += 1
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -135,7 +152,7 @@ def simulate(
     interrupted = False
     for loop, own in zip(loops, drawn, strict=True):
         if loop.tested and count and not interrupted and not own.comparison.unreliable:
-            attacks.append(_attack(setting, loop, count, seed, report))
+            attacks.append(_attack(setting, loop, count, seed, whole))
             sample = attacks[-1].sample
             interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
     first = drawn[0].runs
@@ -175,12 +192,14 @@ def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
     )
 
 
-def _attack(setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None) -> Attack:
-    sample = monte_carlo(setting, loop, count, seed, report)
+def _attack(setting: Setting, loop: Loop, count: int, seed: int, whole: _Whole) -> Attack:
+    sample = monte_carlo(setting, loop, count, seed, whole)
+    whole.before += count
     found, worst, measured = None, None, None
     if sample is not None and not sample.interrupted:
         try:
-            found = attack(setting, loop, seed, report)
+            found = attack(setting, loop, seed, whole)
+            whole.before += ATTACKS
             one = disturbance_of(setting, setting.class_of(loop), [found])
             worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
             measured = compare(setting, worst, loop.promise)

@@ -22,13 +22,13 @@ import numba
 from numba.core.caching import IndexDataCacheFile
 from numba.core.options import DefaultOptions
 
+from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.sealed import SealedFile
 
 _NAMES: list[str] = []  # of all kernels
 # Kernels make no arrays, and their callers hold those that they work on: without counting references, which numba does
 # atomically for every member of every tuple, the loops are twice as fast.
 _UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-COMPILING = "compiling the loops, once per installation"
 KERNELS = (
     "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "machine",
     "stepping", "compiled",
@@ -74,7 +74,7 @@ def _kernel(function: Callable[..., Any], **options: bool) -> Callable[..., Any]
 
 
 @contextmanager
-def told(report: Callable[[str, int, int], None] | None) -> Iterator[None]:
+def told(report: Progress | None) -> Iterator[None]:
     """Reports what is compiled while it is: nothing if the machine code is found in the cache."""
     if report is None:
         yield
@@ -88,7 +88,7 @@ def told(report: Callable[[str, int, int], None] | None) -> Iterator[None]:
             function = event.data["dispatcher"].py_func
             if function.__module__.startswith(__package__):
                 done.add(function.__qualname__)
-                tell(COMPILING, len(done), len(_NAMES))
+                tell(Step(phase=Phase.COMPILATION, done=len(done), of=len(_NAMES)))
 
         def on_end(self, event: Any) -> None:
             pass

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from tubecert.simulate.feedback import Point
     from tubecert.simulate.stepping import Lane, Output
 
-Progress = Callable[[int, int], None]
 _MOST_HALVINGS = 14
 _CHUNK = 16  # lanes that one thread takes at once
 _AGREEING = 0.02  # of the horizon: two levels that stop a lane this near to each other are believed
@@ -36,14 +34,13 @@ def integrate(
     disturbance: Disturbance,
     *,
     tolerance: float,
-    progress: Progress | None = None,
 ) -> Runs:
     """N runs from x0 (N, n) under a disturbance of N lanes, to an error of about `tolerance` in |x|.
 
     A lane that cannot be integrated so far has a larger `error` than asked for, and `unresolved` says from when on; it
     is given up as soon as halving its steps no longer helps, which is so where the loop itself amplifies every
     difference. One that diverges or has no geodesic is stopped and listed in `failures`, and the others go on.
-    ValueError for arguments that do not fit. `progress` is told how many of how many lanes are done.
+    ValueError for arguments that do not fit.
     """
     starts = np.ascontiguousarray(x0, dtype=float)
     N, n = starts.shape
@@ -57,7 +54,7 @@ def integrate(
         raise ValueError("tolerance must be positive")
     if not DESIGNS[problem.controller].disturbed:
         disturbance = Disturbance.from_expressions(None, problem.model, N)
-    return _Lanes(problem, starts, disturbance).halve(tolerance, progress)
+    return _Lanes(problem, starts, disturbance).halve(tolerance)
 
 
 class Ladder:
@@ -125,7 +122,7 @@ class _Lanes:
         self.failed = np.zeros((self.N, _MOST_HALVINGS + 1), dtype=bool)
         self.steps = np.zeros(self.N, dtype=np.int64)
 
-    def halve(self, tolerance: float, progress: Progress | None) -> Runs:
+    def halve(self, tolerance: float) -> Runs:
         """Level after level, of the lanes that are not done."""
         lanes = np.arange(self.N)
         for number in range(_MOST_HALVINGS + 1):
@@ -140,8 +137,6 @@ class _Lanes:
             done = self._compare(lanes, finer, number, tolerance)
             self.steps[lanes] = len(lane.grid.start) - 1
             lanes = lanes[~done]
-            if progress is not None:
-                progress(self.N - len(lanes), self.N)
             if not len(lanes):
                 break
         return self._runs()

@@ -6,26 +6,26 @@ on the number of cores nor on how runs are grouped. What is finished when the us
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopProblem
 from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import Class, Member, adversary, assembled, genes_of, random_member
 
-Progress = Callable[[str, int, int], None]  # what is done, how many runs of how many
-
 BATCH: Final = 256
 TIMES: Final = 201  # output times of a run
 _POPULATION: Final = 64
 _ELITE: Final = 12
 _ROUNDS: Final = 4
+ATTACKS: Final = _ROUNDS * _POPULATION  # runs of an adversary's search
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +94,7 @@ def monte_carlo(
     try:
         for batch in _batches(setting, kind, count, seed):
             if report is not None:
-                report(name, len(cases), count)
+                report(Step(phase=Phase.SIMULATION, name=name, done=len(cases), of=count))
             parts.append(_slim(_run(setting, kind, problem, batch)))
             cases += batch
     except KeyboardInterrupt:
@@ -140,7 +140,8 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
     scores = np.zeros(0)
     for turn in range(_ROUNDS):
         if report is not None:
-            report(f"{loop.controller}, adversary", turn * _POPULATION, _ROUNDS * _POPULATION)
+            name = f"{loop.controller}, adversary"
+            report(Step(phase=Phase.SIMULATION, name=name, done=turn * _POPULATION, of=ATTACKS))
         runs = _run(setting, kind, problem, [_bred(setting, kind, row) for row in genes])
         worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])

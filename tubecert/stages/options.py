@@ -1,9 +1,7 @@
-"""What a command asks for beside the specification, and how progress is told."""
+"""What a command asks for beside the specification."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -25,23 +23,6 @@ class Options:
     adaptation_rate: Fraction | None = None
     gap: Fraction = Fraction(1, 100)
     budget: int = 2_000_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """Progress: what is being bounded, boxes so far, and the bounds so far.
-
-    Where something is counted that is not boxes and has no bounds, `unit` says what.
-    """
-
-    name: str
-    boxes: int
-    below: float = -math.inf
-    above: float = math.inf
-    unit: str = "boxes"
-
-
-Progress = Callable[[Step], None]
 
 
 def overridden(spec: Spec, options: Options) -> Spec:

@@ -16,10 +16,11 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import Range
 from tubecert.model import ControlAffineModel, build
+from tubecert.progress import Progress
 from tubecert.records import Json
 from tubecert.spec import Spec, canonical
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options, Progress, Step
+from tubecert.stages.options import Options
 from tubecert.trajectory import Plan
 from tubecert.verdict import Verdict
 
@@ -98,21 +99,11 @@ class Question:
         show = self.progress
         if show is None:
             return self.effort
-        return replace(
-            self.effort,
-            progress=lambda boxes, below, above: show(Step(name=name, boxes=boxes, below=below, above=above)),
-        )
+        return replace(self.effort, progress=lambda step: show(replace(step, name=name)))
 
     def suprema(self, plan: Plan) -> Suprema:
         """Suprema along a plan, which tell their progress."""
-        show, report = self.progress, None
-        if show is not None:
-            told = show
-
-            def report(name: str, boxes: int, below: float, above: float) -> None:
-                told(Step(name=name, boxes=boxes, below=below, above=above))
-
-        return Suprema(self.model, plan, 0.0, self.time, self.effort, report)
+        return Suprema(self.model, plan, 0.0, self.time, self.effort, self.progress)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
 from tubecert.executor import Executor
+from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
 from tubecert.sweep.folder import identity, prepare, tidy
 from tubecert.sweep.grid import Axis, points
 from tubecert.sweep.point import Failed, Point, Task, certify_point, outcome
-
-Told = Callable[
-    [int, int, bool], None
-]  # points that are done, of how many, and whether one was certified just now
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +35,7 @@ class Sweep:
         )
         return cls(task=task, axes=tuple(axes), points=named)
 
-    def run(self, executor: Executor, told: Told | None = None) -> None:
+    def run(self, executor: Executor, told: Progress | None = None) -> None:
         """Certify what is missing. Raises `TargetError`, and `TubecertError` if no point can be read at all."""
         spec = self.first()
         table = spec.trajectory.table
@@ -50,10 +47,10 @@ class Sweep:
             nonlocal done
             done += 1
             if told is not None:
-                told(done, len(self.points), True)
+                told(Step(phase=Phase.SWEEP, done=done, of=len(self.points)))
 
         if told is not None:
-            told(done, len(self.points), False)
+            told(Step(phase=Phase.SWEEP, done=done, of=len(self.points)))
         executor.map(partial(certify_point, self.task), missing, ready)
         tidy(self.task.folder)
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.progress import Phase, Step
 from tubecert.synthesis.attack import Attack, Attacker
 from tubecert.synthesis.conic import ConicSolution
 from tubecert.synthesis.counterexample import Judgement, counterexample
@@ -225,10 +226,11 @@ class _Synthesis:
 
     def _tell(self, attack: Attack) -> None:
         if self.problem.progress:
-            self.problem.progress(
+            words = (
                 f"round {self.rounds}: kappa >= {self.bound:.5g}; this metric {attack.kappa:.5g}, short of the rate "
                 f"by {attack.shortfall:.2g}; {self.program.size} conditions"
             )
+            self.problem.progress(Step(phase=Phase.SYNTHESIS, name=words))
 
 
 def _new(points: Points, old: Points) -> Points:

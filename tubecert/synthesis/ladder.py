@@ -15,6 +15,7 @@ from math import floor, inf, isfinite, log10, sqrt
 from tubecert.claims.outcomes import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.model import ControlAffineModel
+from tubecert.progress import Phase, Progress, Step
 from tubecert.synthesis.coordinates import Choice
 from tubecert.synthesis.family import MetricFamily, metric_family
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
@@ -58,7 +59,7 @@ class Request:
     thorough: bool = True
     rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
-    progress: Callable[[str], None] | None = None
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -306,7 +307,9 @@ class Ladder:
         if self.request.progress:
             number = attempt.condition_number
             words = attempt.outcome.tag if number is None else f"proven, condition number {number:.4g}"
-            self.request.progress(f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+            self.request.progress(
+                Step(phase=Phase.SYNTHESIS, name=f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
+            )
 
 
 def _attempt(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Final, Literal
 
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
+from tubecert.progress import Progress
 from tubecert.synthesis.coordinates import Choice, Coordinates, coordinates
 from tubecert.synthesis.family import MetricFamily
 
@@ -40,7 +40,7 @@ class SynthesisProblem:
     half_widths: tuple[Fraction, ...] = ()
     rounds: int | None = None
     sharp: bool = False
-    progress: Callable[[str], None] | None = field(default=None, repr=False)
+    progress: Progress | None = field(default=None, repr=False)
 
     @property
     def scaled(self) -> Coordinates:

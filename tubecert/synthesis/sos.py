@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from tubecert.progress import Phase, Step
 from tubecert.synthesis.chart import NotPolynomialError
 from tubecert.synthesis.conic import Affine, ConicProgram, ConicSolution, SemidefiniteBlocks, solve
 from tubecert.synthesis.gram import gram_form
@@ -40,7 +41,8 @@ def propose_sos(problem: SynthesisProblem, *, raised: int = 0) -> Proposal:
     except (NotPolynomialError, NotLiftedError) as error:
         return _proposal(None, ConicSolution.none(f"sums of squares do not apply: {error}"), problem, start)
     if problem.progress is not None:
-        problem.progress(f"sums of squares: {len(conditions.conditions)} polynomial matrices")
+        words = f"sums of squares: {len(conditions.conditions)} polynomial matrices"
+        problem.progress(Step(phase=Phase.SYNTHESIS, name=words))
     found = solve(sos_program(conditions, raised=raised), problem.solver)
     return _proposal(conditions, found, problem, start)
 

@@ -1,0 +1,81 @@
+"""How far a command is, as a sentence."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from tubecert.letters import NAMES
+from tubecert.progress import Phase, Step
+
+COUNTED: Final = {
+    Phase.CERTIFICATION: "claims",
+    Phase.PLAN: "claims",
+    Phase.GAINS: "claims",
+    Phase.RECHECK: "claims",
+    Phase.DESIGN: "tubes",
+    Phase.VERIFICATION: "metrics",
+    Phase.CHECK: "files",
+    Phase.SWEEP: "points",
+    Phase.COMPILATION: "functions",
+    Phase.SIMULATION: "runs",
+}
+_AT: Final = {
+    Phase.CERTIFICATION: "proving",
+    Phase.PLAN: "planning",
+    Phase.GAINS: "gains of certificate",
+    Phase.ADVICE: "looking for what would certify",
+    Phase.SYNTHESIS: "looking for a metric",
+    Phase.DESIGN: "trying tubes",
+    Phase.VERIFICATION: "verifying",
+    Phase.CHECK: "checking",
+    Phase.SWEEP: "certifying points",
+    Phase.COMPILATION: "compiling the loops, once per installation",
+    Phase.SIMULATION: "simulating",
+    Phase.FIGURES: "figures and data",
+    Phase.RECHECK: "examining",
+}
+_JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
+_LETTERS: Final = {name.key: name.letter for name in NAMES}
+
+
+def described(step: Step) -> str:
+    """The whole first, which matters most where a line is cut: how much is done, the time, what is worked on."""
+    whole = [_done(step), _time(step)]
+    return "; ".join(part for part in (*whole, _now(step)) if part)
+
+
+def duration(seconds: float) -> str:
+    """A time as one reads it."""
+    if seconds < 100:
+        return f"{math.ceil(seconds)} s"
+    minutes = seconds / 60
+    return f"{round(minutes)} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+
+
+def _done(step: Step) -> str:
+    counted = COUNTED.get(step.phase)
+    if counted is None or (step.of is None and not step.done):
+        return ""
+    if step.of is None:
+        return f"{step.done} {counted} done"
+    return f"{step.done} of {step.of} {counted} done"
+
+
+def _time(step: Step) -> str:
+    if not step.seconds:
+        return ""
+    left = "" if step.left is None else f", about {duration(step.left)} left"
+    return f"{duration(step.seconds)} so far{left}"
+
+
+def _now(step: Step) -> str:
+    """What is worked on, and what its search says."""
+    name = _LETTERS.get(step.name, step.name) if step.phase is Phase.GAINS else step.name.replace("_", " ")
+    joined = " " if step.phase in _JOINED else ": "
+    words = f"{_AT[step.phase]}{joined}{name}" if name else _AT[step.phase]
+    if step.count:
+        words += f", {step.count:,} {step.unit}"
+    if math.isfinite(step.below) and math.isfinite(step.above):
+        words += f", between {step.below:.4g} and {step.above:.4g}"
+    return words
