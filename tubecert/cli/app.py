@@ -148,12 +148,29 @@ def certify(
     how: Output,
 ) -> None:
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
-    given = dict(locals())
     if (bandwidth is None) != (adaptation_rate is None):
         raise typer.BadParameter("--bandwidth and --adaptation-rate are given together", ctx=context)
     with guarded(how):
-        from tubecert.cli.certify import run
+        from tubecert.cli.certify import Given, run
 
+        given = Given(
+            spec=spec,
+            settings=set_ or (),
+            metric=metric,
+            conditions=None if conditions is None else str(conditions),
+            formulas=formulas.value,
+            numbers={
+                "rho_a": rho_a,
+                "epsilon": epsilon,
+                "bandwidth": bandwidth,
+                "adaptation_rate": adaptation_rate,
+                "gap": gap,
+                "budget": budget,
+                "deadline": deadline,
+            },
+            target=output,
+            pages=report or (),
+        )
         code = run(given, how)
     raise typer.Exit(code)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
@@ -25,32 +26,43 @@ if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
     from tubecert.spec import Spec
+    from tubecert.stages.options import Formulas
 
 
-def run(given: Mapping[str, Any], output: Output) -> ExitCode:
-    """Certify; `given` holds the options by the names of their parameters."""
-    numbers = certification_numbers(given, flag)
-    deadline = numbers.pop("deadline", None)
-    settings = settings_of(given)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says; `numbers` are texts, by the names of their options."""
+
+    spec: str
+    settings: Sequence[str]
+    metric: Path | None
+    conditions: str | None
+    formulas: Formulas
+    numbers: Mapping[str, str | None]
+    target: str | None
+    pages: Sequence[str]
+
+
+def run(given: Given, output: Output) -> ExitCode:
+    """Certify."""
+    numbers = certification_numbers(given.numbers, flag)
+    radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
+    settings = settings_of(given.settings, metric=given.metric, **radii)
     target = _target(given)
     pages = _pages(given, target)
     from tubecert import spec
     from tubecert.spec.metric_file import with_metric
 
-    system = spec.load(given["spec"], settings)
-    if given["metric"] is not None:
-        system = with_metric(system, str(given["metric"]))
+    system = spec.load(given.spec, settings)
+    if given.metric is not None:
+        system = with_metric(system, str(given.metric))
     kept = _kept_place(given, system, target)
     from tubecert.library.certifying import (
         certified,  # numpy and the rest, once the input is known to be readable
     )
     from tubecert.report import progress
-    from tubecert.stages.options import Options
 
-    words: dict[str, Any] = {
-        name: str(given[name]) for name in ("conditions", "formulas") if given[name] is not None
-    }
-    options = Options(**numbers, **words, metric=given["metric"])
+    options = numbers.options(conditions=given.conditions, formulas=given.formulas, metric=given.metric)
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
@@ -58,7 +70,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
             system,
             options,
             report,
-            seconds=deadline,
+            seconds=numbers.deadline,
             command=command,
             told=None if output.quiet or _is_data(target, output) else _told_by(terminal),
         )
@@ -66,7 +78,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
         certificate.write_text(target, found.text)
     metric = _kept_metric(found.result, kept)
     write_pages(pages, found.certificate)
-    _report(found, target, {"metric": metric, "pages": pages}, output)
+    _report(found, target, metric, pages, output)
     return found.verdict.exit_code
 
 
@@ -82,34 +94,31 @@ def _is_data(target: str, output: Output) -> bool:
     return output.json or target == certificate.STDOUT
 
 
-def _target(given: Mapping[str, Any]) -> str:
+def _target(given: Given) -> str:
     """Where the certificate goes, checked before any work is done.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input.
     """
-    given_out: str | None = given["output"]
-    target = f"{Path(given['spec']).stem}.certificate.json" if given_out is None else given_out
+    target = f"{Path(given.spec).stem}.certificate.json" if given.target is None else given.target
     certificate.check_target(target)
-    spare(target, {"specification": given["spec"], "metric file": given["metric"]})
+    spare(target, {"specification": given.spec, "metric file": given.metric})
     return target
 
 
-def _pages(given: Mapping[str, Any], target: str) -> list[str]:
+def _pages(given: Given, target: str) -> list[str]:
     """Where the pages about the certificate go, checked before any work is done. Raises `TargetError`."""
-    pages = list(given["report"] or ())
+    pages = list(given.pages)
     written = None if target == certificate.STDOUT else target
-    check_pages(
-        pages, {"specification": given["spec"], "metric file": given["metric"], "certificate": written}
-    )
+    check_pages(pages, {"specification": given.spec, "metric file": given.metric, "certificate": written})
     return pages
 
 
-def _kept_place(given: Mapping[str, Any], system: Spec, beside: str) -> str | None:
+def _kept_place(given: Given, system: Spec, beside: str) -> str | None:
     """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
-    plan = plan_of(given, system)
+    plan = plan_of(given.spec, system)
     if beside == certificate.STDOUT:
         return None
     spare(beside, {"plan": plan})
@@ -118,7 +127,7 @@ def _kept_place(given: Mapping[str, Any], system: Spec, beside: str) -> str | No
     name = Path(beside).name.removesuffix(".json").removesuffix(".certificate")
     target = str(Path(beside).with_name(f"{name}.metric.json"))
     certificate.check_target(target)
-    spare(target, {"specification": given["spec"], "plan": plan})
+    spare(target, {"specification": given.spec, "plan": plan})
     if Path(target).exists() and not _synthesised(target):
         raise refused(
             f"{target} was not written by tubecert and would be overwritten by the metric that is synthesised"
@@ -150,13 +159,17 @@ def _kept_metric(result: Result, target: str | None) -> str | None:
     return target
 
 
-def _report(found: Certification, target: str, files: Mapping[str, Any], output: Output) -> None:
+def _report(
+    found: Certification, target: str, metric: str | None, pages: Sequence[str], output: Output
+) -> None:
     """The report on stdout, or the certificate, with the verdict line on stderr."""
     from tubecert.report import console
 
     present(
         output,
         console.verdict_line(found.result),
-        lambda: console.report(found.certificate, target=target, verbose=output.verbose, **files),
+        lambda: console.report(
+            found.certificate, target=target, verbose=output.verbose, metric=metric, pages=pages
+        ),
         found.text if _is_data(target, output) else None,
     )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
@@ -28,23 +28,33 @@ _SHOWN = 5
 _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
 
 
-def run(
-    paths: Sequence[str],
-    given: Mapping[str, Any],
-    output: Output,
-    *,
-    skip_others: bool = False,
-    family: str | None = None,
-) -> ExitCode:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says; numbers as texts."""
+
+    paths: Sequence[str]
+    format: str | None
+    certify: bool
+    family: str | None
+    strict: bool
+    skip_others: bool
+    jobs: str
+    no_cache: bool
+    gap: str
+    budget: str | None
+
+
+def run(given: Given, output: Output) -> ExitCode:
     """Check every file, or against a family of plans; findings are the result and go to stdout."""
     format_ = _format(given, output)
     jobs, options = _options(given)
-    if family is None:
-        files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, skip_others)
+    paths = given.paths
+    if given.family is None:
+        files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, given.skip_others)
         results = _checked(files, options, jobs, output) if files else []
         results = [*results, *_skipped(others)] or _nothing(paths)
     else:
-        results = _of_family(paths, family)
+        results = _of_family(paths, given.family)
     write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
     if format_ == "github":
         from tubecert.report import github
@@ -60,10 +70,10 @@ def _of_family(paths: Sequence[str], family: str) -> list[Checked]:
     return members(paths, family)
 
 
-def _format(given: Mapping[str, Any], output: Output) -> str:
+def _format(given: Given, output: Output) -> str:
     """The format asked for; in a workflow of GitHub, without being asked, the one that it understands."""
-    if given["format_"] is not None:
-        return str(given["format_"])
+    if given.format is not None:
+        return given.format
     from tubecert.report import github
 
     if output.json:
@@ -71,16 +81,16 @@ def _format(given: Mapping[str, Any], output: Output) -> str:
     return "github" if github.detected() else "text"
 
 
-def _options(given: Mapping[str, Any]) -> tuple[int, CheckOptions]:
+def _options(given: Given) -> tuple[int, CheckOptions]:
     """The number of jobs and what a check has to know; raises `SpecError` with everything that is wrong."""
     from tubecert.checking import CheckOptions
 
     numbers = Numbers()
-    jobs = numbers.count("--jobs", given["jobs"])
-    gap = numbers.positive("--gap", given["gap"], below=1)
-    budget = numbers.count("--budget", given["budget"])
+    jobs = numbers.count("--jobs", given.jobs)
+    gap = numbers.positive("--gap", given.gap, below=1)
+    budget = numbers.count("--budget", given.budget)
     numbers.check()
-    options = CheckOptions(certify=given["certify"], strict=given["strict"], cached=not given["no_cache"])
+    options = CheckOptions(certify=given.certify, strict=given.strict, cached=not given.no_cache)
     options = replace(options, gap=gap or options.gap, budget=budget or options.budget)
     return jobs or 1, options
 

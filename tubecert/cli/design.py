@@ -15,7 +15,7 @@ from tubecert import certificate, pipeline
 from tubecert.cli.corridor import Asked, corridor, pareto, refused
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
-from tubecert.cli.settings import PARAMETER, settings_of
+from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import spare
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import number_text, suggestion
@@ -73,7 +73,7 @@ def run(given: Given, output: Output) -> ExitCode:
     certificate.check_target(target)
     held = _Held(None if given.metric == SEARCH else given.metric)
     spare(target, {"specification": given.spec, "metric file": held.file})
-    fixed = settings_of({PARAMETER: given.settings, "metric": given.metric})
+    fixed = settings_of(given.settings, metric=given.metric)
     source = read_source(given.spec)
 
     def load(settings: Sequence[Setting]) -> Spec:

@@ -121,13 +121,24 @@ def check(
     Nothing is written but the findings; what files are found to be is remembered, so that a file that has not
     changed costs nothing.
     """
-    given = dict(locals())
     if how.json and format_ not in (None, Format.JSON):
         raise typer.BadParameter("--json and --format exclude each other", ctx=context)
     with guarded(how):
-        from tubecert.cli.check import run
+        from tubecert.cli.check import Given, run
 
-        code = run(specs, given, how, skip_others=skip_others, family=family)
+        given = Given(
+            paths=specs,
+            format=None if format_ is None else str(format_),
+            certify=certify,
+            family=family,
+            strict=strict,
+            skip_others=skip_others,
+            jobs=jobs,
+            no_cache=no_cache,
+            gap=gap,
+            budget=budget,
+        )
+        code = run(given, how)
     raise typer.Exit(code)
 
 

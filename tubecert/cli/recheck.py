@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
 
 from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
@@ -15,18 +15,29 @@ from tubecert.library.rechecking import text_of, told, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.cover import Outcome
 from tubecert.recheck.run import BUDGET, Recheck, recheck
 
 
-def run(given: Mapping[str, Any], output: Output, controller: str | None = None) -> ExitCode:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says, as texts."""
+
+    certificate: str
+    spec: str | None
+    controller: str | None
+    budget: str | None
+
+
+def run(given: Given, output: Output) -> ExitCode:
     """Recheck a certificate; with a specification, also whether it belongs to it, with a folder its controller."""
     numbers = Numbers()
-    budget = numbers.count("--budget", given["budget"])
+    budget = numbers.count("--budget", given.budget)
     numbers.check()
-    name = str(given["certificate"])
+    name = given.certificate
     text = text_of(name)
-    note = belongs(document.read(text, name), name, str(given["spec"])) if given["spec"] is not None else ""
-    code = "" if controller is None else _controller(controller, text, name)
+    note = "" if given.spec is None else belongs(document.read(text, name), name, given.spec)
+    code = "" if given.controller is None else _controller(given.controller, text, name)
     from tubecert.report import progress
     from tubecert.report.terminal import Terminal
 
@@ -52,7 +63,7 @@ def _controller(folder: str, text: str, name: str) -> str:
 
 def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:
     failing = found.failing
-    data: dict[str, Any] = {
+    data = {
         "certificate": name,
         "verdict": found.verdict,
         "stated": found.stated,
@@ -68,8 +79,8 @@ def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:
         ],
         "first_failing": None if failing is None else failing.name,
         "not_examined": list(found.unread),
+        **{what: note for what, note in notes.items() if note},
     }
-    data |= {what: note for what, note in notes.items() if note}
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
@@ -90,7 +101,7 @@ def _as_text(found: Recheck, name: str, notes: Mapping[str, str], output: Output
     return "".join(f"{harmless(visible(line))}\n" for line in lines)
 
 
-def _line(name: str, outcome: Any, *, verbose: bool) -> str:
+def _line(name: str, outcome: Outcome, *, verbose: bool) -> str:
     work = f"  ({outcome.boxes} boxes)" if verbose and outcome.boxes else ""
     why = "" if outcome.holds else f": {outcome.why}"
     return f"  {outcome.verdict:<12}  {name}{work}{why}"

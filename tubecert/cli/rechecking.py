@@ -51,9 +51,9 @@ def recheck(
     how: Output,
 ) -> None:
     """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
-    given = dict(locals())
     with guarded(how):
-        from tubecert.cli.recheck import run
+        from tubecert.cli.recheck import Given, run
 
-        code = run(given, how, controller)
+        given = Given(certificate=certificate, spec=spec, controller=controller, budget=budget)
+        code = run(given, how)
     raise typer.Exit(code)

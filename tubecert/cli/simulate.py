@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +16,7 @@ from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
 from tubecert.libraries import versions
 from tubecert.library.simulating import (
-    Wishes,
+    SimulationNumbers,
     campaign_of,
     controllers_of,
     require_extra,
@@ -38,22 +39,36 @@ _CODES: Final = {
 }
 
 
-def run(given: Mapping[str, Any], output: Output) -> ExitCode:
-    """Simulate; `given` holds the options by the names of their parameters."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says; `numbers` are texts, by the names of their options."""
+
+    spec: str
+    settings: Sequence[str]
+    certificate: Path | None
+    metric: Path | None
+    controllers: str | None
+    gains: str | None
+    numbers: Mapping[str, str | None]
+    folder: str | None
+
+
+def run(given: Given, output: Output) -> ExitCode:
+    """Simulate."""
     require_extra()
-    numbers = simulation_numbers(given, flag)
-    settings = settings_of(given)
-    chosen = controllers_of(given["controllers"], flag)
+    numbers = simulation_numbers(given.numbers, flag)
+    radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
+    settings = settings_of(given.settings, metric=given.metric, **radii)
+    chosen = controllers_of(given.controllers, flag)
     from tubecert import spec
 
-    file, gains, metric = (given[name] for name in ("spec", "gains", "metric"))
-    system = spec.load(file, settings)
-    if metric is not None:
+    system = spec.load(given.spec, settings)
+    if given.metric is not None:
         from tubecert.spec.metric_file import with_metric
 
-        system = with_metric(system, str(metric))
-    wishes = wishes_of(system, numbers, chosen, None if gains is None else str(gains))
-    folder = given["output"] or f"{Path(file).stem}.simulation"
+        system = with_metric(system, str(given.metric))
+    wishes = wishes_of(system, numbers, chosen, given.gains)
+    folder = given.folder or f"{Path(given.spec).stem}.simulation"
     from tubecert.simulate.certified import require_plan
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
@@ -62,7 +77,7 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
     terminal = Terminal.stderr(color=output.color)
     wanted = not (output.no_progress or output.quiet)
     with prepared(folder), progress.shown(terminal, wanted=wanted) as report:
-        system, certified = _certificate(given, system, wishes, folder, report)
+        system, certified = _certificate(given, system, numbers, folder, report)
         campaign = campaign_of(system, certified.result, wishes, report)
         if report is not None:
             report(Step(phase=Phase.FIGURES))
@@ -72,22 +87,20 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
 
 
 def _certificate(
-    given: Mapping[str, Any], system: Spec, wishes: Wishes, folder: str, report: Progress | None
+    given: Given, system: Spec, numbers: SimulationNumbers, folder: str, report: Progress | None
 ) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
     from tubecert.library.certification import certification_of, read
     from tubecert.simulate.certified import adopted, require_tube
 
-    if given["certificate"] is not None:
-        certified = read(str(given["certificate"])).certificate
+    if given.certificate is not None:
+        certified = read(str(given.certificate)).certificate
         system = adopted(system, certified.result)
         require_tube(certified.result)
         return system, certified
     from tubecert import pipeline
 
-    options = pipeline.Options(
-        epsilon=wishes.numbers["epsilon"], rho_a=wishes.numbers["rho_a"], metric=given["metric"]
-    )
+    options = pipeline.Options(epsilon=numbers.epsilon, rho_a=numbers.rho_a, metric=given.metric)
     _tell("no certificate is given: certifying first")
 
     result = pipeline.certify(system, options, report)

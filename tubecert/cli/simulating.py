@@ -106,7 +106,6 @@ def simulate(
     how: Output,
 ) -> None:
     """Integrate the closed loops, attack the tube, draw figures. It can falsify a certificate, never support one."""
-    given = dict(locals())
     if certificate is not None and (epsilon is not None or rho_a is not None):
         raise typer.BadParameter("a certificate has its own epsilon and rho_a", ctx=context)
     if certificate is not None and metric is not None:
@@ -123,7 +122,28 @@ def simulate(
 
             code = drive((str(spec), str(certificate), str(controller)), (runs, seed, duration), how)
         else:
-            from tubecert.cli.simulate import run
+            from tubecert.cli.simulate import Given, run
 
+            given = Given(
+                spec=spec,
+                settings=set_ or (),
+                certificate=certificate,
+                metric=metric,
+                controllers=controllers,
+                gains=None if gains is None else str(gains),
+                numbers={
+                    "epsilon": epsilon,
+                    "rho_a": rho_a,
+                    "duration": duration,
+                    "control_rate": control_rate,
+                    "bandwidth": bandwidth,
+                    "adaptation_rate": adaptation_rate,
+                    "sample_time": sample_time,
+                    "runs": runs,
+                    "seed": seed,
+                    "replay": replay,
+                },
+                folder=output,
+            )
             code = run(given, how)
     raise typer.Exit(code)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from tubecert import certificate, pipeline
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
-from tubecert.cli.settings import PARAMETER, settings_of
+from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode, SpecError
 from tubecert.executor import Cluster, WorkerError, chosen
 from tubecert.files import replace
@@ -60,7 +60,7 @@ def run(given: Given, output: Output) -> ExitCode:
     jobs = numbers.count("--jobs", given.jobs)
     options = _options(given, numbers)
     numbers.check()
-    fixed = settings_of({PARAMETER: given.settings, "metric": given.metric})
+    fixed = settings_of(given.settings, metric=given.metric)
     axes = _axes(given.over)
     if given.parquet and not told.can_write_parquet():
         message, help = "--parquet needs pyarrow", "pip install pyarrow, or read table.csv"

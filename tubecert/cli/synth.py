@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
@@ -20,23 +21,40 @@ if TYPE_CHECKING:
     from tubecert.pipeline import Synthesised
     from tubecert.spec import Spec
 
-_WORDS: Final = ("objective", "route", "solver")
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the command line says; `numbers` are texts, by the names of their options."""
+
+    spec: str
+    settings: Sequence[str]
+    objective: str | None
+    degree: int | None
+    variables: str | None
+    coordinates: str | None
+    route: str | None
+    solver: str | None
+    numbers: Mapping[str, str | None]
+    table: bool
+    plot: str | None
+    target: str | None
 
 
-def run(given: Mapping[str, Any], output: Output) -> ExitCode:
-    """Synthesise; `given` holds the options by the names of their parameters."""
-    numbers = synthesis_numbers(given, flag)
-    settings = settings_of(given)
-    target = given["output"] if given["output"] is not None else f"{Path(given['spec']).stem}.metric.json"
-    for place in (target, *([given["plot"]] if given["plot"] else [])):
+def run(given: Given, output: Output) -> ExitCode:
+    """Synthesise."""
+    numbers = synthesis_numbers(given.numbers, flag)
+    radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
+    settings = settings_of(given.settings, **radii)
+    target = given.target if given.target is not None else f"{Path(given.spec).stem}.metric.json"
+    for place in (target, *([given.plot] if given.plot else [])):
         certificate.check_target(place)
-        spare(place, {"specification": given["spec"]})
-    if given["plot"] and Path(given["plot"]).suffix.lower() != ".svg":
-        raise refused(f"cannot write {given['plot']}: the comparison is drawn as SVG", "give a file FILE.svg")
+        spare(place, {"specification": given.spec})
+    if given.plot and Path(given.plot).suffix.lower() != ".svg":
+        raise refused(f"cannot write {given.plot}: the comparison is drawn as SVG", "give a file FILE.svg")
     from tubecert import spec
 
-    system = spec.load(given["spec"], settings)
-    spare(target, {"plan": plan_of(given, system)})
+    system = spec.load(given.spec, settings)
+    spare(target, {"plan": plan_of(given.spec, system)})
     wanted = wanted_of(system, _wishes(given, numbers), flag)
     from tubecert import pipeline
     from tubecert.library.metrics import options_of
@@ -49,16 +67,16 @@ def run(given: Mapping[str, Any], output: Output) -> ExitCode:
             wanted,
             options_of(system, numbers),
             report,
-            table=bool(given["table"] or given["plot"]),
+            table=given.table or bool(given.plot),
             deadline=deadline_after(numbers.deadline),
             told=lambda so_far: _tell(so_far, system, terminal, output),
         )
     if found.file is not None and target != certificate.STDOUT:
         certificate.write(target, found.file.to_json())
-    if given["plot"] and found.rows:
+    if given.plot and found.rows:
         from tubecert.report.figures_rates import draw
 
-        certificate.write_text(given["plot"], draw(found.data().table))
+        certificate.write_text(given.plot, draw(found.data().table))
     _report(found, system, target, output)
     if found.cut == "interrupted":
         return ExitCode.INTERRUPTED
@@ -73,17 +91,18 @@ def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) 
         terminal.show(synthesis.verdict_line(found.data(), found.file, system.name))
 
 
-def _wishes(given: Mapping[str, Any], numbers: SynthesisNumbers) -> Wishes:
+def _wishes(given: Given, numbers: SynthesisNumbers) -> Wishes:
     """What the command line says of the metric."""
-    words = {name: None if given[name] is None else str(given[name]) for name in _WORDS}
-    names, coordinates = given["variables"], given["coordinates"]
+    names = given.variables
     return Wishes(
         rate=numbers.rate,
         condition_number=numbers.condition_number,
-        degree=given["degree"],
+        objective=given.objective,
+        degree=given.degree,
         variables=None if names is None else tuple(name.strip() for name in names.split(",") if name.strip()),
-        coordinates=one_of("--coordinates", coordinates, COORDINATES),
-        **words,
+        coordinates=one_of("--coordinates", given.coordinates, COORDINATES),
+        route=given.route,
+        solver=given.solver,
     )
 
 

@@ -107,9 +107,29 @@ def synth(
     how: Output,
 ) -> None:
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
-    given = dict(locals())
     with guarded(how):
-        from tubecert.cli.synth import run
+        from tubecert.cli.synth import Given, run
 
+        given = Given(
+            spec=spec,
+            settings=set_ or (),
+            objective=None if objective is None else str(objective),
+            degree=degree,
+            variables=variables,
+            coordinates=None if coordinates is None else str(coordinates),
+            route=None if route is None else str(route),
+            solver=solver,
+            numbers={
+                "rate": rate,
+                "condition_number": condition_number,
+                "rho_a": rho_a,
+                "epsilon": epsilon,
+                "budget": budget,
+                "deadline": deadline,
+            },
+            table=table,
+            plot=plot,
+            target=output,
+        )
         code = run(given, how)
     raise typer.Exit(code)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.errors import TargetError
@@ -38,7 +38,7 @@ def deadline_after(seconds: Fraction | None) -> Deadline | None:
     return None if seconds is None else Deadline.after(float(seconds))
 
 
-def plan_of(given: Mapping[str, Any], system: Spec) -> Path | None:
-    """The plan file of the specification that a command was given, if it has one."""
+def plan_of(file: str, system: Spec) -> Path | None:
+    """The plan file of the specification in `file`, if it has one."""
     table = system.trajectory.table
-    return None if table is None else Path(given["spec"]).parent / table.file
+    return None if table is None else Path(file).parent / table.file

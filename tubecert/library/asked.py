@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Final, Literal, Never, TypeAlias, TypeVar
+from pathlib import Path
+from typing import Final, Literal, Never, TypeAlias, TypeVar
 
 from tubecert.errors import SpecError
 from tubecert.expression import suggestion
@@ -16,8 +17,10 @@ from tubecert.findings import Finding, NamedPlace
 from tubecert.library.numbers import Numbers
 from tubecert.spec import Setting, Spec, Synthesis
 from tubecert.spec.synthesis import MAX_DEGREE, solver_name
+from tubecert.stages.options import Formulas, Options
 
 T = TypeVar("T", bound=str)
+V = TypeVar("V", int, Fraction)
 _SETS: Final = {
     "rho_a": "tube.rho_a",
     "epsilon": "tube.epsilon",
@@ -26,23 +29,48 @@ _SETS: Final = {
 Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification
 _GAP: Final = Fraction(1, 1000)
+_USUAL: Final = Options()
 
 
-def certification_numbers(given: Mapping[str, str | None], named: Named) -> dict[str, Any]:
-    """The numbers that a certification may be asked with, exact; `named` is what findings call each.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertificationNumbers:
+    """The numbers that a certification may be asked with, exact; None: what the specification, or a default, says."""
+
+    rho_a: Fraction | None
+    epsilon: Fraction | None
+    deadline: Fraction | None
+    bandwidth: Fraction | None
+    adaptation_rate: Fraction | None
+    gap: Fraction | None
+    budget: int | None
+
+    def options(self, *, conditions: str | None, formulas: Formulas, metric: Path | None = None) -> Options:
+        """The question, with words and a metric beside the numbers."""
+        return Options(
+            rho_a=self.rho_a,
+            epsilon=self.epsilon,
+            bandwidth=self.bandwidth,
+            adaptation_rate=self.adaptation_rate,
+            gap=self.gap or _USUAL.gap,
+            budget=self.budget or _USUAL.budget,
+            conditions=conditions,
+            formulas=formulas,
+            metric=metric,
+        )
+
+
+def certification_numbers(given: Mapping[str, str | None], named: Named) -> CertificationNumbers:
+    """The numbers of a certification; `named` is what findings call each.
 
     Raises `SpecError` with everything that is wrong with them.
     """
     numbers = Numbers()
-    values: dict[str, Any] = {
-        name: numbers.positive(named(name), given[name]) for name in ("rho_a", "epsilon", "deadline")
-    }
-    for name in ("bandwidth", "adaptation_rate"):
-        values[name] = numbers.gain(named(name), given[name])
-    values["gap"] = numbers.positive(named("gap"), given["gap"], below=1)
-    values["budget"] = numbers.count(named("budget"), given["budget"])
+    radii = {name: numbers.positive(named(name), given[name]) for name in ("rho_a", "epsilon", "deadline")}
+    gains = {name: numbers.gain(named(name), given[name]) for name in ("bandwidth", "adaptation_rate")}
+    gap = numbers.positive(named("gap"), given["gap"], below=1)
+    budget = numbers.count(named("budget"), given["budget"])
     numbers.check()
-    return {name: value for name, value in values.items() if value is not None}
+    return CertificationNumbers(**radii, **gains, gap=gap, budget=budget)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,20 +170,24 @@ def wanted_of(system: Spec, wishes: Wishes, named: Named) -> Synthesis:
     if own is None:
         rate = None if system.metric is None else system.metric.rate
         own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
-    names = ("rate", "condition_number", "degree", "route", "objective", "coordinates")
-    changes: dict[str, Any] = {name: value for name in names if (value := getattr(wishes, name)) is not None}
-    if wishes.solver is not None:
-        changes["solver"] = _solver(wishes.solver, named)
-    if wishes.variables is not None:
-        changes["variables"] = _known_states(system, wishes.variables, named)
-    objective = changes.get("objective", own.objective)
+    objective, rate = wishes.objective or own.objective, _rather(wishes.rate, own.rate)
     if objective == "rate" or (
         objective in ("adaptation", "tube") and wishes.rate is None and own.objective != objective
     ):
-        changes["rate"] = None  # searched for
-    elif "rate" in changes and "objective" not in changes and own.rate is None:
-        changes["objective"] = "condition"
-    wanted = replace(own, **changes)
+        rate = None  # searched for
+    elif wishes.rate is not None and wishes.objective is None and own.rate is None:
+        objective = "condition"
+    variables, solver = wishes.variables, wishes.solver
+    wanted = Synthesis(
+        rate=rate,
+        objective=objective,
+        degree=_rather(wishes.degree, own.degree),
+        variables=own.variables if variables is None else _known_states(system, variables, named),
+        condition_number=_rather(wishes.condition_number, own.condition_number),
+        coordinates=wishes.coordinates or own.coordinates,
+        route=wishes.route or own.route,
+        solver=own.solver if solver is None else _solver(solver, named),
+    )
     if wanted.objective == "rate" and wishes.rate is not None:
         text = f"the objective rate searches for the rate; {named('rate')} cannot be given"
         refuse(named("objective"), "rate", text)
@@ -163,6 +195,10 @@ def wanted_of(system: Spec, wishes: Wishes, named: Named) -> Synthesis:
         text = f"the objective {wanted.objective} needs {named('rate')}, in 1/s"
         refuse(named("objective"), wanted.objective, text)
     return wanted
+
+
+def _rather(wish: V | None, own: V | None) -> V | None:
+    return own if wish is None else wish
 
 
 def _solver(text: str, named: Named) -> str:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
 
 from tubecert import certificate, pipeline
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
-from tubecert.library.asked import certification_numbers, one_of, refuse, require_once
+from tubecert.library.asked import CertificationNumbers, certification_numbers, one_of, refuse, require_once
 from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
@@ -22,7 +21,7 @@ from tubecert.pipeline import Options, Result
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
-from tubecert.stages.options import overridden
+from tubecert.stages.options import Formulas, overridden
 
 
 def certify(
@@ -32,7 +31,7 @@ def certify(
     epsilon: Number | None = None,
     metric: MetricLike | None = None,
     conditions: str | None = None,
-    formulas: Literal["corrected", "as-printed"] = "corrected",
+    formulas: Formulas = "corrected",
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
     gap: Number | None = None,
@@ -59,13 +58,13 @@ def certify(
     )
     numbers = certification_numbers(texts, str)
     _check_words(conditions, formulas, numbers)
-    whole, seconds = spec_of(spec), numbers.pop("deadline", None)
+    whole = spec_of(spec)
     require_once(whole, {**texts, "metric": metric})
-    options = Options(**numbers, conditions=conditions, formulas=formulas)
+    options = numbers.options(conditions=conditions, formulas=formulas)
     if metric is not None:
         whole, name = with_metric(whole, metric)
         options = replace(options, metric=Path(name))
-    return certified(whole, options, timed(progress), seconds=seconds, command="tubecert.certify")
+    return certified(whole, options, timed(progress), seconds=numbers.deadline, command="tubecert.certify")
 
 
 def certified(
@@ -95,10 +94,12 @@ def certified(
     )
 
 
-def _check_words(conditions: str | None, formulas: str, numbers: Mapping[str, Any]) -> None:
+def _check_words(conditions: str | None, formulas: str, numbers: CertificationNumbers) -> None:
     """Raises `SpecError` for words that mean nothing, and for half of a pair of gains."""
     one_of("conditions", conditions, (*words_of(), ALL))
     one_of("formulas", formulas, ("corrected", "as-printed"))
-    for one, other in (("bandwidth", "adaptation_rate"), ("adaptation_rate", "bandwidth")):
-        if one in numbers and other not in numbers:
-            refuse(one, str(numbers[one]), f"{one} and {other} are given together")
+    bandwidth, rate = numbers.bandwidth, numbers.adaptation_rate
+    if bandwidth is not None and rate is None:
+        refuse("bandwidth", str(bandwidth), "bandwidth and adaptation_rate are given together")
+    if rate is not None and bandwidth is None:
+        refuse("adaptation_rate", str(rate), "adaptation_rate and bandwidth are given together")

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 RUNS: Final = 100
 SEED: Final = 0
-_POSITIVE: Final = ("epsilon", "rho_a", "duration", "control_rate")
-GAINS: Final = ("bandwidth", "adaptation_rate", "sample_time")
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
 
 
@@ -196,7 +194,11 @@ class Wishes:
     runs: int
     seed: int
     replay: int | None
-    numbers: Mapping[str, Fraction | None]
+    duration: Fraction | None
+    control_rate: Fraction | None
+    bandwidth: Fraction | None
+    adaptation_rate: Fraction | None
+    sample_time: Fraction | None
 
 
 def require_extra() -> None:
@@ -208,14 +210,49 @@ def require_extra() -> None:
         raise SpecError([Finding(code="TC122", message=message, help=help)])
 
 
-def simulation_numbers(given: Mapping[str, str | None], named: Named) -> dict[str, Any]:
-    """The numbers of a simulation, exact; raises `SpecError` with everything that is wrong with them."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationNumbers:
+    """The numbers that a simulation may be asked with, exact; None: what the specification, or a default, says."""
+
+    epsilon: Fraction | None
+    rho_a: Fraction | None
+    duration: Fraction | None
+    control_rate: Fraction | None
+    bandwidth: Fraction | None
+    adaptation_rate: Fraction | None
+    sample_time: Fraction | None
+    runs: int | None
+    seed: int | None
+    replay: int | None
+
+
+def simulation_numbers(given: Mapping[str, str | None], named: Named) -> SimulationNumbers:
+    """The numbers of a simulation; raises `SpecError` with everything that is wrong with them."""
     numbers = Numbers()
-    values: dict[str, Any] = {name: numbers.positive(named(name), given.get(name)) for name in _POSITIVE}
-    values |= {name: numbers.gain(named(name), given[name]) for name in GAINS}
-    values |= {name: numbers.whole(named(name), given[name]) for name in ("runs", "seed", "replay")}
+
+    def positive(name: str) -> Fraction | None:
+        return numbers.positive(named(name), given.get(name))
+
+    def gain(name: str) -> Fraction | None:
+        return numbers.gain(named(name), given[name])
+
+    def whole(name: str) -> int | None:
+        return numbers.whole(named(name), given[name])
+
+    found = SimulationNumbers(
+        epsilon=positive("epsilon"),
+        rho_a=positive("rho_a"),
+        duration=positive("duration"),
+        control_rate=positive("control_rate"),
+        bandwidth=gain("bandwidth"),
+        adaptation_rate=gain("adaptation_rate"),
+        sample_time=gain("sample_time"),
+        runs=whole("runs"),
+        seed=whole("seed"),
+        replay=whole("replay"),
+    )
     numbers.check()
-    return values
+    return found
 
 
 def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str, ...]:
@@ -232,7 +269,7 @@ def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str
     return words
 
 
-def wishes_of(system: Spec, numbers: Mapping[str, Any], chosen: tuple[str, ...], gains: str | None) -> Wishes:
+def wishes_of(system: Spec, numbers: SimulationNumbers, chosen: tuple[str, ...], gains: str | None) -> Wishes:
     """What is simulated of a specification."""
     from tubecert.simulate.promise import KINDS
     from tubecert.spec import Simulation as Section
@@ -240,24 +277,23 @@ def wishes_of(system: Spec, numbers: Mapping[str, Any], chosen: tuple[str, ...],
     default = system.simulation or Section()
     option = name_of(gains or default.gains or DISTANCE.option).option
     adaptive = KINDS[option].controller
-    values = dict(numbers)
-    if values["control_rate"] is None:
-        values["control_rate"] = default.control_rate
-
-    def first(name: str, otherwise: int) -> int:
-        own = numbers[name]
-        wanted = getattr(default, name) if own is None else own
-        return otherwise if wanted is None else int(wanted)
-
     return Wishes(
         controllers=chosen or default.controllers or ("ccm", adaptive),
         defaulted=not (chosen or default.controllers),
         gains=option,
-        runs=first("runs", RUNS),
-        seed=first("seed", SEED),
-        replay=numbers["replay"],
-        numbers=values,
+        runs=_first(numbers.runs, default.runs, RUNS),
+        seed=_first(numbers.seed, default.seed, SEED),
+        replay=numbers.replay,
+        duration=numbers.duration,
+        control_rate=default.control_rate if numbers.control_rate is None else numbers.control_rate,
+        bandwidth=numbers.bandwidth,
+        adaptation_rate=numbers.adaptation_rate,
+        sample_time=numbers.sample_time,
     )
+
+
+def _first(asked: int | None, default: int | None, otherwise: int) -> int:
+    return asked if asked is not None else otherwise if default is None else default
 
 
 def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress | None) -> Campaign:
@@ -266,10 +302,14 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress |
     from tubecert.simulate.compiled import told
     from tubecert.simulate.setting import Choice, loop_of, setting_of
 
-    numbers = wishes.numbers
-    setting = setting_of(system, result, numbers["duration"])
-    choice = Choice(source=wishes.gains, **{name: numbers[name] for name in GAINS})
-    rate = numbers["control_rate"]
+    setting = setting_of(system, result, wishes.duration)
+    choice = Choice(
+        source=wishes.gains,
+        bandwidth=wishes.bandwidth,
+        adaptation_rate=wishes.adaptation_rate,
+        sample_time=wishes.sample_time,
+    )
+    rate = wishes.control_rate
     also = ("hardware",) if wishes.defaulted and setting.certified.machine else ()
     names = dict.fromkeys((*wishes.controllers, *also))
     loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in names]
