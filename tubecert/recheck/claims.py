@@ -466,12 +466,12 @@ def _gains(case: Case) -> Iterator[Claim]:
 
 def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]:
     """What a kind adds to inputs that have limits."""
-    bounds = tuple(own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds)
+    bounds = {own.name: own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds}
     section, recipe = case.sections.by_key[kind.key], case.result.recipes.get(kind.key)
     if bounds:
         yield ground.claim(
             f"{kind.key}: what is added to u*",
-            (bounds, section, recipe),
+            (tuple(bounds.items()), section, recipe),
             lambda: (
                 metric.stated(False, "it has no recipe")
                 if recipe is None

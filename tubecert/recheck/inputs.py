@@ -122,14 +122,15 @@ def on_plan(place: Place, own: Limited) -> Outcome:
     return together([place.along(lambda room=room: NotNegative(room, place.numbers)) for room in sides])  # type: ignore[misc]
 
 
-def added(shares: Shares | None, bounds: Sequence[InputBound]) -> Outcome:
+def added(shares: Shares | None, bounds: Mapping[str, InputBound]) -> Outcome:
     """What feedback and adaptation add is at most what is stated with every input."""
     if shares is None:
         return Outcome(verdict="undecided", why="this kind says nothing of inputs")
     return all_of(_outcomes(shares, bounds))
 
 
-def _outcomes(shares: Shares, bounds: Sequence[InputBound]) -> Iterator[Outcome]:
-    for bound in bounds:
+def _outcomes(shares: Shares, bounds: Mapping[str, InputBound]) -> Iterator[Outcome]:
+    for name, bound in bounds.items():
         yield at_most(shares.feedback, bound.feedback, "what feedback adds")
-        yield stated(shares.adaptation <= bound.adaptation, "adaptation may add more: R_H")
+        most = shares.clipped.get(name, shares.adaptation)
+        yield stated(most <= bound.adaptation, "adaptation may add more: R_H")

@@ -1,7 +1,8 @@
 """How fast the feedback turns as its pair moves, and how fast the plan moves: D_F, D_Fx, D_cx, Ystar, Lus.
 
 Norms in the metric become definiteness at the printed bound t: t W >= F, -F;   |T_v| <= t |v| W, T_v = F_v - W_v M F -
-F M W_v;   (B_v' - B'M W_v) M (..)' <= t^2 |v|^2.
+F M W_v;   (B_v' - B'M W_v) M (..)' <= t^2 |v|^2. In coordinates in which a constant W is the identity
+|sum v_i A_i y|^2 <= |v|^2 sum |A_i y|^2, so that sum_i T_i M T_i <= t^2 W does for all v at once.
 """
 
 from __future__ import annotations
@@ -88,11 +89,15 @@ def _turns(place: Place) -> tuple[Matrix, list[Matrix]]:
 
 
 def feedback_curvature(place: Place, limit: Fraction) -> Outcome:
-    """By the sum over all directions; where that is too much, direction by direction."""
+    """By all directions as one matrix; by the sum over them; where that is too much, direction by direction."""
     unit, turns = _turns(place)
     moving = [T for T in turns if not all_zero(T)]
     if not moving:
         return stated(True, "")
+    if place.system.flat:
+        at_once = _stacked(place, moving, limit)
+        if at_once.holds:  # else nothing is known: the bound may be too large
+            return at_once
     if len(moving) > 1:
         found = prove(SlopesBelow(moving, unit, limit), place.tube(), min(place.budget, _FIRST))
         if found.verdict != "undecided":
@@ -106,6 +111,16 @@ def feedback_curvature(place: Place, limit: Fraction) -> Outcome:
             if not outcomes[-1].holds:
                 break
     return together(outcomes)
+
+
+def _stacked(place: Place, turns: Sequence[Matrix], limit: Fraction) -> Outcome:
+    """sum_i T_i M T_i <= limit^2 W, of a constant metric."""
+    W, (_, M) = place.system.W, _cleared(place)
+    total = scaled(0, W)
+    for T in turns:
+        total = plus(total, times(T, times(M, T)))
+    test = PositiveDefinite(plus(scaled(limit**2, W), total, -1), W)
+    return prove(test, place.tube(), min(place.budget, _MANY))
 
 
 def _directions(

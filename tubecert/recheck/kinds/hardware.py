@@ -116,7 +116,7 @@ class OfMachines(Kind[HardwareSection, Digital]):
         return {"margins": {STAYS: section.margin.below, LEVEL: section.level_margin.below}}
 
     def shares(self, section: HardwareSection, recipe: Digital, ground: Ground) -> Shares | None:
-        """Feedback with what u0 differs from u*, and the largest end of the clip."""
+        """Feedback with what u0 differs from u*, and the larger end of the clip of each input."""
         if section.windows:
             added = feedback(_course(section, recipe, ground), recipe)
         else:
@@ -124,8 +124,9 @@ class OfMachines(Kind[HardwareSection, Digital]):
             added = None if found is None else found.feedback + found.feedforward
         if added is None:
             return None
-        adaptation = max((abs(end) for ends in section.clip for end in ends), default=recipe.clip_radius)
-        return Shares(added, adaptation)
+        inputs = ground.place.system.inputs
+        clipped = {name: max(map(abs, ends)) for name, ends in zip(inputs, section.clip, strict=False)}
+        return Shares(added, recipe.clip_radius, clipped)
 
     def ranges(self, section: HardwareSection) -> Mapping[str, Range]:
         """Those that it states: the clip need not be the same to both sides."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import ClassVar, Generic, TypeVar
 
@@ -92,10 +92,14 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """What is added to u* at most: |k| <= `feedback`, and `adaptation` bounds what adapts (0: nothing does)."""
+    """What is added to u* at most: |k| <= `feedback`, and `adaptation` bounds what adapts (0: nothing does).
+
+    `clipped` bounds it input by input, where the set that it is clipped to is a box.
+    """
 
     feedback: Ball
     adaptation: Fraction
+    clipped: Mapping[str, Fraction] = field(default_factory=dict)
 
 
 S = TypeVar("S", bound=Section)
