@@ -10,9 +10,9 @@ import tubecert
 
 # what is there now, outside the serialiser and recheck; lower a number when it falls (python tests/house/counts.py)
 MOST = {
-    "mappings of Any": 71,
-    "string-key reads": 265,
-    "Any": 242,
+    "mappings of Any": 41,
+    "string-key reads": 110,
+    "Any": 213,
     "asserts that something is not None": 19,
     "verdict literals": 16,
     "comparisons with sentences": 2,

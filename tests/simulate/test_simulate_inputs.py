@@ -54,7 +54,7 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
             own.plan.least.above == own.plan.greatest.above == 0
         )  # the plan is at rest: u is all of the loop's
         assert use.greatest - use.least > 0.05  # and it does something
-    told = summary(found, "sha256:0")
+    told = summary(found, "sha256:0").to_json()
     assert {part["inputs"][0]["input"] for part in told["loops"]} == {"u"}
     assert told["attacks"][0]["random"]["inputs"][0]["proven"] == list(use.proven)
 
@@ -106,7 +106,7 @@ def test_without_limits_nothing_is_told():
     loop = loop_of(setting, "l1", Choice(source="distance"))
     found = simulate(setting, [loop], count=0, seed=0)
     assert found.drawn[0].comparison.inputs == ()
-    assert all("inputs" not in part for part in summary(found, "sha256:0")["loops"])
+    assert all("inputs" not in part for part in summary(found, "sha256:0").to_json()["loops"])
 
 
 @pytest.mark.slow

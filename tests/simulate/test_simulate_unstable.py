@@ -119,7 +119,7 @@ def thinner(where, factor):
 def words_of(campaign):
     data = summary(campaign, "none")
     parts = [verdict_line(data), *report(data, folder="x", files=1, verbose=False)]
-    return data, "\n".join(
+    return data.to_json(), "\n".join(
         getattr(part, "plain", getattr(getattr(part, "renderable", None), "plain", "")) for part in parts
     )
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
 from tubecert.cli.options import Output, flag
@@ -29,6 +29,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
+    from tubecert.simulate.summary import Summary
     from tubecert.spec import Spec
 
 _CODES: Final = {
@@ -110,7 +111,7 @@ def _certificate(
     return adopted(system, result), certification_of(sealed).certificate
 
 
-def _report(data: Mapping[str, Any], folder: str, files: int, output: Output) -> None:
+def _report(data: Summary, folder: str, files: int, output: Output) -> None:
     """The report on stdout, or the summary as JSON, with the verdict line on stderr."""
     from tubecert.report import simulation
 
@@ -118,7 +119,7 @@ def _report(data: Mapping[str, Any], folder: str, files: int, output: Output) ->
         output,
         simulation.verdict_line(data),
         lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose),
-        json.dumps(data, indent=1, sort_keys=True, allow_nan=False) + "\n" if output.json else None,
+        json.dumps(data.to_json(), indent=1, sort_keys=True, allow_nan=False) + "\n" if output.json else None,
     )
 
 

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import File, Specifiable, spec_of
 from tubecert.progress import Progress
+from tubecert.records import Json
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
 
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from tubecert.simulate.campaign import Campaign
     from tubecert.simulate.loops import Controller
     from tubecert.simulate.runs import Runs
+    from tubecert.simulate.summary import Summary
 
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 RUNS: Final = 100
@@ -62,8 +64,11 @@ class Simulation:
         return self.outcome in OUTCOMES
 
     @property
-    def summary(self) -> Mapping[str, Any]:
+    def summary(self) -> Json:
         """Everything that was found, as plain data."""
+        return self._found().to_json()
+
+    def _found(self) -> Summary:
         from tubecert.simulate.summary import summary
 
         return summary(self.campaign, self.compared_with)
@@ -112,7 +117,7 @@ class Simulation:
     def __str__(self) -> str:
         from tubecert.report import simulation
 
-        return simulation.verdict_line(self.summary).plain
+        return simulation.verdict_line(self._found()).plain
 
     def __repr__(self) -> str:
         return f"<Simulation: {self}>"

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from rich.table import Table
 from rich.text import Text
 
-from tubecert.records import from_json
 from tubecert.report.layout import indented, titled
 from tubecert.report.numbers import UNKNOWN, down, short, up
 from tubecert.simulate.inputs import InputUse
+from tubecert.simulate.summary import (
+    ClearanceData,
+    ComparisonData,
+    GainsData,
+    LoopData,
+    RunAt,
+    StoppedData,
+    Summary,
+    ViolationData,
+)
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
-
-Data = Mapping[str, Any]
 
 STYLES: Final = {
     "falsified": "bold red",
@@ -39,16 +47,34 @@ _WORDS: Final = {
 }
 
 
-def verdict_line(data: Data) -> Text:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Part:
+    """Runs of a loop, and what they are about; `{run}` stands for the number of a run."""
+
+    loop: LoopData
+    comparison: ComparisonData
+    what: str
+
+    @property
+    def counts(self) -> bool:
+        """Whether the loop is meant to stay in the tube, and there are runs that say whether it does."""
+        return self.loop.tested and bool(self.comparison.worst)
+
+    def run(self, item: RunAt | StoppedData | ViolationData) -> str:
+        """Which run it was."""
+        return self.what.replace("{run}", str(item.run))
+
+
+def verdict_line(data: Summary) -> Text:
     """The outcome on one line."""
     line = Text(no_wrap=True, overflow="ignore")
-    line.append(data["outcome"], style=STYLES[data["outcome"]])
-    line.append(f" {data['name']}: ", style="bold")
+    line.append(data.outcome, style=STYLES[data.outcome])
+    line.append(f" {data.name}: ", style="bold")
     line.append(_because(data))
     return line
 
 
-def report(data: Data, *, folder: str, files: int, verbose: bool) -> list[RenderableType]:
+def report(data: Summary, *, folder: str, files: int, verbose: bool) -> list[RenderableType]:
     """The whole report as renderables; `folder` holds the files."""
     parts: list[RenderableType] = [verdict_line(data), indented(Text(_CAVEAT))]
     for title, body in _sections(data, verbose):
@@ -59,19 +85,19 @@ def report(data: Data, *, folder: str, files: int, verbose: bool) -> list[Render
     return [*parts, Text(), where]
 
 
-def _because(data: Data) -> str:
+def _because(data: Summary) -> str:
     """What decided, in a few words."""
-    runs = sum(part["runs"] for part in _parts(data) if part["tested"])
-    use = max((part["worst"]["distance"]["share"] for part in _parts(data) if _counts(part)), default=None)
-    left = sum(part["left_the_tube"] for part in _parts(data) if part["tested"])
-    match data["outcome"]:
+    tested = [part.comparison for part in _parts(data) if part.loop.tested]
+    runs = sum(own.runs for own in tested)
+    shares = [own.worst["distance"].share for own in tested if own.worst]
+    use = max((share for share in shares if share is not None), default=None)
+    match data.outcome:
         case "falsified":
             return f"a promise of the certificate is broken; see VIOLATION below ({_runs(runs)})"
         case "tube left":
-            exits = [
-                part["first_exit"]["t"] for part in _parts(data) if part["tested"] and part["first_exit"]
-            ]
-            first = f"first at t = {short(min(exits))} s"
+            left = sum(own.left_the_tube for own in tested)
+            exits = [own.first_exit.t for own in tested if own.first_exit is not None]
+            first = f"first at t = {short(min(t for t in exits if t is not None))} s"
             return f"the tube is left in {left} of {_runs(runs)}, {first}; no certificate covers these gains"
         case "no result":
             return f"the error estimate of some runs exceeds rho/100, or they failed ({_runs(runs)})"
@@ -90,159 +116,145 @@ def _runs(count: int) -> str:
     return "1 run" if count == 1 else f"{count} runs"
 
 
-def _counts(part: Data) -> bool:
-    return bool(part["tested"] and part["worst"])
-
-
-def _parts(data: Data) -> Iterator[dict[str, Any]]:
+def _parts(data: Summary) -> Iterator[_Part]:
     """Every comparison, with what it is about."""
-    for loop in data["loops"]:
-        yield {**loop, "what": f"uncertainty {data['uncertainty']}"}
-    for attack in data["attacks"]:
-        for name, words in (
-            ("random", "random run {run}, seed {seed}"),
-            ("adversary", "adversary, seed {seed}"),
+    for own in data.loops:
+        yield _Part(loop=own.loop, comparison=own.comparison, what=f"uncertainty {data.uncertainty}")
+    for attack in data.attacks:
+        for found, words in (
+            (attack.random, f"random run {{run}}, seed {data.seed}"),
+            (attack.adversary, f"adversary, seed {data.seed}"),
         ):
-            if name in attack:
-                yield {**attack, **attack[name], "what": words.replace("{seed}", str(data["seed"]))}
+            if found is not None:
+                yield _Part(loop=attack.loop, comparison=found.comparison, what=words)
 
 
-def _sections(data: Data, verbose: bool) -> Iterator[tuple[str, list[RenderableType]]]:
-    broken = [_violation(part, item) for part in _parts(data) for item in part["violations"]]
+def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[RenderableType]]]:
+    parts = list(_parts(data))
+    broken = [_violation(part, item) for part in parts for item in part.comparison.violations]
     if broken:
         yield "VIOLATION", list(broken)
-    stopped = [_stopped(part, item) for part in _parts(data) for item in part["stopped"][:3]]
-    stopped += [_unresolved(part, item) for part in _parts(data) for item in part["unresolved"][:3]]
-    cautions = [
-        Text(f"{loop['controller']}: {loop['caution']}") for loop in data["loops"] if "caution" in loop
-    ]
+    stopped = [_stopped(part, item) for part in parts for item in part.comparison.stopped[:3]]
+    stopped += [_unresolved(part, item) for part in parts for item in part.comparison.unresolved[:3]]
+    loops = [own.loop for own in data.loops]
+    cautions = [Text(f"{loop.controller}: {loop.caution}") for loop in loops if loop.caution is not None]
     if stopped or cautions:
         yield "Stopped, or no result" if stopped else "Unstable", [*cautions, *stopped]
     yield (
-        f"Loops under the uncertainty {data['uncertainty']}, 0 <= t <= {short(data['horizon'])} s",
+        f"Loops under the uncertainty {data.uncertainty}, 0 <= t <= {short(data.horizon)} s",
         [_loops(data)],
     )
-    if data["attacks"]:
-        yield f"Attacks within the class, seed {data['seed']}", [_class(data), _attacks(data)]
-    if any(_counts(part) for part in _parts(data)):
+    if data.attacks:
+        yield f"Attacks within the class, seed {data.seed}", [_class(data), _attacks(data)]
+    if any(part.counts for part in parts):
         yield "Largest share of every bound", [_bounds(data)]
     if inputs := _inputs(data):
         yield "Inputs, in all runs", [_table_of(inputs)]
-    if data["obstacles"]["plan"]:
+    if data.obstacles.plan:
         yield "Obstacles (least distance; negative: collision)", [_obstacles(data)]
     if verbose:
-        yield "Gains", [_gains(loop) for loop in data["loops"] if "gains" in loop]
+        yield "Gains", [_gains(loop, loop.gains) for loop in loops if loop.gains is not None]
 
 
-def _where(part: Data, item: Data) -> str:
-    """Which run it was."""
-    return str(part["what"]).replace("{run}", str(item["run"]))
+def _when(item: ViolationData) -> str:
+    return "" if item.t is None else f"t = {short(item.t)} s, "
 
 
-def _when(item: Data) -> str:
-    return "" if item["t"] is None else f"t = {short(item['t'])} s, "
-
-
-def _violation(part: Data, item: Data) -> Text:
-    where = _where(part, item)
-    what = (
-        f"{part['controller']}: {_WORDS.get(item['bound_of'], item['bound_of'])} is {short(item['value'], 6)}"
-    )
-    text = Text(f"{what}, promised at most {short(item['bound'], 6)}; {_when(item)}{where}", "red")
+def _violation(part: _Part, item: ViolationData) -> Text:
+    where, name = part.run(item), _WORDS.get(item.bound_of, item.bound_of)
+    what = f"{part.loop.controller}: {name} is {short(item.value, 6)}"
+    text = Text(f"{what}, promised at most {short(item.bound, 6)}; {_when(item)}{where}", "red")
     if "random run" in where:
-        text.append(f"\n  to see it alone: the same command with --replay {item['run']}", style="default")
+        text.append(f"\n  to see it alone: the same command with --replay {item.run}", style="default")
     return text
 
 
-def _stopped(part: Data, item: Data) -> Text:
-    where = _where(part, item)
-    return Text(f"{part['controller']}: {item['reason']} at t = {short(item['t'])} s, {where}")
+def _stopped(part: _Part, item: StoppedData) -> Text:
+    return Text(f"{part.loop.controller}: {item.reason} at t = {short(item.t)} s, {part.run(item)}")
 
 
-def _unresolved(part: Data, item: Data) -> Text:
-    where = _where(part, item)
-    since = UNKNOWN if item["t"] is None else f"{short(item['t'])} s"
+def _unresolved(part: _Part, item: RunAt) -> Text:
+    since = UNKNOWN if item.t is None else f"{short(item.t)} s"
     return Text(
-        f"{part['controller']}: from t = {since} on the run depends on the steps of the integration: "
-        f"the loop is unstable, or too fast to be followed; {where}"
+        f"{part.loop.controller}: from t = {since} on the run depends on the steps of the integration: "
+        f"the loop is unstable, or too fast to be followed; {part.run(item)}"
     )
 
 
-def _loops(data: Data) -> Table:
+def _loops(data: Summary) -> Table:
     table = _table("controller", "gains", "are", "max d/bound", "max |x-x*|/bound", "settled")
-    for loop in data["loops"]:
-        settled = loop["settled"]
+    for own in data.loops:
+        settled = own.comparison.settled
         table.add_row(
-            loop["controller"],
-            _gain_words(loop),
-            loop["gains_are"],
-            _share(loop, "distance"),
-            _share(loop, "deviation"),
+            own.loop.controller,
+            _gain_words(own.loop),
+            own.loop.gains_are,
+            _share(own.comparison, "distance"),
+            _share(own.comparison, "deviation"),
             UNKNOWN if settled is None else f"{short(settled)} s",
         )
     return table
 
 
-def _gain_words(loop: Data) -> str:
-    gains = loop.get("gains")
-    if not gains:
+def _gain_words(loop: LoopData) -> str:
+    gains = loop.gains
+    if gains is None:
         return UNKNOWN
-    bandwidth = gains["bandwidth"]
-    words = ["no filter" if bandwidth is None else f"omega {short(bandwidth)}"]
-    if gains["adaptation_rate"] is not None:
-        words.append(f"Gamma {short(gains['adaptation_rate'])}")
-    if gains["sample_time"] is not None:
-        words.append(f"Ts {short(gains['sample_time'])}")
-    if "control_rate" in loop:
-        words.append(f"held at {short(loop['control_rate'])} Hz")
+    words = ["no filter" if gains.bandwidth is None else f"omega {short(gains.bandwidth)}"]
+    if gains.adaptation_rate is not None:
+        words.append(f"Gamma {short(gains.adaptation_rate)}")
+    if gains.sample_time is not None:
+        words.append(f"Ts {short(gains.sample_time)}")
+    if loop.control_rate is not None:
+        words.append(f"held at {short(loop.control_rate)} Hz")
     return ", ".join(words)
 
 
-def _share(part: Data, name: str) -> str:
-    use = part["worst"].get(name)
-    if use is None or use["share"] is None:
+def _share(own: ComparisonData | None, name: str) -> str:
+    use = None if own is None else own.worst.get(name)
+    if use is None or use.share is None:
         return UNKNOWN
-    return f"{short(use['share'])} at {short(use['t'])} s"
+    return f"{short(use.share)} at {short(use.t)} s"
 
 
-def _class(data: Data) -> Text:
-    kind = data["class"]
+def _class(data: Summary) -> Text:
+    own = data.bounds
     return Text(
-        f"|h| <= {short(kind['h'])}, |dh/dx| <= {short(kind['h_x'])}, |dh/dt| <= {short(kind['h_t'])}, "
-        f"|h| <= {short(kind['h_initial'])} at the start"
+        f"|h| <= {short(own.h)}, |dh/dx| <= {short(own.h_x)}, |dh/dt| <= {short(own.h_t)}, "
+        f"|h| <= {short(own.h_initial)} at the start"
     )
 
 
-def _attacks(data: Data) -> Table:
+def _attacks(data: Summary) -> Table:
     table = _table("controller", "runs", "left the tube", "no result", "max d/bound", "adversary", "settled")
-    for attack in data["attacks"]:
-        random, adversary = attack.get("random"), attack.get("adversary")
-        settled = random and random["settled"]
-        runs = UNKNOWN
-        if random:
-            asked = random["asked"]
-            runs = str(random["runs"]) + (f" of {asked}" if random["runs"] < asked else "")
+    for attack in data.attacks:
+        found = None if attack.random is None else attack.random.comparison
+        runs = settled = UNKNOWN
+        if attack.random is not None and found is not None:
+            asked = attack.random.asked
+            runs = str(found.runs) + (f" of {asked}" if found.runs < asked else "")
+            settled = UNKNOWN if found.settled is None else f"{short(found.settled)} s"
         table.add_row(
-            attack["controller"],
+            attack.loop.controller,
             runs,
-            str(random["left_the_tube"]) if random else UNKNOWN,
-            str(random["no_result"] + len(random["stopped"])) if random else UNKNOWN,
-            _share(random, "distance") if random else UNKNOWN,
-            _share(adversary, "distance") if adversary else UNKNOWN,
-            UNKNOWN if settled is None else f"{short(settled)} s",
+            UNKNOWN if found is None else str(found.left_the_tube),
+            UNKNOWN if found is None else str(found.no_result + len(found.stopped)),
+            _share(found, "distance"),
+            _share(None if attack.adversary is None else attack.adversary.comparison, "distance"),
+            settled,
         )
     return table
 
 
-def _bounds(data: Data) -> Table:
+def _bounds(data: Summary) -> Table:
     """What the loops that adapt used of every bound, over all their runs."""
     most: dict[str, dict[str, float]] = {}
     for part in _parts(data):
-        if _counts(part):
-            shares = most.setdefault(part["controller"], {})
-            for name, use in part["worst"].items():
-                if use["share"] is not None:
-                    shares[name] = max(shares.get(name, 0.0), use["share"])
+        if part.counts:
+            shares = most.setdefault(part.loop.controller, {})
+            for name, use in part.comparison.worst.items():
+                if use.share is not None:
+                    shares[name] = max(shares.get(name, 0.0), use.share)
     names = [name for name in _WORDS if any(name in shares for shares in most.values())]
     table = _table("controller", *(_WORDS[name] for name in names))
     for controller, shares in most.items():
@@ -250,12 +262,12 @@ def _bounds(data: Data) -> Table:
     return table
 
 
-def _inputs(data: Data) -> dict[tuple[str, str], InputUse]:
+def _inputs(data: Summary) -> dict[tuple[str, str], InputUse]:
     """How far every input with limits went over all runs of a loop, by controller and input."""
     found: dict[tuple[str, str], InputUse] = {}
     for part in _parts(data):
-        for own in from_json(tuple[InputUse, ...], part.get("inputs", []), "inputs"):
-            key = str(part["controller"]), own.input
+        for own in part.comparison.inputs:
+            key = part.loop.controller, own.input
             found[key] = own if key not in found else found[key].joined(own)
     return found
 
@@ -268,30 +280,24 @@ def _table_of(inputs: Mapping[tuple[str, str], InputUse]) -> Table:
     return table
 
 
-def _obstacles(data: Data) -> Table:
-    loops = data["loops"]
-    table = _table("obstacle", "plan", "tube", *(loop["controller"] for loop in loops))
-    rows = data["obstacles"]
-    for i, (plan, tube) in enumerate(zip(rows["plan"], rows["tube"], strict=True)):
-        table.add_row(
-            str(i + 1),
-            _clearance(plan),
-            _clearance(tube),
-            *(_clearance(loop["obstacles"][i]) for loop in loops),
-        )
+def _obstacles(data: Summary) -> Table:
+    table = _table("obstacle", "plan", "tube", *(own.loop.controller for own in data.loops))
+    rows = zip(data.obstacles.plan, data.obstacles.tube, strict=True)
+    for i, (plan, tube) in enumerate(rows):
+        loops = (_clearance(own.obstacles[i]) for own in data.loops)
+        table.add_row(str(i + 1), _clearance(plan), _clearance(tube), *loops)
     return table
 
 
-def _clearance(item: Data) -> str:
-    value = short(item["clearance"])
-    return f"collides, {value} at {short(item['t'])} s" if item["collides"] else value
+def _clearance(item: ClearanceData) -> str:
+    value = short(item.clearance)
+    return f"collides, {value} at {short(item.t)} s" if item.collides else value
 
 
-def _gains(loop: Data) -> Text:
-    gains = loop["gains"]
+def _gains(loop: LoopData, gains: GainsData) -> Text:
     return Text(
-        f"{loop['controller']}: projection radius {short(gains['projection_radius'], 6)}, "
-        f"predictor gain {gains['predictor_gain']}"
+        f"{loop.controller}: projection radius {short(gains.projection_radius, 6)}, "
+        f"predictor gain {gains.predictor_gain}"
     )
 
 

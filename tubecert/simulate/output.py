@@ -73,7 +73,7 @@ def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
         if attack.sample is not None:
             yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
     yield from figures(campaign)
-    text = json.dumps(summary(campaign, certificate), indent=1, sort_keys=True, allow_nan=False)
+    text = json.dumps(summary(campaign, certificate).to_json(), indent=1, sort_keys=True, allow_nan=False)
     yield SUMMARY, (text + "\n").encode()
 
 

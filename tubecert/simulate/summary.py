@@ -1,4 +1,4 @@
-"""A campaign as data: what was simulated, with which gains, what it used of every bound, and what broke.
+"""A campaign as records: what was simulated, with which gains, what it used of every bound, and what broke.
 
 The words are chosen with care: a simulation that finds nothing has not falsified anything, and that is all.
 """
@@ -7,19 +7,211 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
-from tubecert.records import to_json
+from tubecert.records import INLINE, Json, to_json
 from tubecert.simulate.campaign import Attack, Campaign, Drawn
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
+from tubecert.simulate.inputs import InputUse
 from tubecert.simulate.setting import Loop, Setting
 
 FORMAT: Final = "tubecert-simulation/1"
+_LISTED: Final = 20  # of the runs that left, stopped or came to nothing
 
-Data = dict[str, Any]
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainsData:
+    """Gains of a loop; None where it has no such gain, or one beyond all numbers."""
+
+    bandwidth: float | None
+    adaptation_rate: float | None
+    sample_time: float | None
+    projection_radius: float | None
+    predictor_gain: float | list[list[float]] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineGainsData(GainsData):
+    """Those of the loop of certificate H, with its times in s."""
+
+    delay: float
+    feedback_time: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopData:
+    """A loop, whether a certificate covers its gains, and whether it is meant to stay in the tube."""
+
+    controller: str
+    gains_are: str
+    covered: bool
+    tested: bool
+    control_rate: float | None = None
+    gains: GainsData | None = None
+    caution: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunAt:
+    """A run, by its number, and a time in s."""
+
+    run: int
+    t: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoppedData:
+    """A run that ended early, and why."""
+
+    run: int
+    t: float | None
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UseData:
+    """The largest value of a quantity, its bound if it has one, and where it was met."""
+
+    value: float | None
+    bound: float | None
+    share: float | None
+    run: int
+    t: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViolationData:
+    """A bound that was broken."""
+
+    bound_of: str
+    run: int
+    t: float | None
+    value: float | None
+    bound: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonData:
+    """Runs against the promises about their loop."""
+
+    runs: int
+    left_the_tube: int
+    first_outside: tuple[int, ...]
+    first_exit: RunAt | None
+    no_result: int
+    unresolved: tuple[RunAt, ...]
+    stopped: tuple[StoppedData, ...]
+    worst: Mapping[str, UseData]
+    violations: tuple[ViolationData, ...]
+    settled: float | None
+    final_deviation: float | None
+    error_estimate: float
+    inputs: tuple[InputUse, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearanceData:
+    """The least distance to an obstacle, by its number, and when in s."""
+
+    obstacle: int
+    clearance: float | None
+    t: float
+    collides: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnData:
+    """A loop under the uncertainty that is drawn."""
+
+    loop: LoopData = field(metadata=INLINE)
+    comparison: ComparisonData = field(metadata=INLINE)
+    obstacles: tuple[ClearanceData, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RandomData:
+    """Random runs; fewer than were asked for if somebody interrupted."""
+
+    asked: int
+    comparison: ComparisonData = field(metadata=INLINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaveData:
+    """The h that the adversary found, a wave in x and t."""
+
+    amplitude: list[float]
+    frequency: list[float]
+    wave: list[float]
+    phase: list[float]
+    push: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdversaryData:
+    """The run of the adversary, its start, its h and what acted beside it."""
+
+    comparison: ComparisonData = field(metadata=INLINE)
+    start: list[float]
+    h: WaveData
+    beside: Mapping[str, list[float]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttackData:
+    """What random runs and the adversary found against a loop."""
+
+    loop: LoopData = field(metadata=INLINE)
+    largest_distance_over_dbar: float | None
+    random: RandomData | None = None
+    adversary: AdversaryData | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstaclesData:
+    """How far the plan and its tube stay from every obstacle."""
+
+    plan: tuple[ClearanceData, ...]
+    tube: tuple[ClearanceData, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundsData:
+    """The class of uncertainties that attacked: bounds of |h|, |dh/dx|, |dh/dt|, and of |h| at the start."""
+
+    h: float
+    h_x: float
+    h_t: float
+    h_initial: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """Everything that was found; `certificate` is the hash of the one that was compared with."""
+
+    format: str
+    name: str
+    outcome: str
+    certificate: str
+    horizon: float
+    rho: float
+    dbar: float
+    uncertainty: str
+    bounds: BoundsData
+    seed: int
+    loops: tuple[DrawnData, ...]
+    attacks: tuple[AttackData, ...]
+    obstacles: ObstaclesData
+
+    def to_json(self) -> Json:
+        """What `summary.json` holds."""
+        data = to_json(self)
+        data["class"] = data.pop("bounds")
+        return data
 
 
 def outcome(campaign: Campaign) -> str:
@@ -35,140 +227,160 @@ def outcome(campaign: Campaign) -> str:
     return "not falsified" if any(loop.promise for loop, _ in campaign.comparisons) else "nothing claimed"
 
 
-def summary(campaign: Campaign, certificate: str) -> Data:
-    """JSON-ready data; `certificate` is the hash of the certificate that was compared with."""
+def summary(campaign: Campaign, certificate: str) -> Summary:
+    """What was found; `certificate` is the hash of the certificate that was compared with."""
     setting = campaign.setting
-    return {
-        "format": FORMAT,
-        "name": setting.spec.name,
-        "outcome": outcome(campaign),
-        "certificate": certificate,
-        "horizon": setting.horizon,
-        "rho": setting.rho,
-        "dbar": setting.reach,
-        "uncertainty": campaign.uncertainty,
-        "class": {name: getattr(setting.uncertainty, name) for name in ("h", "h_x", "h_t", "h_initial")},
-        "seed": campaign.seed,
-        "loops": [_drawn(item) for item in campaign.drawn],
-        "attacks": [_attack(item, setting) for item in campaign.attacks],
-        "obstacles": {
-            "plan": [_clearance(item) for item in campaign.plan_clearance],
-            "tube": [_clearance(item) for item in campaign.tube_clearance],
-        },
-    }
+    own = setting.uncertainty
+    return Summary(
+        format=FORMAT,
+        name=setting.spec.name,
+        outcome=outcome(campaign),
+        certificate=certificate,
+        horizon=setting.horizon,
+        rho=setting.rho,
+        dbar=setting.reach,
+        uncertainty=campaign.uncertainty,
+        bounds=BoundsData(h=own.h, h_x=own.h_x, h_t=own.h_t, h_initial=own.h_initial),
+        seed=campaign.seed,
+        loops=tuple(map(_drawn, campaign.drawn)),
+        attacks=tuple(_attack(item, setting) for item in campaign.attacks),
+        obstacles=ObstaclesData(
+            plan=tuple(map(_clearance, campaign.plan_clearance)),
+            tube=tuple(map(_clearance, campaign.tube_clearance)),
+        ),
+    )
 
 
-def _loop(loop: Loop) -> Data:
+def _loop(loop: Loop) -> LoopData:
+    return LoopData(
+        controller=loop.controller,
+        gains_are=loop.origin,
+        covered=loop.promise is not None,
+        tested=loop.tested,
+        control_rate=loop.problem.control_rate,
+        gains=_gains(loop),
+        caution=loop.caution or None,
+    )
+
+
+def _gains(loop: Loop) -> GainsData | None:
     gains, machine = loop.problem.gains, loop.problem.machine
-    data: Data = {"controller": loop.controller, "gains_are": loop.origin}
-    if loop.problem.control_rate is not None:
-        data["control_rate"] = loop.problem.control_rate
-    if gains is not None:
-        predictor = np.asarray(gains.predictor_gain)
-        data["gains"] = {
-            "bandwidth": gains.bandwidth,
-            "adaptation_rate": gains.adaptation_rate,
-            "sample_time": gains.sample_time,
-            "projection_radius": gains.projection_radius,
-            "predictor_gain": predictor.tolist(),
-        }
     if machine is not None:
-        data["gains"] = {
-            "bandwidth": _finite(machine.bandwidth),
-            "adaptation_rate": None,
-            "sample_time": machine.sample_time,
-            "delay": machine.delay,
-            "feedback_time": machine.feedback_time,
-            "projection_radius": _finite(machine.radius),
-            "predictor_gain": None,
-        }
-    if loop.caution:
-        data["caution"] = loop.caution
-    return data | {"covered": loop.promise is not None, "tested": loop.tested}
+        return MachineGainsData(
+            bandwidth=_finite(machine.bandwidth),
+            adaptation_rate=None,
+            sample_time=machine.sample_time,
+            delay=machine.delay,
+            feedback_time=machine.feedback_time,
+            projection_radius=_finite(machine.radius),
+            predictor_gain=None,
+        )
+    if gains is None:
+        return None
+    return GainsData(
+        bandwidth=gains.bandwidth,
+        adaptation_rate=gains.adaptation_rate,
+        sample_time=gains.sample_time,
+        projection_radius=gains.projection_radius,
+        predictor_gain=np.asarray(gains.predictor_gain).tolist(),
+    )
 
 
-def _drawn(item: Drawn) -> Data:
-    return {
-        **_loop(item.loop),
-        **_comparison(item.comparison),
-        "obstacles": [_clearance(found) for found in item.clearance],
-    }
+def _drawn(item: Drawn) -> DrawnData:
+    return DrawnData(
+        loop=_loop(item.loop),
+        comparison=_comparison(item.comparison),
+        obstacles=tuple(map(_clearance, item.clearance)),
+    )
 
 
-def _attack(item: Attack, setting: Setting) -> Data:
-    data = _loop(item.loop) | {"largest_distance_over_dbar": _finite(item.greatest / setting.reach)}
-    if item.sample is not None and item.comparison is not None:
-        data["random"] = {"asked": item.sample.asked, **_comparison(item.comparison)}
-    if item.case is not None and item.worst_comparison is not None:
-        member = item.case.member
-        data["adversary"] = {
-            **_comparison(item.worst_comparison),
-            "start": item.case.start.tolist(),
-            "h": {
-                "amplitude": member.amplitude.tolist(),
-                "frequency": member.frequency.tolist(),
-                "wave": (member.wave @ setting.S).tolist(),
-                "phase": member.phase.tolist(),
-                "push": member.push,
-            },
-        }
-        if member.beside is not None:
-            beside = member.beside._asdict().items()
-            data["adversary"]["beside"] = {name: part[0].tolist() for name, part in beside if name != "most"}
-    return data
+def _attack(item: Attack, setting: Setting) -> AttackData:
+    return AttackData(
+        loop=_loop(item.loop),
+        largest_distance_over_dbar=_finite(item.greatest / setting.reach),
+        random=_random(item),
+        adversary=_adversary(item, setting),
+    )
 
 
-def _comparison(found: Comparison) -> Data:
-    data: Data = {
-        "runs": found.count,
-        "left_the_tube": len(found.outside),
-        "first_outside": list(found.outside[:20]),
-        "first_exit": None if found.first_exit is None else _run_at(*found.first_exit),
-        "no_result": len(found.unreliable),
-        "unresolved": [_run_at(lane, t) for lane, t in found.unresolved[:20]],
-        "stopped": [
-            {"run": lane, "t": _finite(t), "reason": reason} for lane, t, reason in found.failures[:20]
-        ],
-        "worst": {name: _use(use) for name, use in found.uses.items()},
-        "violations": [
-            {
-                "bound_of": item.name,
-                "run": item.lane,
-                "t": _finite(item.time),
-                "value": _finite(item.value),
-                "bound": item.bound,
-            }
+def _random(item: Attack) -> RandomData | None:
+    if item.sample is None or item.comparison is None:
+        return None
+    return RandomData(asked=item.sample.asked, comparison=_comparison(item.comparison))
+
+
+def _adversary(item: Attack, setting: Setting) -> AdversaryData | None:
+    if item.case is None or item.worst_comparison is None:
+        return None
+    member = item.case.member
+    beside = None if member.beside is None else member.beside._asdict()
+    return AdversaryData(
+        comparison=_comparison(item.worst_comparison),
+        start=item.case.start.tolist(),
+        h=WaveData(
+            amplitude=member.amplitude.tolist(),
+            frequency=member.frequency.tolist(),
+            wave=(member.wave @ setting.S).tolist(),
+            phase=member.phase.tolist(),
+            push=member.push,
+        ),
+        beside=None
+        if beside is None
+        else {name: part[0].tolist() for name, part in beside.items() if name != "most"},
+    )
+
+
+def _comparison(found: Comparison) -> ComparisonData:
+    return ComparisonData(
+        runs=found.count,
+        left_the_tube=len(found.outside),
+        first_outside=found.outside[:_LISTED],
+        first_exit=None if found.first_exit is None else _run_at(*found.first_exit),
+        no_result=len(found.unreliable),
+        unresolved=tuple(_run_at(lane, t) for lane, t in found.unresolved[:_LISTED]),
+        stopped=tuple(
+            StoppedData(run=lane, t=_finite(t), reason=reason) for lane, t, reason in found.failures[:_LISTED]
+        ),
+        worst={name: _use(use) for name, use in found.uses.items()},
+        violations=tuple(
+            ViolationData(
+                bound_of=item.name,
+                run=item.lane,
+                t=_finite(item.time),
+                value=_finite(item.value),
+                bound=item.bound,
+            )
             for item in found.violations
-        ],
-        "settled": found.settled,
-        "final_deviation": None if found.final is None else _finite(found.final),
-        "error_estimate": found.error,
-    }
-    return data | ({"inputs": to_json(found.inputs)} if found.inputs else {})
+        ),
+        settled=found.settled,
+        final_deviation=None if found.final is None else _finite(found.final),
+        error_estimate=found.error,
+        inputs=found.inputs,
+    )
 
 
-def _run_at(lane: int, t: float) -> Data:
-    return {"run": lane, "t": _finite(t)}
+def _run_at(lane: int, t: float) -> RunAt:
+    return RunAt(run=lane, t=_finite(t))
 
 
-def _use(use: Use) -> Mapping[str, Any]:
+def _use(use: Use) -> UseData:
     share = use.share
-    return {
-        "value": _finite(use.value),
-        "bound": use.bound,
-        "share": None if share is None else _finite(share),
-        "run": use.lane,
-        "t": _finite(use.time),
-    }
+    return UseData(
+        value=_finite(use.value),
+        bound=use.bound,
+        share=None if share is None else _finite(share),
+        run=use.lane,
+        t=_finite(use.time),
+    )
 
 
-def _clearance(item: Clearance) -> Data:
-    return {
-        "obstacle": item.obstacle,
-        "clearance": _finite(item.value),
-        "t": item.time,
-        "collides": item.collides,
-    }
+def _clearance(item: Clearance) -> ClearanceData:
+    return ClearanceData(
+        obstacle=item.obstacle,
+        clearance=_finite(item.value),
+        t=item.time,
+        collides=item.collides,
+    )
 
 
 def _finite(value: float) -> float | None:
