@@ -29,6 +29,11 @@ def said(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *w
         (("certify", "a.yaml", "b.yaml"), "one specification at a time"),
         (("certify", "a.yaml", "--rate", "1"), "tubecert synth --rate"),
         (("certify", "-"), "nothing is read from stdin"),
+        (("certify", "a.yaml", "--conditions", "D"), "'--conditions': 'D' is not one of"),
+        (("synth", "a.yaml", "--degree", "3.5"), "'--degree': it is not a whole number"),
+        (("synth", "a.yaml", "--degree", "-2"), "'--degree': it must be at least 0"),
+        (("init", "plant"), "tubecert init plant.yaml"),
+        (("recheck", "README.md"), "not JSON"),
     ],
 )
 def test_a_command_line_that_means_something_else(

@@ -367,7 +367,7 @@ def test_what_powers_multiply_to_is_bounded_for_every_sign() -> None:
 
 def test_a_divisor_that_is_zero_is_no_constant_to_forget() -> None:
     for text in ("1/0", "x/0", "0/0", "0**-1", "x/(y - y)"):
-        assert refusal(text).message == "division by zero"
+        assert refusal(text).message.startswith("division by zero")
 
 
 @pytest.mark.parametrize("word", sorted(ELSEWHERE))

@@ -131,6 +131,12 @@ def test_what_is_left_is_estimated_for_the_phase_from_what_was_done_in_it():
     assert [step.left for step in found] == [None, 30.0, None, 30.0, None]
 
 
+def test_nothing_is_promised_of_gains():
+    steps = [(i, Step(phase=Phase.CERTIFICATION, done=i, of=9)) for i in range(3)]
+    found = told([*steps, (4, Step(phase=Phase.GAINS, name="distance", done=3, of=9))])
+    assert [step.left for step in found] == [None, 8.0, 7.0, None]
+
+
 def test_what_has_no_end_has_no_time_left():
     steps = [(i, Step(phase=Phase.DESIGN, done=i)) for i in range(3)]
     assert [step.left for step in told(steps)] == [None, None, None]

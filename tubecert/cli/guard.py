@@ -61,7 +61,10 @@ def refuse_usage(error: Any) -> int:
     text = StringIO()
     error.show(file=text)
     hint = usage_hint(error, sys.argv[1:])
-    _tell_as_is(printable_lines(text.getvalue() + hint).rstrip("\n"))
+    said = text.getvalue()
+    for jargon, plain in _PLAIN:
+        said = said.replace(jargon, plain)
+    _tell_as_is(printable_lines(said + hint).rstrip("\n"))
     return int(error.exit_code)
 
 
@@ -77,6 +80,15 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
         return "  one specification at a time; tubecert check takes several, and folders\n"
     return ""
 
+
+_PLAIN: Final = (
+    ("Value error, ", ""),
+    ("Input should be a valid integer, unable to parse string as an integer", "it is not a whole number"),
+    ("Input should be greater than or equal to", "it must be at least"),
+    ("Input should be less than or equal to", "it must be at most"),
+    ("Input should be", "it must be"),
+)
+"""What a library says of a value, and what is said here."""
 
 _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(

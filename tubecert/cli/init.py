@@ -20,6 +20,8 @@ _BESIDE: Final[Mapping[str, tuple[str, ...]]] = {"csv": ("plan.csv",)}
 
 def run(template: str, target: str | None, *, quiet: bool) -> None:
     """Write a template to a file that does not exist yet (`-`: to stdout); raises `TargetError`."""
+    if target is not None and target != certificate.STDOUT and not Path(target).suffix:
+        raise refused(f"{target} has no suffix", f"write tubecert init {target}.yaml")
     text = _text(f"{template}.yaml")
     if target == certificate.STDOUT:
         write_stdout(text)

@@ -82,7 +82,11 @@ def _check_foreign(text: str, word: str) -> None:
     width = max(1, len(word))
     if word.lower().lstrip("+-.") in _NOT_FINITE:
         raise ExpressionError(
-            f"{word} is not a finite number", offset=start, width=width, kind="value", help="write a number"
+            f"{word} is not a finite number",
+            offset=start,
+            width=width,
+            kind="value",
+            help="write a number: sets have ends, and a horizon without one is left out",
         )
     if word.lower().lstrip("+-.") in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"
@@ -115,8 +119,8 @@ def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, E
         return parse(text, symbols=symbols), factor
     except ExpressionError as error:
         if error.kind == "symbol":
-            names = f"known: {', '.join(sorted(symbols)[:20])}" if symbols else "there are none"
-            error.help = f"a number has no unit but deg, and may use parameters only ({names})"
+            names = f"; it may use {', '.join(sorted(symbols)[:20])}" if symbols else ""
+            error.help = f"write a number such as 0.1, without a unit (only deg is one){names}"
         raise
 
 

@@ -122,10 +122,17 @@ class _Lowering:
             try:
                 self.values[node] = self._lower(node)
             except ZeroDivisionError:
-                raise self._error(node, "division by zero", kind="value") from None
+                raise self._error(node, *self._nothing_below(node), kind="value") from None
             self._bound(node)
         self.obligations.sort(key=lambda item: (item.offset, item.width))
         return Parsed(expression=self.values[root], obligations=tuple(self.obligations))
+
+    def _nothing_below(self, node: ast.expr) -> tuple[str, str]:
+        """That there is a division by zero, and what is zero; names are constants, or they would not be."""
+        below = node.right if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) else None
+        if below is None or not any(isinstance(each, ast.Name) for each in ast.walk(below)):
+            return "division by zero", ""
+        return f"division by zero: {self._source(below)[:60]} is 0", "give its parameters other values"
 
     def _operands(self, node: ast.expr) -> list[ast.expr]:
         match node:
@@ -210,7 +217,7 @@ class _Lowering:
             raise self._error(
                 node.right,
                 f"the exponent {words} is not an integer",
-                help="exponents are integers; sqrt and exp are functions",
+                help="exponents are integers; sqrt and exp are functions: a**x is exp(x*log(a))",
             )
         if abs(value.fraction) > MAX_EXPONENT:
             raise self._error(

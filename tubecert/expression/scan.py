@@ -111,8 +111,10 @@ _LOOKALIKES = {
     "\u2212": "-", "\u2010": "-", "\u2011": "-", "\u2012": "-", "\u2013": "-", "\u2014": "-", "\ufe63": "-",
     "\uff0d": "-", "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u2217": "*", "\u2219": "*", "\u2022": "*",
     "\u00f7": "/", "\u2215": "/", "\u2044": "/", "\u00b2": "**2", "\u00b3": "**3", "\u2074": "**4",
-    "\u221a": "sqrt(...)", "\u03c0": "pi", "\u2018": "no quotes", "\u2019": "no quotes", "\u00a0": "a space",
+    "\u221a": "sqrt(...)", "\u03c0": "pi", "\u00a0": "a space",
     "\u202f": "a space", "\u2009": "a space", "\uff08": "(", "\uff09": ")", "\uff0c": ",",
+    **dict.fromkeys("\u2018\u2019\u201c\u201d\u201e", "straight quotes around an expression, and none in it"),
+    "\u00b0": "30 deg in values and sets, 30*pi/180 in expressions",
 }  # fmt: skip
 
 
@@ -250,7 +252,7 @@ class _Walk:
         """Takes one token."""
         called = self.last is not None and self.last.kind == "name" and self.last.text in FUNCTIONS
         if called and token.text != "(":
-            raise self._uncalled()
+            raise self._uncalled(token)
         if token.kind == "name":
             self._known(token)
         if token.kind != "operator" or token.text == "(":
@@ -266,7 +268,7 @@ class _Walk:
         if self.last and self.operand_due:
             raise ExpressionError("the expression ends where a value is expected", offset=len(text.rstrip()))
         if self.open:
-            raise self.open[-1][0].error("this parenthesis is never closed", _QUOTE)
+            raise self.open[-1][0].error("this parenthesis is never closed", f"close it; {_QUOTE}")
 
     def _operand(self, token: _Token, called: bool) -> None:
         if token.text == "(":
@@ -286,11 +288,13 @@ class _Walk:
             self.signs = 0
         if token.text == ")":
             if not self.open:
-                raise token.error("this parenthesis was never opened", _QUOTE)
+                raise token.error("this parenthesis was never opened", f"remove it, or open one; {_QUOTE}")
             self.open.pop()
         elif token.text == "," and not (self.open and self.open[-1][1]):
             raise token.error(
-                "an entry is one expression", "a comma separates the arguments of a function only"
+                "an entry is one expression",
+                "a comma separates the arguments of a function only; decimals have a point, and every expression "
+                "has quotes of its own",
             )
 
     def _sign(self, token: _Token) -> None:
@@ -336,10 +340,13 @@ class _Walk:
             + f"names: {shown}; functions: {' '.join(functions)}; a constant of your own goes into system.parameters"
         )
 
-    def _uncalled(self) -> ExpressionError:
+    def _uncalled(self, due: _Token | None = None) -> ExpressionError:
         assert self.last is not None
         name = self.last.text
-        return self.last.error(f"{name} needs an argument in parentheses", f"write {name}(...)")
+        power = "; its square is {name}(...)**2" if due is not None and due.text == "**" else ""
+        return self.last.error(
+            f"{name} needs an argument in parentheses", f"write {name}(...){power.format(name=name)}"
+        )
 
     def _juxtaposed(self, token: _Token) -> ExpressionError:
         assert self.last is not None

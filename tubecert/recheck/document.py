@@ -209,6 +209,12 @@ class Members:
         return None if self[key].value is None else reads(self[key])
 
 
+def _given_instead(file: str) -> str:
+    if file.endswith((".yaml", ".yml")):
+        return "give a file that tubecert certify wrote; a specification is certified first"
+    return "give a file that tubecert certify wrote"
+
+
 def read(text: str, file: str) -> Node:
     """The document, its format checked; numbers are exact."""
     if len(text) > MOST_BYTES:
@@ -222,7 +228,7 @@ def read(text: str, file: str) -> Node:
     except json.JSONDecodeError as error:
         at = Location(file=file, line=error.lineno, column=error.colno)
         raise wrong(
-            "TC600", f"not JSON: {error.msg}", "give a file that tubecert certify wrote", at
+            "TC600", f"this is no certificate, for it is not JSON ({error.msg})", _given_instead(file), at
         ) from None
     except ValueError as error:
         raise wrong("TC600", f"{file}: {error}", "write the certificate again") from None

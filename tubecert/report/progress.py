@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tubecert.report.terminal import Terminal
 
 EVERY: Final = 10.0  # s between lines of a log
+_UNLIKE: Final = (Phase.GAINS,)  # these take longer than what was counted before them
 Clock = Callable[[], float]
 
 
@@ -43,7 +44,8 @@ class Timed:
         if step.of != self.whole or step.done < self.before:
             self.whole, self.before, self.since = step.of, step.done, now
         fresh, left = step.done - self.before, None
-        if step.of is not None and fresh > 0 and step.done < step.of:
+        alike = step.phase not in _UNLIKE
+        if step.of is not None and fresh > 0 and step.done < step.of and alike:
             left = (now - self.since) / fresh * (step.of - step.done)
         self.shown(replace(step, seconds=now - self.began, left=left))
 

@@ -29,7 +29,10 @@ from tubecert.spec import codes
 from tubecert.spec.types import Spec
 
 _KIND: Final = Kind(
-    most=10_000_000, unreadable=codes.UNREADABLE, too_large=codes.LIMIT, help="give a file of coefficients"
+    most=10_000_000,
+    unreadable=codes.UNREADABLE,
+    too_large=codes.LIMIT,
+    help="give a metric file (tubecert synth writes them), or coefficients as CSV, .npz or .mat",
 )
 _CLOSE: Final = Fraction(1, 10**9)  # of the largest entry: what rounding may make of symmetry
 _MOST: Final = 10_000  # numbers in a file

@@ -7,10 +7,11 @@ an explicit stack, so that depth is checked before it can hurt.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
@@ -185,6 +186,9 @@ def _syntax(source: Source, error: yaml.YAMLError, language: str) -> Finding:
     problem = getattr(error, "problem", None) or getattr(error, "reason", None) or str(error)
     context = getattr(error, "context", None)
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    began = getattr(error, "context_mark", None)
+    if began is not None and any(what in str(context) for what in _BEGUN):
+        mark = began  # where it ends, or should, says nothing
     words = " ".join(str(problem).split())[:200]
     location = source.location(_mark(mark))
     tab = source.text[source.index(_mark(mark)) :].startswith("\t")
@@ -193,11 +197,22 @@ def _syntax(source: Source, error: yaml.YAMLError, language: str) -> Finding:
         message=f"this is not {language}: {words}"
         + (f" ({' '.join(str(context).split())[:100]})" if context else ""),
         location=location,
-        help="indent with spaces, not tabs" if tab else _remedy(words),
+        help="indent with spaces, not tabs" if tab else _remedy(words, location.source),
     )
 
 
-def _remedy(problem: str) -> str:
+_BEGUN: Final = ("simple key", "quoted scalar")
+_ASSIGNED = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)")
+_GLUED = re.compile(r"\s*([A-Za-z_]\w*):(\S.*)")
+
+
+def _remedy(problem: str, line: str) -> str:
+    if slip := _ASSIGNED.fullmatch(line) or _GLUED.fullmatch(line):
+        return f"write {slip[1]}: {slip[2].strip()[:40]}, with a colon and a blank"
+    if "quoted" in problem or "end of stream" in problem:
+        return "close the quotes that open here"
+    if "expected key" in problem:
+        return "keys of one section begin in the same column: indent this line as the others"
     if "mapping values" in problem:
         return "one key per line; quote text that contains ': '"
     if "cannot start any token" in problem:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import ONE, ZERO
+from tubecert.expression import ONE, ZERO, number_text
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import Names
@@ -113,7 +113,7 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     if delay is not None and sample_time is not None and delay > sample_time:
         entries["delay"].fail(
             codes.RANGE,
-            "hardware.delay is longer than the sample time",
+            f"hardware.delay is {number_text(delay)} s, longer than the sample time of {number_text(sample_time)} s",
             f"write `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep over hardware.rate, too), or less",
         )
     feedback = _positive(entries, "feedback_rate", names)

@@ -262,6 +262,7 @@ def _metric(field: Field | None, names: Names) -> tuple[Metric | None, Synthesis
 
 
 def _check_version(field: Field | None) -> None:
-    version = field.number({}) if field else None
-    if field is not None and version is not None and version != VERSION:
-        field.fail(codes.RANGE, f"version {version} of the format is unknown", f"write tubecert: {VERSION}")
+    version = None if field is None else field.text("a number")
+    if field is not None and version is not None and version.strip() != str(VERSION):
+        shown = version[:20] or "nothing"
+        field.fail(codes.RANGE, f"version {shown} of the format is unknown", f"write tubecert: {VERSION}")

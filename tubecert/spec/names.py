@@ -24,6 +24,7 @@ from tubecert.expression import (
 )
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
+from tubecert.spec.instead import glued
 from tubecert.spec.reader import Field, Scope
 
 TIME: Final = "t"
@@ -225,7 +226,10 @@ def _read_parameters(
     ranges: dict[str, Interval] = {}
     if field is None:
         return values, ranges
-    for key, node in field.pairs("of names to numbers") or []:
+    pairs = field.pairs("of names to numbers") or []
+    later = [key.text for key, _ in pairs]
+    for key, node in pairs:
+        later.remove(key.text)
         entry = field.child(key, node)
         name = _name(key.text, _key_field(field, key), "parameter", taken)
         if isinstance(entry.node, ListNode):
@@ -233,7 +237,7 @@ def _read_parameters(
             if name is not None:
                 ranges[name] = ends
             continue
-        value = None if _is_range(entry) else entry.constant(values)
+        value = None if _is_range(entry) or _is_early(entry, later) else entry.constant(values)
         if name is not None:
             values[name] = (
                 ONE if value is None else value
@@ -269,6 +273,16 @@ def _is_range(field: Field) -> bool:
     help = "write the nominal value, or [lower, upper] for a parameter of f or B that lies anywhere between"
     field.fail(codes.NUMBER, message, f"{help}; a difference may stand in parentheses" if found[1] else help)
     return True
+
+
+def _is_early(field: Field, later: Collection[str]) -> bool:
+    """Reports a parameter that uses one from further down."""
+    text = field.node.text if isinstance(field.node, Scalar) else ""
+    early = next((word for word in re.findall(r"[A-Za-z]\w*", text) if word in later), None)
+    if early is not None:
+        message = f"{early} is defined further down; a parameter may use those above it"
+        field.fail(codes.UNKNOWN_SYMBOL, message, f"move {early} up")
+    return early is not None
 
 
 def _rises(first: str, second: str) -> bool:
@@ -312,7 +326,8 @@ def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]
         unit = field.child(key, node).text("a unit")
         if key.text not in (*names.states, *names.inputs):
             message = f"{key.text[:60]} is neither a state nor an input"
-            help = suggestion(key.text, [*names.states, *names.inputs])
+            known = [*names.states, *names.inputs]
+            help = glued(key.text, known) or suggestion(key.text, known)
             _key_field(field, key).fail(codes.UNKNOWN_KEY, message, help)
         elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
             field.child(key, node).fail(

@@ -6,6 +6,7 @@ problem.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -21,7 +22,6 @@ from tubecert.expression import (
     Side,
     full_text,
     longest_text,
-    near,
     parse,
     parse_constant,
     parse_number,
@@ -31,6 +31,7 @@ from tubecert.expression import (
 from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
+from tubecert.spec.instead import EXAMPLES, OTHER_WORDS, glued, of_key, of_value
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
 
@@ -38,85 +39,6 @@ Parameters = Mapping[str, Expression]
 T = TypeVar("T")
 
 _GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
-
-_OTHER_KEYS = {
-    **dict.fromkeys(
-        ("saturation", "saturations", "input_limits", "u_max", "u_min", "actuators"),
-        "limits of the inputs are the key limits: {NAME: [low, high]}",
-    ),
-    **dict.fromkeys(("x0", "start", "initial", "initial_condition"), "write initial_state: {at: [...]}"),
-    **dict.fromkeys(("reference", "path", "setpoint", "desired"), "the plan is the key trajectory"),
-    **dict.fromkeys(
-        ("disturbances", "wind"),
-        "what acts beside the inputs is the key disturbance, what acts through them is uncertainty",
-    ),
-    **dict.fromkeys(
-        ("noise", "delay", "sensors", "sample_time", "sampling", "computer", "machine"),
-        "the machine is the key hardware: {rate: 500, delay: 0.001, noise: 0.001}",
-    ),
-    **dict.fromkeys(
-        ("constraints", "domain", "bounds_x"), "the box that the tube must stay in is the key safe_set"
-    ),
-    **dict.fromkeys(
-        ("rho", "radius", "width"),
-        "how wide the tube is follows from epsilon and rho_a, or is given by state: half_widths: {NAME: 0.1}",
-    ),
-    **dict.fromkeys(("W", "dual", "matrix"), "the inverse of the metric is the key dual_metric"),
-    "M": "the metric is given by its inverse, dual_metric",
-    **dict.fromkeys(("lambda", "lam", "decay"), "the contraction rate is the key rate, in 1/s"),
-    **dict.fromkeys(("synthesize", "synthesis", "synth"), "to have a metric found write synthesise: {}"),
-    **dict.fromkeys(("g", "G"), "the matrix of the inputs is the key B"),
-    **dict.fromkeys(("title", "system_name"), "the name of the specification is the key name"),
-    **dict.fromkeys(("version", "format"), "the version of the format is the key tubecert: 1"),
-    **dict.fromkeys(("frequency", "freq", "hz", "Hz"), "the sample rate is the key rate, in Hz"),
-    **dict.fromkeys(
-        ("Gamma", "omega", "bandwidth", "adaptation_rate", "gains"),
-        "gains are found; certify --bandwidth W --adaptation-rate G proves some of your own",
-    ),
-    **dict.fromkeys(("circle", "sphere", "ball"), "a round obstacle is a disc: {center: [...], radius: ...}"),
-    **dict.fromkeys(("d", "delta", "matched"), "the uncertainty is the key h, an expression per input"),
-    "file": "the file of a metric is given by --metric FILE, that of a plan by kind: csv",
-}
-"""Keys that other formats have, and what there is of them here."""
-
-_PLACES = {
-    **dict.fromkeys(("epsilon", "rho_a", "half_widths"), "tube"),
-    **dict.fromkeys(("states", "inputs", "parameters", "definitions", "f", "B"), "system"),
-    "dual_metric": "metric",
-    "h": "uncertainty",
-    "horizon": "trajectory",
-}
-"""Where keys belong that are often written elsewhere."""
-
-_MEANT = {
-    "W": ("dual_metric",),
-    "lambda": ("rate",),
-    "g": ("B",),
-    "title": ("name",),
-    "version": ("tubecert",),
-    **dict.fromkeys(("synthesize", "synthesis", "synth", "file"), ("dual_metric", "rate")),
-}
-"""Required keys that a key of another format stands for: they are not called missing as well."""
-
-_OTHER_WORDS = {
-    **dict.fromkeys(("regulation", "setpoint", "point", "constant", "hover"), "equilibrium"),
-    **dict.fromkeys(("tracking", "trajectory", "expression", "function", "analytic"), "expressions"),
-    **dict.fromkeys(("table", "file", "spline", "waypoints", "samples"), "csv"),
-    **dict.fromkeys(("optimal", "planner", "plan", "ddp", "lqr"), "ilqr"),
-    **dict.fromkeys(("proven", "proved", "yes", "ok"), "certified"),
-}
-"""Words that other formats have for a choice."""
-
-_EXAMPLES = {
-    "horizon": "5, in s",
-    "rate": "1, in 1/s",
-    "file": "plan.csv",
-    "tubecert": "1",
-    "target": "[...], one number per state",
-    "at": "[...], one number per state",
-    "input": "[...], one number per input",
-}
-"""Values of keys that are missing, where that says more than dots."""
 
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
@@ -246,7 +168,7 @@ class Field:
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
             message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
-            help = "add " + ", ".join(f"{key}: {_EXAMPLES.get(key, '...')}" for key in missing)
+            help = "add " + ", ".join(f"{key}: {EXAMPLES.get(key, '...')}" for key in missing)
             if self.key is None:
                 self.fail(codes.MISSING_KEY, message, help)
             else:
@@ -277,7 +199,7 @@ class Field:
         """The items of a list; another number of them than `count` is a finding."""
         if not isinstance(self.node, ListNode):
             self._wrong_type(
-                f"a list of {f'{count} ' if count is not None else ''}{what}", help or self._listed(count)
+                f"a list of {what if count is None else _counted(count, what)}", help or self._listed(count)
             )
             return None
         if count is not None and len(self.node.items) != count:
@@ -304,7 +226,7 @@ class Field:
                 codes.NOT_YET, f"{self.path}: {word} is not yet supported", f"use {' or '.join(choices)}"
             )
         else:
-            other = _OTHER_WORDS.get(word.lower())
+            other = OTHER_WORDS.get(word.lower())
             meant = f"here it is {other}; " if other in choices else ""
             help = meant + suggestion(word, choices, what="choices")
             self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
@@ -373,7 +295,11 @@ class Field:
     def term(self, scope: Scope) -> Term | None:
         """An expression."""
         if not isinstance(self.node, Scalar):
-            self._wrong_type("an expression", "put the expression in quotes")
+            row = isinstance(self.node, ListNode) and all(isinstance(each, Scalar) for each in self._nodes)
+            help = (
+                "write a row of A x as one expression: 2*x1 - x2" if row else "put the expression in quotes"
+            )
+            self._wrong_type("an expression", help)
             return None
         try:
             parsed = scope.parse(self.node.text)
@@ -411,7 +337,10 @@ class Field:
         if isinstance(self.node, ListNode) and all(isinstance(node, Scalar) for node in self.node.items):
             self.fail(codes.WRONG_SHAPE, f"{self.path} must be a list of rows", f"write {shape}")
             return None
-        found = self.items(rows, "rows", f"write {shape}")
+        help = f"write {shape}"
+        if rows != columns == len(self._nodes):
+            help += "; these rows may be its columns"
+        found = self.items(rows, "rows", help)
         return _all([row.terms(columns, scope) for row in found or []], rows)
 
     def inside(self, offset: int, width: int) -> Location:
@@ -441,16 +370,27 @@ class Field:
         if isinstance(self.node, MappingNode):
             return "write the values only, in brackets and in their order: [..., ...]"
         text = self.node.text.strip() if isinstance(self.node, Scalar) else ""
+        if text.startswith("(") and text.endswith(")"):
+            text = text[1:-1].strip()
+        if count == 2 and (size := re.fullmatch(r"(?:\+-|\+/-|±)\s*([0-9.]+)", text)):
+            return f"write [-{size[1]}, {size[1]}]"
         plain = text and len(text) <= 40 and not set(text) & set("[]{}\n;")
         if not plain or (count is not None and text.count(",") + 1 != count):
             return f"write a list in brackets: [{', '.join(['...'] * min(count or 2, 8))}]"
         return f'write ["{text}"]' if "(" in text else f"write [{text}]"
 
     def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
-        if found == 2 * wanted > 2 and what == "numbers":
+        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
+        if any(";" in text for text in texts):
+            help = "entries are separated by commas: [..., ...]"
+        elif found > wanted and what == "numbers" and all(text.lstrip("+-").isdecimal() for text in texts):
             help = help or "if a comma was meant as a decimal point, write the point"
         entries = "1 entry" if found == 1 else f"{found} entries"
-        self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {wanted} {what}", help)
+        self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help)
+
+    @property
+    def _nodes(self) -> tuple[Node, ...]:
+        return self.node.items if isinstance(self.node, ListNode) else ()
 
     def _unknown(self, key: Scalar, known: Sequence[str]) -> list[str]:
         """Reports an unknown key; returns the known ones that it may stand for."""
@@ -461,18 +401,12 @@ class Field:
         message = f"unknown key {shown}" + (f" in {self.path}" if self.path else "")
         if not key.text.isascii():
             message += " (it contains letters outside ASCII)"
-        name, colon, value = key.text.partition(":")
-        if colon and name in known:  # {x:1}, which YAML reads as one word
-            self._at(
-                codes.UNKNOWN_KEY, key, message, f"write `{name}: {value[:40]}`, with a blank after the colon"
-            )
-            return [name]
-        close = near(key.text, known)
-        advice = _OTHER_KEYS.get(key.text) or suggestion(key.text, known, what="known keys")
-        if key.text in _PLACES and not close:
-            advice = f"it belongs to {_PLACES[key.text]}"
+        if apart := glued(key.text, known):
+            self._at(codes.UNKNOWN_KEY, key, message, apart)
+            return [key.text.partition(":")[0]]
+        advice, meant = of_key(key.text, known)
         self._at(codes.UNKNOWN_KEY, key, message, advice)
-        return list(_MEANT.get(key.text, ())) if key.text in _OTHER_KEYS else close
+        return meant
 
     def _wrong_type(self, wanted: str, help: str = "") -> None:
         if isinstance(self.node, BrokenNode):
@@ -480,14 +414,21 @@ class Field:
         found = "a list" if isinstance(self.node, ListNode) else "a mapping"
         if isinstance(self.node, Scalar):
             found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
+        instead = of_value(self.path, self.node.text if isinstance(self.node, Scalar) else "")
         name = self.path or self.reader.document
-        self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", help)
+        self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", instead or help)
 
 
 def root_field(reader: Reader, node: Node | None) -> Field:
     """The whole document; an empty file is an empty text."""
     start = Mark(line=0, column=0)
     return Field(reader=reader, path="", node=node or Scalar(start=start, end=start, text=""))
+
+
+def _counted(count: int, what: str) -> str:
+    """1 expression, one per input; 2 expressions, one per input."""
+    first, comma, rest = what.partition(",")
+    return f"{count} {first.removesuffix('s') if count == 1 and first != 'entries' else first}{comma}{rest}"
 
 
 def _all(values: Sequence[T | None], count: int) -> tuple[T, ...] | None:

@@ -27,8 +27,11 @@ def read_name(field: Field) -> str | None:
     name = field.text("a name")
     if name is None or _SLUG.fullmatch(name):
         return name
+    slug = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:64]
     field.fail(
-        codes.NAME, f"{name[:60]!r} cannot be a name", "use ASCII letters, digits, _ and -, at most 64"
+        codes.NAME,
+        f"{name[:60]!r} cannot be a name",
+        "use ASCII letters, digits, _ and -, at most 64" + (f": {slug}" if slug else ""),
     )
     return None
 

@@ -1,0 +1,46 @@
+"""What users write by mistake, and what they are told: the table is `mistakes.MISTAKES`."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from mistakes import GOOD, MISTAKES
+
+from tubecert.errors import TubecertError
+from tubecert.findings import Finding
+from tubecert.pipeline import inspect
+from tubecert.spec import load_text
+
+JARGON = re.compile(r"value error|pydantic|NoneType|Traceback|instance of|expected type", re.IGNORECASE)
+
+
+def found(text: str) -> list[Finding]:
+    try:
+        spec = load_text(text, "spec.yaml")
+    except TubecertError as error:
+        return list(error.findings)
+    return inspect(spec)
+
+
+def test_without_a_mistake_nothing_is_said() -> None:
+    assert found(GOOD) == []
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1].strip()[:40] or "left out")
+def test_a_mistake_is_located_and_what_to_write_is_said(mistake: tuple[str, str, str, int, int, str]) -> None:
+    old, new, code, line, column, words = mistake
+    assert old in GOOD
+    findings = found(GOOD.replace(old, new, 1))
+    said = [f"{item.code} {item.location} {item.message} / {item.help}" for item in findings]
+    assert any(
+        item.location is not None
+        and (item.code, item.location.line, item.location.column) == (code, line, column)
+        and words in f"{item.message} / {item.help}"
+        for item in findings
+    ), "\n".join(said)
+    assert not any(JARGON.search(text) for text in said)
+
+
+def test_there_are_many_of_them() -> None:
+    assert len({(old, new) for old, new, *_ in MISTAKES}) == len(MISTAKES) >= 300
