@@ -14,6 +14,7 @@ from rich.text import Text
 from tubecert.certificate import seal
 from tubecert.certificate.result import Certificate, Result
 from tubecert.findings import Finding, Location, Severity
+from tubecert.records import to_json
 from tubecert.report import console, findings
 from tubecert.report.numbers import down, end, exact, percent, short, up
 from tubecert.report.terminal import Terminal
@@ -196,7 +197,7 @@ def test_findings_are_printed_as_they_are_and_counted():
 
 
 def test_findings_as_data():
-    assert findings.as_data(finding()) == {
+    assert to_json(findings.as_data(finding())) == {
         "code": "TC109",
         "severity": "error",
         "message": "^ is not allowed",
@@ -205,7 +206,7 @@ def test_findings_as_data():
         "column": 5,
         "help": "write **",
     }
-    assert findings.as_data(Finding(code="TC100", message="no")) == {
+    assert to_json(findings.as_data(Finding(code="TC100", message="no"))) == {
         "code": "TC100",
         "severity": "error",
         "message": "no",

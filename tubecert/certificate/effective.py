@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -119,6 +120,15 @@ class Effective:
         found = self.data.get(name)
         return [_mapping(item) for item in found] if isinstance(found, list) else []
 
+    def at_rest(self, without: Collection[str]) -> str:
+        """The text of a specification at rest at 0, for where the plan is in a file that is elsewhere.
+
+        The sections `without` are left out, and so are the windows of the tube, which are those of a plan.
+        """
+        rest = {"kind": "equilibrium", "at": ["0"] * len(self.system.states)}
+        kept = {key: _timeless(key, value) for key, value in self.data.items() if key not in without}
+        return json.dumps(kept | {"trajectory": rest})
+
     @classmethod
     def of(cls, data: Mapping[str, Tree], path: str = "effective") -> Effective:
         """The views of canonical data; raises `FormError`."""
@@ -132,6 +142,10 @@ class Effective:
             disturbance=view.disturbance,
             obstacles=view.obstacles,
         )
+
+
+def _timeless(key: str, section: Tree) -> Tree:
+    return {name: value for name, value in section.items() if name != "windows"} if key == "tube" else section
 
 
 def _mapping(value: Tree) -> Mapping[str, Tree]:

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from tubecert.certificate.result import MetricData, SolverData
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
-from tubecert.records import to_json
+from tubecert.records import Json, to_json
 from tubecert.spec.metric_file import FORMAT
 
 
@@ -32,10 +31,9 @@ class MetricFile:
     solver: SolverData
     margin: Constant | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """What the file holds."""
-        data: dict[str, Any] = to_json(self)
-        return data
+        return to_json(self)
 
 
 def metric_file(

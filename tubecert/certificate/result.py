@@ -395,10 +395,9 @@ class Result:
         }
         return {key: pair for key, pair in found.items() if pair is not None}
 
-    def to_json(self) -> dict[str, Json]:
+    def to_json(self) -> Json:
         """What `result` holds."""
-        data: dict[str, Json] = to_json(self)
-        return data
+        return to_json(self)
 
     @classmethod
     def from_json(cls, data: Json) -> Result:

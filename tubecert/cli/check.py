@@ -16,6 +16,7 @@ from tubecert.findings import Finding, Severity
 from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json
 from tubecert.progress import Phase
+from tubecert.records import to_json
 from tubecert.report.findings import as_data, render, summary
 from tubecert.report.terminal import Terminal
 
@@ -172,7 +173,7 @@ def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> 
 
 
 def _as_json(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-    data = [as_data(item) for result in results for item in result.findings]
+    data = [to_json(as_data(item)) for result in results for item in result.findings]
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 

@@ -24,6 +24,7 @@ from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
 from tubecert.pipeline.width import Measure, measure_of
 from tubecert.printable import printable_json, visible
+from tubecert.records import to_json
 from tubecert.report import design as told
 from tubecert.report import progress
 from tubecert.report.terminal import Terminal
@@ -106,7 +107,7 @@ def run(given: Given, output: Output) -> ExitCode:
     if text is not None:
         certificate.write_text(target, text)
     written = None if text is None else visible(target)
-    data = printable_json(json.dumps(told.as_data(found), indent=1, ensure_ascii=False)) + "\n"
+    data = printable_json(json.dumps(to_json(told.as_data(found)), indent=1, ensure_ascii=False)) + "\n"
     present(
         output,
         told.summary(first, found),

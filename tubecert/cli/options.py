@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Annotated, Any, get_type_hints
@@ -80,12 +80,11 @@ class Output:
     debug: Debug = False
 
     @classmethod
-    def of(cls, context: typer.Context, values: Mapping[str, Any]) -> Output:
-        """The options given after the command (`values`) together with those given before it.
+    def of(cls, context: typer.Context, own: Output) -> Output:
+        """The options given after the command (`own`) together with those given before it.
 
         Raises a usage error for `-q` with `-v`.
         """
-        own = cls(**values)
         before = context.obj if isinstance(context.obj, cls) else cls()
         both = cls(
             **{item.name: getattr(own, item.name) or getattr(before, item.name) for item in fields(cls)}
@@ -103,7 +102,7 @@ def with_output(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def whole(context: typer.Context, version: bool, **values: Any) -> None:
-        how = Output.of(context, {name: values.pop(name) for name in shared})
+        how = Output.of(context, Output(**{name: values.pop(name) for name in shared}))
         command(context, **values, how=how)
 
     parameters = [parameter for name, parameter in own.parameters.items() if name != "how"]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.library.specification import File, Specification
-from tubecert.records import FormError
+from tubecert.records import FormError, Json
 from tubecert.report import gains as report_gains
 from tubecert.report.outline import widths
 from tubecert.report.page import Reason
@@ -289,7 +289,7 @@ def read(path: File) -> Certification:
         raise file.incomplete(source, str(error)) from error
 
 
-def certification_of(sealed: Mapping[str, Any], given: Specification | None = None) -> Certification:
+def certification_of(sealed: Json, given: Specification | None = None) -> Certification:
     """A sealed certificate as a value; raises `FormError`."""
     return Certification(certificate=Certificate.from_json(sealed), text=file.dump(sealed), given=given)
 

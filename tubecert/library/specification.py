@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
@@ -75,7 +76,7 @@ class Specification:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.specification(self.data)
+        return notebook.specification(Effective.of(self.data))
 
 
 Specifiable: TypeAlias = Specification | File | Data

@@ -431,7 +431,7 @@ def _solver(metric: VerifiedMetric) -> SolverData:
     )
 
 
-def _metric_data(metric: VerifiedMetric) -> dict[str, Json]:
+def _metric_data(metric: VerifiedMetric) -> Json:
     return {
         "rate": exact_json(metric.rate),
         "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any
 
 from tubecert.kept import keep, read_kept
 
@@ -16,7 +15,7 @@ KIND = "plans"
 Rows = tuple[tuple[str, ...], ...]  # decimals as text, row by row
 
 
-def key(content: Mapping[str, Any]) -> str:
+def key(content: Mapping[str, object]) -> str:
     """The name of a plan: a hash of everything that it follows from."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

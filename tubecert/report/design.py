@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -13,6 +14,7 @@ from tubecert.report.console import verdict_line
 from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
 from tubecert.report.numbers import exact, percent, up
+from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
@@ -66,17 +68,37 @@ def _stops(each: Attempt) -> str:
     return "" if each.size is not None or reason is None else sentence(reason)
 
 
-def as_data(found: Design) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttemptData:
+    """A size of the tube that was tried: its factor, and the id of the claim that stopped it."""
+
+    scale: str
+    verdict: Verdict
+    size: float | None
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignData:
+    """Every attempt, and the factor of the best."""
+
+    best: str | None
+    attempts: tuple[AttemptData, ...]
+
+
+def as_data(found: Design) -> DesignData:
     """Every attempt, for programs."""
-    return {
-        "best": None if found.best is None else str(found.best.scale),
-        "attempts": [
-            {
-                "scale": str(each.scale),
-                "verdict": str(each.result.verdict),
-                "size": each.size,
-                "reason": None if each.result.reason is None else each.result.reason.claim.tag,
-            }
-            for each in found.attempts
-        ],
-    }
+    return DesignData(
+        best=None if found.best is None else str(found.best.scale),
+        attempts=tuple(map(_attempt, found.attempts)),
+    )
+
+
+def _attempt(each: Attempt) -> AttemptData:
+    reason = each.result.reason
+    return AttemptData(
+        scale=str(each.scale),
+        verdict=each.result.verdict,
+        size=each.size,
+        reason=None if reason is None else reason.claim.tag,
+    )

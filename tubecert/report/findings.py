@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from rich.text import Text
 
@@ -15,15 +15,16 @@ _STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity
 def render(findings: Sequence[Finding], *, closing: str | None = None) -> list[Text]:
     """The findings in their order, then how many there are (or `closing`)."""
     lines = [_styled(finding) for finding in findings]
-    return [*lines, Text(_count(findings) if closing is None else closing, style="bold", **_AS_IS)]
+    return [*lines, _as_is(_count(findings) if closing is None else closing, "bold")]
 
 
-# Neither wrapped nor cut: places must stay clickable, and carets below what they point at.
-_AS_IS: dict[str, Any] = {"no_wrap": True, "overflow": "ignore"}
+def _as_is(text: str, style: str = "") -> Text:
+    """Neither wrapped nor cut: places must stay clickable, and carets below what they point at."""
+    return Text(text, style, no_wrap=True, overflow="ignore")
 
 
 def _styled(finding: Finding) -> Text:
-    text = Text(str(finding), **_AS_IS)
+    text = _as_is(str(finding))
     word = f"{finding.severity} {finding.code}"
     start = text.plain.find(word)
     text.stylize(_STYLES[finding.severity], start, start + len(word))
@@ -53,16 +54,28 @@ def summary(findings: Sequence[Finding], files: int) -> str:
     return f"{files} {noun} checked: {_count(findings)}"
 
 
-def as_data(finding: Finding) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FindingData:
     """A finding for programs; file, line and column only where it has a place."""
-    data: dict[str, Any] = {
-        "code": finding.code,
-        "severity": str(finding.severity),
-        "message": finding.message,
-    }
-    if finding.location is not None:
-        place = finding.location
-        data |= {"file": place.file, "line": place.line, "column": place.column}
-    if finding.help:
-        data["help"] = finding.help
-    return data
+
+    code: str
+    severity: Severity
+    message: str
+    file: str | None = None
+    line: int | None = None
+    column: int | None = None
+    help: str | None = None
+
+
+def as_data(finding: Finding) -> FindingData:
+    """A finding for programs."""
+    place = finding.location
+    return FindingData(
+        code=finding.code,
+        severity=finding.severity,
+        message=finding.message,
+        file=None if place is None else place.file,
+        line=None if place is None else place.line,
+        column=None if place is None else place.column,
+        help=finding.help or None,
+    )

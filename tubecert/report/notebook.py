@@ -6,9 +6,8 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.result import Certificate, Result
@@ -80,9 +79,8 @@ def _half_widths(result: Result) -> Table | None:
     )
 
 
-def specification(data: Mapping[str, Any]) -> str:
+def specification(effective: Effective) -> str:
     """The card of a specification: its equations and its safe set."""
-    effective = Effective.of(data)
     rows = [(Cell(text=line, kind="code"),) for line in equations(effective)]
     box = effective.part("safe_set")
     sides = ", ".join(f"{name} in [{', '.join(map(str, side))}]" for name, side in box.items())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 
-from tubecert.certificate.effective import Effective, Tree
+from tubecert.certificate.effective import Effective
 from tubecert.certificate.result import Certificate, Result
 from tubecert.records import to_json
 from tubecert.report.mathml import Equation, aligned
@@ -72,17 +72,17 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
         yield "overridden by the command", Cell(text=_list(overrides))
 
 
-def _plan(trajectory: Mapping[str, Tree]) -> str:
+def _plan(trajectory: Mapping[str, object]) -> str:
     rest = {key: value for key, value in trajectory.items() if key != "kind"}
     kind = trajectory.get("kind", "")
     return f"{kind}: {_list(rest)}" if rest else str(kind)
 
 
-def _list(values: Mapping[str, Tree]) -> str:
+def _list(values: Mapping[str, object]) -> str:
     return ", ".join(f"{name} = {_value(value)}" for name, value in sorted(values.items()))
 
 
-def _value(value: Tree) -> str:
+def _value(value: object) -> str:
     if isinstance(value, Mapping):
         return f"({_list(value)})"
     if isinstance(value, Sequence) and not isinstance(value, str):

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from math import isfinite
 from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricKilling
+from tubecert.enclosure.constant import Constant
 from tubecert.printable import printable_json, visible
-from tubecert.records import Json, to_json
+from tubecert.records import to_json
 from tubecert.report.layout import indented
 from tubecert.report.numbers import down, end, exact, up
 from tubecert.report.sections import VERDICTS, place
+from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
@@ -78,18 +83,42 @@ def _condition(found: Verified) -> str:
 
 def as_json(found: Sequence[tuple[str, Verified]]) -> str:
     """A list of objects, one for each metric."""
-    return printable_json(json.dumps([_data(*each) for each in found], indent=1, ensure_ascii=False)) + "\n"
+    return (
+        printable_json(json.dumps([to_json(_data(*each)) for each in found], indent=1, ensure_ascii=False))
+        + "\n"
+    )
 
 
-def _data(file: str, found: Verified) -> dict[str, Json]:
-    numbers = ("largest_rate", "condition_number", "lower", "upper")
-    known = {key: getattr(found, key) for key in numbers}
-    return {
-        "file": file,
-        "name": found.name,
-        "verdict": str(found.verdict),
-        "rate": to_json(found.rate),
-        "safe_set": to_json(dict(found.safe_set)),
-        **{key: [v.below, v.above] for key, v in known.items() if v is not None and isfinite(v.below)},
-        **({} if found.reason is None else {"reason": to_json(found.reason)}),
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifiedData:
+    """What is known of the metric in a file; what is None was not reached."""
+
+    file: str
+    name: str
+    verdict: Verdict
+    rate: Fraction
+    safe_set: Mapping[str, tuple[Fraction, Fraction]]
+    largest_rate: Constant | None = None
+    condition_number: Constant | None = None
+    lower: Constant | None = None
+    upper: Constant | None = None
+    reason: Reason | None = None
+
+
+def _data(file: str, found: Verified) -> VerifiedData:
+    return VerifiedData(
+        file=file,
+        name=found.name,
+        verdict=found.verdict,
+        rate=found.rate,
+        safe_set=found.safe_set,
+        largest_rate=_known(found.largest_rate),
+        condition_number=_known(found.condition_number),
+        lower=_known(found.lower),
+        upper=_known(found.upper),
+        reason=found.reason,
+    )
+
+
+def _known(value: Constant | None) -> Constant | None:
+    return value if value is not None and isfinite(value.below) else None

@@ -5,12 +5,11 @@ Nothing is believed that the hash does not cover; nothing is proven here either 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import SectionData
 from tubecert.kinds.hardware import HardwareData
 from tubecert.model import ControlAffineModel
-from tubecert.records import Json
 from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
@@ -131,24 +129,12 @@ def adopted(spec: Spec, result: Result) -> Spec:
     Raises `ForeignError` if the certificate is about another system.
     """
     compared(spec, result).require(spec, "the certificate")
-    other = _without_plan(result.spec.effective.data)
+    other = load_text(result.spec.effective.at_rest(_UNUSED), "certificate")
     spec = as_set(spec, result.overrides)
     spec = replace(spec, tube=replace(other.tube, windows=spec.tube.windows))
     if result.overrides.metric is None and spec.metric is not None:
         return spec
     return replace(spec, metric=other.metric, synthesis=other.synthesis)
-
-
-def _without_plan(effective: Mapping[str, Any]) -> Spec:
-    """The specification in a certificate, at rest at 0: its plan may be in a file that is elsewhere."""
-    rest = {"kind": "equilibrium", "at": ["0"] * len(effective["system"]["states"])}
-    kept = {key: _timeless(key, value) for key, value in effective.items() if key not in _UNUSED}
-    return load_text(json.dumps(kept | {"trajectory": rest}), "certificate")
-
-
-def _timeless(key: str, section: Json) -> Json:
-    """A section of a specification; that of the tube without its windows, which are those of a plan."""
-    return {name: value for name, value in section.items() if name != "windows"} if key == "tube" else section
 
 
 def require_plan(spec: Spec) -> None:

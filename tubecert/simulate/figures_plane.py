@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -106,14 +106,14 @@ def _obstacles(axis: Axes, setting: Setting, names: tuple[str, str]) -> None:
         if set(obstacle.states) != set(names):
             continue
         turned = obstacle.states != names
-        style: dict[str, Any] = {"facecolor": "#BDBDBD", "edgecolor": "#6E6E6E", "zorder": 2, "label": label}
         patch: Patch
         if obstacle.radius is not None:
             center = [float(value) for value in obstacle.center]
-            patch = Circle((center[::-1] if turned else center), float(obstacle.radius), **style)  # type: ignore[arg-type]
+            patch = Circle((center[::-1] if turned else center), float(obstacle.radius))  # type: ignore[arg-type]
         else:
             corners = corners_of(obstacle)
-            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True, **style)
+            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True)
+        patch.set(facecolor="#BDBDBD", edgecolor="#6E6E6E", zorder=2, label=label)
         axis.add_patch(patch)
         label = None
 

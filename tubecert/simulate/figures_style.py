@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito, told apart by everybody; what is certified i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from tubecert.simulate.campaign import Campaign, Drawn
 from tubecert.simulate.setting import Setting
@@ -57,7 +57,15 @@ def blank(width: float, height: float) -> Figure:
     return figure
 
 
-def line(item: Drawn) -> dict[str, Any]:
+class LineStyle(TypedDict):
+    """What matplotlib is told of a curve."""
+
+    color: str
+    ls: str | tuple[int, tuple[float, float]]
+    label: str
+
+
+def line(item: Drawn) -> LineStyle:
     """How the curves of a loop are drawn: dashed for one whose promise is not tested."""
     controller = item.loop.controller
     style = "-" if item.loop.tested or controller in ("nominal", "reference") else (0, (6, 1.5))

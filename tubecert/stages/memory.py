@@ -5,11 +5,12 @@ A proof is found again under everything that it follows from, so that it cannot 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from tubecert.certificate.file import digest
+from tubecert.records import Json
 
 T = TypeVar("T")
 
@@ -25,9 +26,9 @@ class Memory:
     computed: dict[str, int] = field(default_factory=dict)
     most: int | None = None
 
-    def recall(self, name: str, depends_on: Mapping[str, Any], compute: Callable[[], T]) -> T:
+    def recall(self, name: str, depends_on: Json, compute: Callable[[], T]) -> T:
         """The value that `compute` gives, which depends on `depends_on` (JSON data) and nothing else."""
-        key = name, digest(dict(depends_on))
+        key = name, digest(depends_on)
         if key not in self.kept:
             self.kept[key] = compute()
             self.computed[name] = self.computed.get(name, 0) + 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
-from typing import Any
 
 from tubecert.claims.advice import DeclareMetricBound, LowerRate, OtherMetric, RaiseBudget
 from tubecert.claims.family import Relax
@@ -14,6 +13,7 @@ from tubecert.enclosure.branch_and_bound import Decision
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import rank_decision
+from tubecert.records import Json
 from tubecert.spec import canonical
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.verdict import Verdict
@@ -54,7 +54,7 @@ def prove_metric(question: Question) -> ProvenMetric | Stopped:
     return broken or ProvenMetric(question=question, proof=proof, lower=proof.lower_on_set)
 
 
-def _on(question: Question) -> dict[str, Any]:
+def _on(question: Question) -> Json:
     """Everything that a claim on the safe set follows from."""
     whole = canonical(question.spec)
     parts = {key: whole.get(key) for key in ("system", "safe_set", "metric", "owed")}

@@ -58,7 +58,7 @@ class Question:
         return self
 
     @cached_property
-    def ground(self) -> dict[str, Json]:
+    def ground(self) -> Json:
         """Everything that the model, the start and the tube follow from, as data; plans in files have other knots.
 
         The whole specification but the sections that these are not made of: one that is not in `_APART` counts.

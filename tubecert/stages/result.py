@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from tubecert.bounds.compute import Radius
 from tubecert.certificate.effective import Effective
@@ -37,6 +36,7 @@ from tubecert.certificate.sections import (
 )
 from tubecert.claims.family import Reason
 from tubecert.conditions.inputs import JudgedInput
+from tubecert.conditions.theorem import Recipe
 from tubecert.expression import number_text
 from tubecert.letters import ALL, name_of
 from tubecert.metric.verify import MetricProof
@@ -255,7 +255,7 @@ def _input_data(found: JudgedInput) -> InputData:
     )
 
 
-def _recipes(judged: Judged | None) -> dict[str, Any]:
+def _recipes(judged: Judged | None) -> dict[str, Recipe]:
     """What proves the gains of each kind that is certified."""
     sections = {} if judged is None else judged.sections
     return {key: each.proof.recipe for key, each in sections.items() if each.proof is not None}

@@ -48,7 +48,7 @@ class Planned:
         return self.metric.question
 
     @cached_property
-    def ground(self) -> dict[str, Json]:
+    def ground(self) -> Json:
         """Everything that the tube and the constants over it follow from, as data."""
         knots = self.plan.knots
         texts = [] if knots is None else [*map(number_text, knots.t), *_texts((*knots.x, *knots.u))]
@@ -90,7 +90,7 @@ class TubeFound:
         return self.planned.plan
 
     @cached_property
-    def ground(self) -> dict[str, Json]:
+    def ground(self) -> Json:
         """Everything that the constants over the tube follow from, as data."""
         return self.planned.ground | {"shape": _shape(self.coordinates, self.rho, self.sides or ())}
 

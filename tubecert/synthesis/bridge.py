@@ -127,10 +127,10 @@ def _constraint(kind: str, part: Affine, y: Any) -> Any:
     return cvxpy.reshape(value, (order, order), order="C") >> 0
 
 
-def _settings(name: str, tolerance: float, iterations: int | None) -> dict[str, Any]:
+def _settings(name: str, tolerance: float, iterations: int | None) -> dict[str, float]:
     """Tolerance and limit under the names that a solver has for them."""
     if name == "CLARABEL":
-        settings: dict[str, Any] = dict.fromkeys(("tol_feas", "tol_gap_abs", "tol_gap_rel"), tolerance)
+        settings: dict[str, float] = dict.fromkeys(("tol_feas", "tol_gap_abs", "tol_gap_rel"), tolerance)
         return settings | {"max_threads": 1} | ({} if iterations is None else {"max_iter": iterations})
     if name == "SCS":
         return {"eps_abs": tolerance, "eps_rel": tolerance, "max_iters": iterations or 20_000}
