@@ -7,17 +7,22 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Generic
 
+from tubecert.conditions.hardware.loop import Rounding
 from tubecert.conditions.theorem import R
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """Gains that a user fixes, in rad/s, 1/s^2 and s; what is None is searched for. `curve`: whether one is wanted."""
+    """Gains that a user fixes, in rad/s, 1/s^2 and s; what is None is searched for. `curve`: whether one is wanted.
+
+    `lost`: what the arithmetic of the controller is allowed to lose.
+    """
 
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     sample_time: Fraction | None = None
     curve: bool = True
+    lost: Rounding | None = None
 
     def __bool__(self) -> bool:
         return not (self.bandwidth is None and self.adaptation_rate is None and self.sample_time is None)

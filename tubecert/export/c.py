@@ -11,7 +11,7 @@ from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, Port, Program
 from tubecert.export.vectors import Vectors
-from tubecert.export.words import NOT_COVERED, TIMING, heading
+from tubecert.export.words import TIMING, heading, promise
 
 _UNSAFE: Final = (
     "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__",
@@ -80,7 +80,7 @@ def _comment(texts: Sequence[str]) -> Iterator[str]:
 
 def _header(c: Controller, language: C) -> Iterator[str]:
     name, big = c.name, c.name.upper()
-    yield from _comment((heading(c), "", f"Certificate: {c.hash}", "", *NOT_COVERED, "", *TIMING))
+    yield from _comment((heading(c), "", f"Certificate: {c.hash}", "", *promise(c), "", *TIMING))
     yield f"#ifndef {big}_H"
     yield f"#define {big}_H"
     yield ""
@@ -140,7 +140,7 @@ def _out(c: Controller, name: str, size: str) -> str:
 
 def _source(c: Controller, language: C) -> Iterator[str]:
     big = c.name.upper()
-    yield from _comment((heading(c), f"Certificate: {c.hash}", "", *NOT_COVERED))
+    yield from _comment((heading(c), f"Certificate: {c.hash}", "", *promise(c)))
     yield f'#include "{c.name}.h"'
     yield ""
     yield "#include <float.h>"

@@ -17,11 +17,11 @@ from typing import Final
 
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Certificate
-from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.conditions.hardware import HardwareRecipe, Rounding
 from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.errors import TubecertError
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
-from tubecert.expression import free_symbols
+from tubecert.expression import derivatives, free_symbols
 from tubecert.expression.matrix import Matrix, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import HARDWARE
@@ -37,7 +37,9 @@ INTEGRATION: Final = 4  # steps of the prediction of H-P
 NODES: Final = (Fraction("0.11270166537925831148"), Fraction(1, 2), Fraction("0.88729833462074168852"))
 _WEIGHTS: Final = (Fraction(5, 18), Fraction(4, 9), Fraction(5, 18))
 _DIGITS: Final = Context(prec=60)
+LEAST_SIZE: Final = Fraction(1, 2**120)  # |c|^2 below which the feedback fades out
 _NOISE: Final = "noise_metric"  # n_M of one unit of noise
+_GAIN: Final = "feedback_gain"
 _LONGEST: Final = 32  # characters of a name
 
 
@@ -60,9 +62,11 @@ class Controller:
 
     `name` begins every name in the code; `hash` is that of the certificate. Times in s; `horizon` None
     without end; `level`: d(x*, x) stays below it, and `reach` what d(x*, .) is at most where the feedback
-    looks; `metric` is M; `ranges`: what is proven of every input. Of the plan,
-    either the program `plan` or `pieces`. `still`: u* is constant; `held`: u* is played from sample to sample. `older`:
-    the share of a sample in which the input before the last one still acts.
+    looks; `metric` is M; `ranges`: what is proven of every input; `share` is th; `estimate` bounds |q|, and
+    `feedback_gain` is du. `lost`: what rounding may cost, where the certificate covers it. Of the plan, either the
+    program `plan` or `pieces`.
+    `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is covered.
+    `still`: u* is constant; `held`: u* is played from sample to sample.
     """
 
     name: str
@@ -77,6 +81,10 @@ class Controller:
     reach: Fraction
     metric: tuple[tuple[Fraction, ...], ...]
     ranges: tuple[tuple[float, float], ...]
+    share: Fraction
+    estimate: Fraction
+    feedback_gain: Fraction
+    lost: Rounding | None
     predicts: bool
     held: bool
     still: bool
@@ -87,6 +95,7 @@ class Controller:
     law: Program
     applied: Program
     gauss: Program | None
+    bend: Program | None
     predictor: Program | None
     estimator: Program
 
@@ -132,6 +141,7 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
         held=spec.hardware.held,
         horizon=_horizon(certificate),
         ranges=tuple(data.inputs.get(each, (-math.inf, math.inf)) for each in model.inputs),
+        feedback_gain=_gain(certificate),
     )
     if certificate.result.claim.plans is not None or spec.trajectory.bundle is not None:
         raise refused(
@@ -144,7 +154,8 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
 class Machine:
     """What a controller is made of.
 
-    `clip` by input, empty for the ball of the recipe; `coordinates` S, by rows; `horizon` of the claim, None for ever.
+    `clip` by input, empty for the ball of the recipe; `coordinates` S, by rows; `horizon` of the claim, None for ever;
+    `feedback_gain` du.
     """
 
     name: str
@@ -158,6 +169,7 @@ class Machine:
     held: bool
     horizon: Fraction | None
     ranges: tuple[tuple[float, float], ...]
+    feedback_gain: Fraction = Fraction(0)
 
 
 def assembled(machine: Machine) -> Controller:
@@ -166,7 +178,7 @@ def assembled(machine: Machine) -> Controller:
     _require(model, recipe)
     pieces = _pieces(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
     still, m = pieces is None and not free_symbols(plan.u), len(model.inputs)
-    played = not still and not machine.held
+    played, covered = not still and not machine.held, bool(recipe.rounding)
     return Controller(
         name=_identifier(machine.name),
         system=machine.name,
@@ -180,6 +192,12 @@ def assembled(machine: Machine) -> Controller:
         reach=machine.reach,
         metric=inverse([[e.fraction for e in row] for row in model.W]),
         ranges=machine.ranges,
+        share=forgotten(recipe),
+        estimate=2 * recipe.clip_radius
+        + recipe.bias
+        + recipe.ripple,  # |h| <= R and |h - q| <= max(H0, S) + N
+        feedback_gain=machine.feedback_gain,
+        lost=recipe.rounding[0] if recipe.rounding else None,
         predicts=recipe.prediction is not None,
         held=machine.held,
         still=still,
@@ -187,9 +205,10 @@ def assembled(machine: Machine) -> Controller:
         pieces=pieces,
         drift=_drift(model),
         flow=_flow(model),
-        law=_law(model),
+        law=_law(model, machine.feedback_gain if covered else None),
         applied=_applied(m, recipe, played=played),
         gauss=_gauss(m) if played and pieces is None else None,
+        bend=_bend(plan) if played and pieces is None and covered else None,
         predictor=None if recipe.prediction is None else _predictor(model, recipe.delay / INTEGRATION),
         estimator=_estimator(machine),
     )
@@ -252,10 +271,20 @@ def _reach(certificate: Certificate, recipe: HardwareRecipe) -> Fraction:
     upper = None if metric is None or metric.upper is None else metric.upper.above
     if noise is None or upper is None:
         raise incomplete("that is exported", "what noise is in the metric is missing")
+    return looked_at(recipe, noise, upper)
+
+
+def looked_at(recipe: HardwareRecipe, noise: float, upper: float) -> Fraction:
+    """What d(x*, .) is at most where the feedback looks; n_M of one unit of noise and A are `noise` and `upper`."""
     looked = recipe.noise * Fraction(noise)
     if recipe.prediction is not None:
         looked = max(looked, recipe.prediction * Fraction(math.nextafter(math.sqrt(upper), math.inf)))
     return recipe.level + Fraction(f"{float(looked) * (1 + 1e-6):.6e}")
+
+
+def _gain(certificate: Certificate) -> Fraction:
+    """du, from above."""
+    return Fraction(certificate.result.constants[_GAIN].above or 0)
 
 
 def _horizon(certificate: Certificate) -> Fraction | None:
@@ -351,8 +380,22 @@ def _gauss(m: int) -> Program:
     )
 
 
-def _law(model: ControlAffineModel) -> Program:
-    """(0.5) in closed form: g = M z, alpha/2 = g'(f + B u* - v*) + lambda z'g, kappa = -(alpha/2)_+ B'g/|B'g|^2."""
+def _bend(plan: Plan) -> Program:
+    """Of six derivatives of u*, which the error of Gauss's rule is made of."""
+    bent = list(plan.u)
+    for _ in range(2 * len(NODES)):
+        bent = derivatives(bent, TIME)
+    writer = Writer()
+    (t,) = writer.input("t", 1)
+    writer.output("u", writer.expressions(bent, {TIME: t}))
+    return writer.finished("bend", "the sixth derivative of u*(t)")
+
+
+def _law(model: ControlAffineModel, most: Fraction | None) -> Program:
+    """(0.5) in closed form: g = M z, alpha/2 = g'(f + B u* - v*) + lambda z'g, kappa = -(alpha/2)_+ B'g/|B'g|^2.
+
+    With `most` (du), |kappa| is held below du d, which it is in exact arithmetic: theory 8.11.
+    """
     writer = Writer()
     y, names = _states(writer, model, "y")
     f, n = writer.input("f", len(model.states)), range(len(model.states))
@@ -367,10 +410,25 @@ def _law(model: ControlAffineModel) -> Program:
     excess = writer.add(writer.dot(g, w), writer.mul(writer.constant(model.rate), square))
     c = [writer.dot([B[i][j] for i in n], g) for j in range(len(us))]
     size = writer.dot(c, c)
-    share = writer.choose(RATIO, excess, size)
+    share = (
+        writer.choose(RATIO, excess, size)
+        if most is None
+        else _held_below(writer, most, square, excess, size)
+    )
+    for name, places in (("z", z), ("c", c), ("excess", [excess])):
+        writer.mark(name, places)
     writer.output("kappa", [writer.neg(writer.mul(share, each)) for each in c])
     writer.output("told", [square, excess, size])
     return writer.finished("law", "the feedback of least norm; told: d^2, alpha/2 and |c|^2")
+
+
+def _held_below(writer: Writer, most: Fraction, square: Place, excess: Place, size: Place) -> Place:
+    """min((alpha/2)_+/|c|, du d)/|c|, with |c| from 2^-60 on."""
+    nothing = writer.constant(0)
+    norm = writer.call("sqrt", writer.choose(GREATEST, size, writer.constant(LEAST_SIZE)))
+    limit = writer.mul(writer.constant(most), writer.call("sqrt", writer.choose(GREATEST, square, nothing)))
+    wanted = writer.div(writer.choose(GREATEST, excess, nothing), norm)
+    return writer.div(writer.choose(LEAST, wanted, limit), norm)
 
 
 def _estimator(machine: Machine) -> Program:

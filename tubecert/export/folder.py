@@ -11,8 +11,9 @@ from typing import Final, Literal
 from tubecert.certificate.file import write_text
 from tubecert.errors import TargetError
 from tubecert.export import c as c99
-from tubecert.export.controller import Controller
+from tubecert.export.controller import Controller, refused
 from tubecert.export.python import python
+from tubecert.export.rounding import UncoveredError, within
 from tubecert.export.vectors import vectors
 from tubecert.export.words import readme
 from tubecert.findings import Finding
@@ -47,7 +48,11 @@ class Exported:
 
 
 def exported(controller: Controller, language: Language = "c", precision: Precision = "double") -> Exported:
-    """A controller in a language; in Python everything is `double`."""
+    """A controller in a language; in Python everything is `double`.
+
+    Raises `TubecertError` (TC710) where the certificate is about rounding, and the code can lose more than it allows.
+    """
+    _require_digits(controller, precision if language == "c" else "double")
     own = _c(controller, precision) if language == "c" else _python(controller)
     manifest = {
         "format": FORMAT,
@@ -61,6 +66,22 @@ def exported(controller: Controller, language: Language = "c", precision: Precis
     files[MANIFEST] = json.dumps(manifest, indent=1, sort_keys=True) + "\n"
     files["README.md"] = readme(controller, said, precision=precision if language == "c" else None)
     return Exported(controller=controller, language=language, precision=precision, files=files)
+
+
+def _require_digits(controller: Controller, precision: Precision) -> None:
+    if controller.lost is None:
+        return  # the certificate assumes a computer that is exact, and the files say so
+    try:
+        covered = within(controller, precision)
+    except UncoveredError as error:
+        raise refused(
+            f"no bound of rounding is known for {error}", "certify without hardware.arithmetic"
+        ) from error
+    if not covered:
+        raise refused(
+            f"the certificate does not allow for what {precision} loses",
+            f"export it in double, or certify with hardware: {{arithmetic: {precision}}}",
+        )
 
 
 def _c(controller: Controller, precision: Precision) -> dict[str, tuple[str, str]]:

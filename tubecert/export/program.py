@@ -49,13 +49,14 @@ class Port:
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """Steps in their order, what goes in and what comes out."""
+    """Steps in their order, what goes in and what comes out; `marked`: what in between has a name in a proof."""
 
     name: str
     words: str
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     steps: tuple[Step, ...]
+    marked: tuple[Port, ...] = ()
 
     @cached_property
     def numbers(self) -> tuple[float, ...]:
@@ -85,6 +86,7 @@ class Writer:
         self._known: dict[Step, Place] = {}
         self._inputs: list[Port] = []
         self._outputs: list[Port] = []
+        self._marked: list[Port] = []
 
     def input(self, name: str, size: int) -> list[Place]:
         """A vector that goes in."""
@@ -96,10 +98,15 @@ class Writer:
         """A vector that comes out."""
         self._outputs.append(Port(name=name, places=tuple(places)))
 
+    def mark(self, name: str, places: Sequence[Place]) -> None:
+        """A vector in between."""
+        self._marked.append(Port(name=name, places=tuple(places)))
+
     def finished(self, name: str, words: str) -> Program:
         """The program: only the steps that something needs."""
         needed, steps = set(), self._steps
-        waiting = [place for port in (*self._inputs, *self._outputs) for place in port.places]
+        ports = (*self._inputs, *self._outputs, *self._marked)
+        waiting = [place for port in ports for place in port.places]
         while waiting:
             place = waiting.pop()
             if place not in needed:
@@ -112,6 +119,7 @@ class Writer:
             words=words,
             inputs=_moved(self._inputs, moved),
             outputs=_moved(self._outputs, moved),
+            marked=_moved(self._marked, moved),
             steps=tuple(
                 Step(
                     operation=steps[old].operation,

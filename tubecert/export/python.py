@@ -10,7 +10,7 @@ from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, Program
 from tubecert.export.vectors import Vectors
-from tubecert.export.words import NOT_COVERED, TIMING, heading
+from tubecert.export.words import TIMING, heading, promise
 
 _WIDTH: Final = 96
 
@@ -49,7 +49,7 @@ def python(controller: Controller, vectors: Vectors) -> str:
 def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield f'"""{heading(c)}'
     yield ""
-    yield from (*NOT_COVERED, "", *TIMING)
+    yield from (*promise(c), "", *TIMING)
     yield '"""'
     yield ""
     yield "import math"

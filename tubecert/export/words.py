@@ -7,10 +7,16 @@ from typing import Final
 
 from tubecert.export.controller import INTEGRATION, NODES, Controller
 
-NOT_COVERED: Final = (
+_EXACT: Final = (
     "What the proof covers: the loop of theorem H in EXACT arithmetic. The rounding of this code is not",
     "covered: exact arithmetic is assumed, and so are the exact mean of u* over a sample and, where the",
-    "feedback predicts, the exact solution of its model.",
+    "feedback predicts, the exact solution of its model. To have it covered, certify the specification with",
+    "hardware: {arithmetic: double} (or single).",
+)
+_ROUNDED: Final = (
+    "What the proof covers: the loop of theorem H-R, which is this code with the rounding of its arithmetic.",
+    "Assumed of the computer: IEEE 754, rounded to nearest, functions of math.h within 4 units in the last",
+    "place, inputs that act as they are given, and measurements that are the numbers handed in.",
 )
 TIMING: Final = (
     "`start` with what is measured at t = 0 gives the input that acts at once. Then",
@@ -18,6 +24,11 @@ TIMING: Final = (
     "sample until the next one replaces it. The actuator holds it. `step` at t = 0 takes the measurement",
     "that `start` has taken. Every sample is taken exactly once, at its time.",
 )
+
+
+def promise(controller: Controller) -> tuple[str, ...]:
+    """What the proof says of rounding."""
+    return _EXACT if controller.lost is None else _ROUNDED
 
 
 def heading(controller: Controller) -> str:
@@ -45,7 +56,7 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield "The certificate proves that this loop keeps the state in its tube, for the noise, wind and uncertainty"
     yield f"that it names, with this sample time and delay. Arithmetic: `{precision or 'double'}`."
     yield ""
-    yield from NOT_COVERED
+    yield from promise(c)
     yield ""
     yield "Nor is a clock that jitters, an actuator that lags, or an input that is clipped somewhere else."
     yield ""

@@ -19,6 +19,7 @@ from tubecert.kinds import RATES
 from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
+from tubecert.pipeline.rounding import rounded
 from tubecert.pipeline.windows import windowed
 from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
@@ -102,7 +103,7 @@ def judge(bounded: Bounded) -> Judged:
     for recipe, each in PROPOSERS.items():
         tell_gains(bounded.question, recipe)
         proposals[recipe] = each.propose(problem, asked)
-    return judge_all(bounded, proposals)
+    return judge_all(bounded, rounded(bounded, proposals, asked))
 
 
 def explain(judged: Judged) -> Explanation:

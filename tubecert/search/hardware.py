@@ -17,7 +17,8 @@ from tubecert.conditions import hardware as theorem_h
 from tubecert.conditions import machine as machines
 from tubecert.conditions.arithmetic import Array, least_solution, quiet
 from tubecert.conditions.decimals import round_down, round_up
-from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, gains
+from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, Rounding, gains
+from tubecert.conditions.hardware.loop import lost_of
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import TubeProblem
@@ -35,6 +36,9 @@ _HAIR = 1 + 1e-12
 _TIE = 1e-7
 _LEAST = 1e-15  # of what is 0 but for rounding
 _CURVE_POINTS = 13
+_NOTHING_LOST = Rounding(
+    feedback=Fraction(0), input=Fraction(0), estimate=Fraction(0), prediction=Fraction(0)
+)
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -64,7 +68,7 @@ class Choice:
     f0: Array
 
 
-def in_lanes(at: Lanes, dhat: Array, *, predicts: bool) -> Loop[Array]:
+def in_lanes(at: Lanes, dhat: Array, *, predicts: bool, rounding: tuple[Rounding, ...] = ()) -> Loop[Array]:
     """The loops of machines at levels, with nothing proven of Y, S, N and np, and the level for a floor."""
     zero = np.zeros(np.broadcast_shapes(at.Ts.shape, dhat.shape))
     ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
@@ -83,13 +87,15 @@ def in_lanes(at: Lanes, dhat: Array, *, predicts: bool) -> Loop[Array]:
         np=zero if predicts else None,
         late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
         off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
+        lost=lost_of(rounding, lambda q: np.asarray(float(q))),
     )
 
 
 class Search:
-    """Theorem H in floats, over one problem."""
+    """Theorem H in floats, over one problem; `lost`: what rounding may cost."""
 
-    def __init__(self, problem: TubeProblem, machine: Machine) -> None:
+    def __init__(self, problem: TubeProblem, machine: Machine, lost: Rounding | None = None) -> None:
+        self.rounding = () if machine.asked.arithmetic is None else (lost or _NOTHING_LOST,)
         self.problem = problem
         self.machine = machine
         self.R = machine.clip_radius(problem.constants.h)
@@ -113,7 +119,12 @@ class Search:
     @quiet
     def settled(self, at: Lanes, chosen: Choice) -> Loop[Array]:
         """The loop with the least Y, S, N and np; but for rounding, what the theorem asks for."""
-        loop = in_lanes(replace(at, omega=chosen.omega), chosen.dhat, predicts=self.machine.asked.predict)
+        loop = in_lanes(
+            replace(at, omega=chosen.omega),
+            chosen.dhat,
+            predicts=self.machine.asked.predict,
+            rounding=self.rounding,
+        )
         loop = replace(loop, f0=chosen.f0 + 0 * loop.Ts)
         for _ in range(1 if loop.np is None else _PREDICTIONS):
             Y = self._least_speed(loop)
@@ -362,6 +373,7 @@ def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -
         bias=S,
         ripple=N,
         prediction=None if prediction is None else round_up(prediction, 13),
+        rounding=search.rounding,
     )
 
 
@@ -477,7 +489,7 @@ def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRec
     machine = problem.machine
     if machine is None or obstacles(problem, theorem_h.THEOREM):
         return Proposal()
-    search = Search(problem, machine)
+    search = Search(problem, machine, asked.lost)
     searched = machine.asked.largest is not None
     recipe: HardwareRecipe | None = None
     for value in _largest_values(search) if searched else [Fraction(1)]:

@@ -22,6 +22,7 @@ from tubecert.spec.load import load, load_text
 from tubecert.spec.override import Setting
 from tubecert.spec.types import (
     Adaptation,
+    Arithmetic,
     Bounds,
     Disturbance,
     Expectation,
@@ -47,6 +48,7 @@ from tubecert.spec.types import (
 __all__ = [
     "CODES",
     "Adaptation",
+    "Arithmetic",
     "Bounds",
     "Disturbance",
     "Expectation",

@@ -204,6 +204,8 @@ def hardware_data(spec: Spec, machine: Hardware) -> dict[str, Any]:
         "bandwidth": sought(machine.bandwidth, "auto"),
         **_given(noise_rate=machine.noise_rate),
     }
+    if machine.arithmetic is not None:
+        data["arithmetic"] = machine.arithmetic
     if machine.feedback_time is not None:
         data["feedback_rate"] = number_text(1 / machine.feedback_time)
     return data

@@ -11,7 +11,7 @@ from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Disturbance, Hardware, Largest, Term, TermMatrix, Vector
+from tubecert.spec.types import Arithmetic, Disturbance, Hardware, Largest, Term, TermMatrix, Vector
 
 KEYS: Final = (
     "rate",
@@ -23,9 +23,12 @@ KEYS: Final = (
     "feedback_rate",
     "predict",
     "bandwidth",
+    "arithmetic",
     "limits",
 )
 LARGEST: Final = "largest"
+EXACT: Final = "exact"
+_ARITHMETICS: Final[Mapping[str, Arithmetic]] = {"single": "single", "double": "double"}
 ONE_SAMPLE: Final = "one sample"
 MAX_COLUMNS: Final = 32
 
@@ -123,10 +126,11 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         entries["feedforward"].word(("continuous", "held")) if "feedforward" in entries else "continuous",
         entries["predict"].word(("true", "false")) if "predict" in entries else "false",
         None if _is(entries.get("bandwidth"), "auto") else _positive(entries, "bandwidth", names),
+        entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT,
     )
     if len(field.reader.findings) > before:
         return None
-    noise, noise_rate, feedforward, predict, bandwidth = found
+    noise, noise_rate, feedforward, predict, bandwidth, arithmetic = found
     return Hardware(
         sample_time=sample_time,
         delay=delay,
@@ -137,6 +141,7 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         feedback_time=None if feedback is None else 1 / feedback,
         predict=predict == "true",
         bandwidth=bandwidth,
+        arithmetic=_ARITHMETICS.get(arithmetic or EXACT),
         largest=unknown[0] if unknown else None,
     )
 

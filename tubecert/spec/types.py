@@ -237,6 +237,7 @@ class Simulation:
 
 
 Largest = Literal["sample_time", "delay", "noise", "wind"]
+Arithmetic = Literal["single", "double"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,8 +247,9 @@ class Hardware:
     `sample_time` of inputs and adaptation; `delay` from a sample to its input, None with `one_sample` (it is one
     sample time); `noise`: |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|;
     `held`: u* is played from sample to sample; `feedback_time`: the sample time of the feedback where it has one of its
-    own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s. `largest` is what is
-    searched for, `wind` being the bound of the disturbance.
+    own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s; `arithmetic`: what the
+    controller computes in, None where it computes exactly. `largest` is what is searched for, `wind` being the bound of
+    the disturbance.
     """
 
     sample_time: Fraction | None
@@ -259,6 +261,7 @@ class Hardware:
     feedback_time: Fraction | None = None
     predict: bool = False
     bandwidth: Fraction | None = None
+    arithmetic: Arithmetic | None = None
     largest: Largest | None = None
 
     def __post_init__(self) -> None:

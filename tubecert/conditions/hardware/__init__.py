@@ -12,7 +12,15 @@ from __future__ import annotations
 from tubecert.conditions.hardware.estimation import estimate
 from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.feedback import metric_gust
-from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, WindowProof, loop_of, plant
+from tubecert.conditions.hardware.loop import (
+    HardwareRecipe,
+    Loop,
+    Plant,
+    Rounding,
+    WindowProof,
+    loop_of,
+    plant,
+)
 from tubecert.conditions.hardware.theorem import LEVEL, STAYS, THEOREM, margins_hardware
 from tubecert.conditions.hardware.told import Budget, Told, told, told_in_windows
 
@@ -25,6 +33,7 @@ __all__ = [
     "HardwareRecipe",
     "Loop",
     "Plant",
+    "Rounding",
     "Told",
     "WindowProof",
     "estimate",

@@ -112,8 +112,10 @@ def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) ->
 
 
 def base_of(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> T:
-    """What pushes whatever the feedback knows: the plan's defect, the input of the plan that is held, the wind."""
-    return p.n.delta + acting(p, p.n.beta) * e.ups + p.beta_w * loop.wbar
+    """What pushes whatever the feedback knows: the plan's defect, u* that is held, the wind, and rounding."""
+    base = p.n.delta + acting(p, p.n.beta) * e.ups + p.beta_w * loop.wbar
+    # Lam <= r_a + ell(age) (d + move), and d >= f0 where it counts, (H.36)
+    return base if loop.lost is None else base + loop.lost.feedback / loop.f0
 
 
 def mean_wait(rate: T, period: T) -> T:

@@ -137,11 +137,12 @@ def noise_in_feedback(p: Plant[T], loop: Loop[T]) -> tuple[T, T]:
 
 
 def feedforward_error(p: Plant[T], loop: Loop[T]) -> T:
-    """ups >= |u0 - u*|: 0, or what u* does while it is held, (H.6a)."""
-    if not p.held:
-        return number(0, loop.Ts)
-    most = 2 * p.n.Dus
-    return most if p.m.Lus is None else minimum(most, p.m.Lus * (maximum(loop.Ts, loop.Tf) + loop.tau))
+    """ups >= |u0 - u*|: 0, or what u* does while it is held, (H.6a); and what rounding does to the input, (H.36)."""
+    held = number(0, loop.Ts)
+    if p.held:
+        most = 2 * p.n.Dus
+        held = most if p.m.Lus is None else minimum(most, p.m.Lus * (maximum(loop.Ts, loop.Tf) + loop.tau))
+    return held if loop.lost is None else held + loop.lost.input
 
 
 def lag_of_filter(loop: Loop[T]) -> T:
@@ -160,12 +161,13 @@ def error_of_estimate(p: Plant[T], loop: Loop[T], s1: T, whole: T) -> T:
     b0 = minimum(n.DBp * n.DBx, n.DBpx * n.DB)
     nbar = loop.nu * p.m.n_E
     moved = loop.Y * loop.Ts / 2 + nbar
-    return (
+    found = (
         s1 * loop.Ts / 2
         + b0 * whole * moved
         + p.m.D_pf * (loop.Y * loop.Ts / 4 + nbar)
         + n.DBpx * p.rest * moved
     )
+    return found if loop.lost is None else found + loop.lost.estimate
 
 
 def wind_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
@@ -194,6 +196,9 @@ def prediction_error(p: Plant[T], loop: Loop[T], known: T, missed: T) -> T | Non
     y = (n.Dfx + n.Dbx * known) * loop.tau
     # (e^y - 1)/D_p = tau e^y (1 - e^(-y))/y
     grown = exp(y)
-    return loop.nu * p.m.n_E * grown + (n.DB * missed + p.D_E * loop.wbar + p.rest) * (
+    if loop.lost is not None:
+        missed = missed + loop.lost.input
+    found = loop.nu * p.m.n_E * grown + (n.DB * missed + p.D_E * loop.wbar + p.rest) * (
         loop.tau * grown * decay_mean(y)
     )
+    return found if loop.lost is None else found + loop.lost.prediction

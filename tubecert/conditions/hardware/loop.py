@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Generic
@@ -28,13 +29,28 @@ class WindowProof:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rounding:
+    """What the arithmetic of the computer may lose at most (theorem H-R), in units of d^2/s, inputs, inputs, states.
+
+    `feedback` r_a: alpha/2 + c'kappa may be that much above 0; `input` r_u: what acts differs from u0 + kappa - q^ by
+    at most that; `estimate` r_q, of each sigma; `prediction` r_p, of the predicted state.
+    """
+
+    feedback: Fraction
+    input: Fraction
+    estimate: Fraction
+    prediction: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HardwareRecipe:
     """The proof of theorem H: the loop, and the numbers that the theorem asks for.
 
     The loop: `sample_time` Ts, `delay` tau, `feedback_time` Tf (Ts where the feedback has no rate of its own),
     `bandwidth` omega (None: no filter), `noise` nu in units of noise, `wind` |w|, `clip_radius` R. The proof: `level`
     dhat, `floor` f0, `speed` Y, `bias` S, `ripple` N, and `prediction` np of theorem H-P (None without prediction).
-    With `windows` (theorem HW) they are the largest of the windows.
+    With `windows` (theorem HW) they are the largest of the windows. `rounding`: none where the computer is exact, or
+    what it may lose.
     """
 
     sample_time: Fraction
@@ -51,11 +67,22 @@ class HardwareRecipe:
     ripple: Fraction
     prediction: Fraction | None
     windows: tuple[WindowProof, ...] = ()
+    rounding: tuple[Rounding, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost(Generic[T]):
+    """A `Rounding` in one arithmetic: r_a, r_u, r_q, r_p."""
+
+    feedback: T
+    input: T
+    estimate: T
+    prediction: T
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop(Generic[T]):
-    """A recipe in one arithmetic; `omega` None: th = 1; `np` None: no prediction.
+    """A recipe in one arithmetic; `omega` None: th = 1; `np` None: no prediction; `lost` None: a computer is exact.
 
     Two clocks: `late` is 1 where the feedback's is the slower one, else 0; `off` is 1 where the slower one is no
     multiple of the faster one, else 0.
@@ -75,6 +102,7 @@ class Loop(Generic[T]):
     np: T | None
     late: T
     off: T
+    lost: Lost[T] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,4 +172,15 @@ def loop_of(recipe: HardwareRecipe) -> Loop[Interval]:
         np=None if recipe.prediction is None else Interval.of(recipe.prediction),
         late=Interval.of(int(Tf > Ts)),
         off=Interval.of(int(not in_step(Ts, Tf))),
+        lost=lost_of(recipe.rounding, Interval.of),
+    )
+
+
+def lost_of(rounding: tuple[Rounding, ...], of: Callable[[Fraction], T]) -> Lost[T] | None:
+    """What is lost, in the arithmetic that `of` makes numbers of."""
+    if not rounding:
+        return None
+    (r,) = rounding
+    return Lost(
+        feedback=of(r.feedback), input=of(r.input), estimate=of(r.estimate), prediction=of(r.prediction)
     )

@@ -17,13 +17,14 @@ from tubecert.conditions.arithmetic import (
 from tubecert.conditions.hardware import windows
 from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.gains import uncovered
-from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
+from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, Rounding, loop_of, plant
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Margins, Theorem
 from tubecert.conditions.verdict import Shortfall, unbounded
 from tubecert.enclosure.interval import Interval
 
+_LOST = tuple(Rounding.__slots__)
 LEVEL, STAYS = "hardware_level", "hardware"  # the conditions (H.10) and (H.12)
 
 
@@ -74,10 +75,12 @@ def _from_below(margin: Interval) -> Interval:
 def _describes_a_loop(r: HardwareRecipe) -> bool:
     """What section 1 asks of the numbers: 0 <= delay <= Ts, and with prediction delay <= Tf."""
     positive = (r.sample_time, r.feedback_time, r.clip_radius, r.level, r.floor, r.speed)
-    sizes = (r.delay, r.noise, r.wind, r.bias, r.ripple)
+    lost = [x for each in r.rounding for x in (each.feedback, each.input, each.estimate, each.prediction)]
+    sizes = (r.delay, r.noise, r.wind, r.bias, r.ripple, *lost)
     return (
         all(x > 0 for x in positive)
         and all(x >= 0 for x in sizes)
+        and len(r.rounding) <= 1
         and (r.bandwidth is None or r.bandwidth > 0)
         and r.delay <= r.sample_time
         and (r.prediction is None or (r.prediction >= 0 and r.delay <= r.feedback_time))
@@ -123,9 +126,10 @@ def is_the_machine(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
         (Fraction(0) if wind is None else wind.bound, recipe.wind),
         (asked.bandwidth, recipe.bandwidth),
     )
-    return asked.predict == (recipe.prediction is not None) and all(
-        wanted is None or wanted == own for wanted, own in given
+    alike = asked.predict == (recipe.prediction is not None) and (asked.arithmetic is None) == (
+        not recipe.rounding
     )
+    return alike and all(wanted is None or wanted == own for wanted, own in given)
 
 
 def is_a_machine_like(problem: TubeProblem, own: HardwareRecipe | None, other: HardwareRecipe) -> bool:
@@ -140,6 +144,7 @@ def is_a_machine_like(problem: TubeProblem, own: HardwareRecipe | None, other: H
         (other.delay, Ts if asked.one_sample else own.delay),
         (other.feedback_time, Ts if asked.feedback_time is None else asked.feedback_time),
         (other.prediction is None, own.prediction is None),
+        (other.rounding, own.rounding),
     )
     return asked.bandwidth in (None, other.bandwidth) and all(a == b for a, b in same)
 
@@ -201,7 +206,7 @@ THEOREM = Theorem(
     ultimate=ultimate_radius,
     about=is_the_machine,
     alike=is_a_machine_like,
-    sizes=("delay", "noise", "wind", "speed", "bias", "ripple", "prediction"),
+    sizes=("delay", "noise", "wind", "speed", "bias", "ripple", "prediction", *_LOST),
     optional=("bandwidth", "prediction"),
-    parts=("windows",),
+    parts=("windows", "rounding"),
 )

@@ -1,0 +1,387 @@
+"""How much the arithmetic of a controller can lose: a bound of every error of its programs. Trusted.
+
+In: a `Controller` and the type it computes in. Out: the numbers of theorem H-R (theory 8.11), each an upper bound.
+Every operation is followed twice: what it gives in exact arithmetic lies in an interval, and what a computer gives
+differs from that by at most an error. Both are rounded outward. Nothing is assumed of how errors cancel.
+
+What is assumed of the computer: IEEE 754, rounded to nearest, every operation in its own type or fused with the next
+one; functions of math.h within 4 units in the last place (sqrt, by IEEE 754, within half a unit). Both are in the files
+that are exported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+
+from tubecert.conditions.hardware import Rounding
+from tubecert.coordinates import inverse
+from tubecert.enclosure import interval
+from tubecert.enclosure.constant import printable_above
+from tubecert.enclosure.interval import Array, Interval, sqrt, up
+from tubecert.export.controller import LEAST_SIZE, Controller
+from tubecert.export.program import GREATEST, LEAST, Place, Program, Step
+from tubecert.spec import Arithmetic
+
+_LIBRARY: Final = 8  # units of rounding that a function of math.h may be off: 4 in the last place
+_GAUSS: Final = 2016000  # of the error of Gauss's rule with three nodes: f^(6) length^6/2016000 of the mean
+_PIECES: Final = 64  # of the horizon, along which a plan is followed
+
+
+class UncoveredError(ValueError):
+    """What a controller does, and no bound is derived for; the text says what, for a reader."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Float:
+    """A type of IEEE 754: `unit` u of rounding, `least`, what underflow may lose, and `most`, below infinity."""
+
+    unit: Fraction
+    least: Fraction
+    most: float
+
+    def near(self, value: Fraction) -> Fraction:
+        """The number of the type that stands in the code for a constant."""
+        return (
+            Fraction(float(np.float32(float(value)))) if self.unit > DOUBLE.unit else Fraction(float(value))
+        )
+
+
+DOUBLE: Final = Float(unit=Fraction(1, 2**53), least=Fraction(1, 2**1074), most=2.0**1022)
+SINGLE: Final = Float(unit=Fraction(1, 2**24), least=Fraction(1, 2**149), most=2.0**126)
+
+FLOATS: Final[Mapping[Arithmetic, Float]] = {"single": SINGLE, "double": DOUBLE}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Followed:
+    """A result: exactly in `value`, and off by `error` at most; both (P,), by pieces of the plan."""
+
+    value: Interval
+    error: Array
+
+    @property
+    def most(self) -> Interval:
+        """A bound of what the computer has."""
+        return Interval.exact(self.value.magnitude) + Interval.exact(self.error)
+
+
+def rounding_of(controller: Controller, arithmetic: Arithmetic) -> Rounding:
+    """The numbers of theorem H-R for exported code; raises `UncoveredError` where none are derived."""
+    with np.errstate(all="ignore"):
+        return _Analysis(controller, FLOATS[arithmetic]).rounding()
+
+
+def within(controller: Controller, arithmetic: Arithmetic) -> bool:
+    """Whether the certificate of a controller allows for what its code can lose; raises `UncoveredError`."""
+    own, lost = rounding_of(controller, arithmetic), controller.lost
+    return lost is not None and all(getattr(own, each) <= getattr(lost, each) for each in Rounding.__slots__)
+
+
+class _Analysis:
+    """The programs of a controller, one after the other, on all that can go in."""
+
+    def __init__(self, controller: Controller, real: Float) -> None:
+        if controller.predicts:
+            raise UncoveredError("the integration of a prediction")
+        if controller.pieces is not None:
+            raise UncoveredError("a plan through knots")
+        self.c, self.real, self.u = controller, real, Interval.of(real.unit)
+        self.eta = Interval.of(real.least)
+        self.m, self.n = len(controller.inputs), len(controller.states)
+        W = inverse([list(row) for row in controller.metric])
+        self.widths = [sqrt(Interval.of(W[i][i])) * Interval.of(controller.reach) for i in range(self.n)]
+        self.norm_M, self.norm_W = _frobenius(controller.metric), _frobenius(W)
+
+    def rounding(self) -> Rounding:
+        """r_a, r_u, r_q; nothing is predicted."""
+        xs, us = self._plan()
+        law = self._law(xs, us)
+        return Rounding(
+            feedback=_printed(law.lost),
+            input=_printed(law.beside + self._written(law, us) + self._clipped()),
+            estimate=_printed(self._estimated(xs, law, us)),
+            prediction=Fraction(0),
+        )
+
+    # -- what goes in
+
+    def _time(self) -> Followed:
+        """The time of a sample, which is counted and multiplied; the code stops at the horizon."""
+        c = self.c
+        assert c.plan is not None
+        moves = any(step.operation == "input" for step in c.plan.steps if _reaches(c.plan, step))
+        if not moves:
+            return Followed(value=Interval.exact(np.zeros(1)), error=np.zeros(1))
+        if c.horizon is None:
+            raise UncoveredError("a plan that moves without end: the time itself loses digits")
+        end = float(c.horizon)
+        knots = np.linspace(0.0, end, _PIECES + 1)
+        value = Interval(knots[:-1], up(knots[1:]))
+        # of a time that is at most the horizon: the counter, Ts, their product and the horizon are rounded, and so are
+        # a node of Gauss's rule (a number of 20 digits) and its sum
+        late = 9 * self.u * Interval.of(max(c.horizon, c.sample_time)) + 4 * self.eta
+        return Followed(value=value, error=np.full(_PIECES, float(late.hi)))
+
+    def _plan(self) -> tuple[list[Followed], list[Followed]]:
+        assert self.c.plan is not None
+        t = self._time()
+        out = self._run(self.c.plan, {"t": [t]})
+        return [_over(t, x) for x in out["x"]], [_over(t, u) for u in out["u"]]
+
+    def _near(self, xs: Sequence[Followed]) -> list[Followed]:
+        """What may be measured: in the tube around x*, and without an error, as it is what the code has."""
+        return [
+            Followed(value=x.value + Interval(-w.hi, w.hi), error=0 * x.error)
+            for x, w in zip(xs, self.widths, strict=True)
+        ]
+
+    # -- the feedback
+
+    def _law(self, xs: Sequence[Followed], us: Sequence[Followed]) -> _Law:
+        """r_a, and what kappa may be above du d: theory 8.11, (H.37)-(H.39)."""
+        y = self._near(xs)
+        f = self._run(self.c.drift, {"x": y})["f"]
+        vs = self._run(self.c.flow, {"x": xs, "u": us})["v"]
+        found = self._run(self.c.law, {"y": y, "f": f, "xs": xs, "vs": vs, "us": us}, apart=("y", "xs"))
+        z, c, (excess,) = found["z"], found["c"], found["excess"]
+        e_z, e_c, e_a = _length(z), _length(c), Interval.exact(excess.error)
+        C = _size(c)
+        theta = 2 * (self.m + 8) * self.u + self.m * self.eta / Interval.of(LEAST_SIZE)
+        nu = (2 * self.n + 4) * self.u * self.norm_M * self.norm_W
+        if not float(nu.hi) < 0.5:
+            raise UncoveredError("the metric, in this type: its distances have no digit that is right")
+        du, reach = Interval.of(self.c.feedback_gain), Interval.of(self.c.reach)
+        off = sqrt(self.norm_M) * e_z
+        lost = sqrt(self.eta * (self.n + 2) ** 2 * (1 + self.norm_M) * (1 + reach * reach * self.norm_W))
+        beyond = du * (off + (nu + 6 * self.u) * (reach + off) + lost)  # e_l, (H.37)
+        L = du * reach + beyond
+        if not bool(np.all(beyond.hi <= (du * reach).lo)):
+            raise UncoveredError("the feedback, in this type: its limit has no digit that is right")
+        above = beyond + theta * L
+        least = sqrt(Interval.of(LEAST_SIZE))
+        r_a = e_a + L * (7 * e_c + 4 * theta * (C + e_c)) + 2 * C * beyond + 2 * L * least + C * above
+        return _Law(lost=_most(r_a), beside=_most(above), feedback=_most(L + above))
+
+    def _written(self, law: _Law, us: Sequence[Followed]) -> Interval:
+        """u* and the two sums that make the input of kappa, u* and the estimate."""
+        most = law.feedback + _most(_size(us)) + self._estimate
+        return _most(_length(us)) + 3 * self.u * (most + most) + 4 * self.m * self.eta
+
+    @property
+    def _estimate(self) -> Interval:
+        return Interval.of(self.c.estimate)
+
+    def _clipped(self) -> Interval:
+        """The projection: of a box its ends are rounded, of a ball the length, the share and the product."""
+        return (self.m + 8) * self.u * self._estimate + 4 * self.m * self.eta
+
+    # -- the estimate
+
+    def _estimated(self, xs: Sequence[Followed], law: _Law, us: Sequence[Followed]) -> Interval:
+        """r_q: all that one sample adds to q, over th."""
+        y = self._near(xs)
+        f = self._run(self.c.drift, {"x": y})["f"]
+        pieces = len(y[0].error)
+        # what was measured a sample before may lie in the piece before
+        last_y, last_f = [_widened(x) for x in y], [_widened(x) for x in f]
+        held = law.feedback + _most(_size(us)) + 2 * self._estimate
+        acted = [_within(held, pieces) for _ in range(self.m)]
+        given = {"held": acted, "before": acted}
+        if self.c.gauss is not None:
+            given["played"] = self._played(us)
+        mean = self._run(self.c.applied, given)["mean"]
+        q = [_within(self._estimate, pieces) for _ in range(self.m)]
+        seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
+        new = self._run(self.c.estimator, {**seen, "q": q, "mean": mean})["q"]
+        share = Interval.of(self.c.share)
+        # th and pi are decimals of 50 digits at least
+        return _most(_length(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
+
+    def _played(self, us: Sequence[Followed]) -> list[Followed]:
+        """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*."""
+        assert self.c.gauss is not None
+        assert self.c.bend is not None
+        nodes = [_widened(u) for u in us]
+        found = self._run(self.c.gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
+        bends = self._run(self.c.bend, {"t": [self._time()]})["u"]
+        share = Interval.of(self.c.sample_time**6 / _GAUSS)
+        return [
+            Followed(
+                value=x.value,
+                error=(Interval.exact(x.error) + share * Interval.exact(_widened(bend).value.magnitude)).hi,
+            )
+            for x, bend in zip(found, bends, strict=True)
+        ]
+
+    # -- steps
+
+    def _run(
+        self, program: Program, given: Mapping[str, Sequence[Followed]], apart: tuple[str, str] | None = None
+    ) -> dict[str, list[Followed]]:
+        """What comes out of a program; `apart`: vectors whose entries differ by the half-widths at most."""
+        memory: list[Followed] = []
+        for step in program.steps:
+            found = self._step(step, memory, given)
+            if apart is not None and step.operation == "sub":
+                found = self._met(found, [program.steps[p] for p in step.places], apart)
+            memory.append(found)
+        ports = (*program.outputs, *program.marked)
+        return {port.name: [memory[place] for place in port.places] for port in ports}
+
+    def _met(self, found: Followed, args: Sequence[Step], apart: tuple[str, str]) -> Followed:
+        """y_i - x*_i lies within the half-width."""
+        first, second = args
+        names = (first.name, second.name) if {first.operation, second.operation} == {"input"} else None
+        if names != apart or first.index != second.index:
+            return found
+        w = self.widths[first.index].hi
+        return Followed(
+            value=Interval(np.maximum(found.value.lo, -w), np.minimum(found.value.hi, w)), error=found.error
+        )
+
+    def _step(
+        self, step: Step, memory: Sequence[Followed], given: Mapping[str, Sequence[Followed]]
+    ) -> Followed:
+        if step.operation == "input":
+            return given[step.name][step.index]
+        if step.operation == "constant":
+            off = abs(step.value - self.real.near(step.value))
+            return Followed(value=Interval.of(step.value), error=np.asarray(Interval.of(off).hi))
+        args = [memory[place] for place in step.places]
+        if step.operation == "neg":
+            return Followed(value=-args[0].value, error=args[0].error)
+        if step.operation == "choose":
+            return self._chosen(step.name, args[0], args[1])
+        if step.operation == "call":
+            return self._called(step.name, args[0])
+        return self._rounded(*_combined(step.operation, args[0], args[1]))
+
+    def _rounded(self, value: Interval, error: Interval, units: int = 1) -> Followed:
+        """With the rounding of the operation itself."""
+        most = Interval.exact(value.magnitude) + error
+        whole = error + units * self.u * most + units * self.eta
+        sure = np.asarray(most.hi) < self.real.most  # of what overflows, and of NaN, nothing is known
+        return Followed(value=value, error=np.where(sure, whole.hi, np.inf))
+
+    def _chosen(self, name: str, a: Followed, b: Followed) -> Followed:
+        """The lesser or the greater of two moves by no more than they do; of other choices nothing is asked."""
+        error = np.maximum(a.error, b.error)
+        x, y = a.value, b.value
+        if name == LEAST:
+            return Followed(value=Interval(np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi)), error=error)
+        if name == GREATEST:
+            return Followed(value=Interval(np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi)), error=error)
+        return Followed(value=Interval(-np.inf, np.inf), error=error + np.inf)
+
+    def _called(self, name: str, a: Followed) -> Followed:
+        value, off = getattr(interval, name)(a.value), Interval.exact(a.error)
+        wide = Interval((a.value - off).lo, (a.value + off).hi)
+        error = Interval.exact(_steepest(name, wide)) * off
+        if name == "sqrt":
+            # |sqrt(p) - sqrt(q)| <= sqrt(|p - q|), where the slope has no bound
+            error = Interval.exact(np.fmin(error.sanitised().hi, sqrt(off).hi))
+        return self._rounded(value, error, 1 if name == "sqrt" else _LIBRARY)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Law:
+    """r_a; what kappa is above du d at most; and a bound of |kappa|."""
+
+    lost: Interval
+    beside: Interval
+    feedback: Interval
+
+
+def _combined(operation: str, a: Followed, b: Followed) -> tuple[Interval, Interval]:
+    """The exact result, and how far it moves with its operands."""
+    x, y = a.value, b.value
+    off_a, off_b = Interval.exact(a.error), Interval.exact(b.error)
+    if operation == "add":
+        return x + y, off_a + off_b
+    if operation == "sub":
+        return x - y, off_a + off_b
+    size_x, size_y = Interval.exact(x.magnitude), Interval.exact(y.magnitude)
+    if operation == "mul":
+        return x * y, size_x * off_b + size_y * off_a + off_a * off_b
+    ratio = x / y
+    room = Interval.exact(y.mignitude) - off_b
+    moved = (off_a + Interval.exact(ratio.sanitised().magnitude) * off_b) / room
+    return ratio, Interval(moved.lo, np.where(room.lo > 0, moved.hi, np.inf))
+
+
+def _steepest(name: str, x: Interval) -> Array:
+    """A bound of |f'| over an interval."""
+    one = Interval.of(1)
+    slopes = {
+        "sin": one,
+        "cos": one,
+        "atan": one,
+        "tanh": one,
+        "tan": one + interval.tan(x) * interval.tan(x),
+        "exp": interval.exp(x),
+        "sinh": interval.cosh(x),
+        "cosh": interval.sinh(x),
+        "log": one / x,
+        "sqrt": one / (2 * sqrt(x)),
+        "asin": one / sqrt(one - x * x),
+        "acos": one / sqrt(one - x * x),
+    }
+    return slopes[name].sanitised().magnitude
+
+
+def _reaches(program: Program, step: Step) -> bool:
+    """Whether something that comes out of a program rests on a step."""
+    wanted: set[Place] = {place for port in program.outputs for place in port.places}
+    for place in range(len(program.steps) - 1, -1, -1):
+        if place in wanted:
+            wanted |= set(program.steps[place].places)
+    return any(program.steps[place] is step for place in wanted)
+
+
+def _frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:
+    return sqrt(Interval.of(sum((q * q for row in rows for q in row), Fraction(0))))
+
+
+def _length(vector: Sequence[Followed]) -> Interval:
+    """The Euclidean length of the errors, by pieces."""
+    return sqrt(sum((Interval.exact(x.error) * Interval.exact(x.error) for x in vector), Interval.of(0)))
+
+
+def _size(vector: Sequence[Followed]) -> Interval:
+    """A bound of the length of what a computer has, by pieces."""
+    return sqrt(sum((x.most * x.most for x in vector), Interval.of(0)))
+
+
+def _over(t: Followed, x: Followed) -> Followed:
+    """By pieces, also what does not depend on time."""
+    zero = 0 * t.error
+    return Followed(value=Interval(x.value.lo + zero, x.value.hi + zero), error=x.error + zero)
+
+
+def _widened(x: Followed) -> Followed:
+    """Over all pieces."""
+    value = Interval(np.full_like(x.error, x.value.lo.min()), np.full_like(x.error, x.value.hi.max()))
+    return Followed(value=value, error=np.full_like(x.error, x.error.max()))
+
+
+def _within(most: Interval, pieces: int) -> Followed:
+    """What is known by its size only, and has no error of its own: it is what the code has."""
+    ends = np.full(pieces, float(np.max(most.hi)))
+    return Followed(value=Interval(-ends, ends), error=np.zeros(pieces))
+
+
+def _most(x: Interval) -> Interval:
+    """The largest over all pieces."""
+    return Interval.exact(float(np.max(x.sanitised().hi)))
+
+
+def _printed(x: Interval) -> Fraction:
+    most = float(x.hi)
+    if not np.isfinite(most):
+        raise UncoveredError("what a program computes has no bound in this type")
+    return Fraction(repr(printable_above(most)))
