@@ -45,6 +45,8 @@ def pad(at: Digital) -> Fraction:
 def along(windows: Sequence[Window], promise: Promise) -> tuple[Passed, ...] | None:
     """What theorem HW gives; None where a condition beside those of the levels, (H.25), is not proven."""
     for window in windows:
+        if window.at.losses is not None:  # theorem H-R is stated for one window
+            return None
         if not window.at.sensible or promise.predicts != (window.at.prediction is not None):
             return None
         if window.length < pad(window.at):

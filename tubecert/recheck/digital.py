@@ -92,8 +92,20 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Losses:
+    """What the arithmetic of the controller may lose: of alpha/2 + c'kappa, the input, sigma, the predicted state."""
+
+    feedback: Fraction
+    input: Fraction
+    estimate: Fraction
+    prediction: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Digital:
     """The numbers of a recipe; times in s. `bandwidth` None: the filter forgets at once (omega is infinite).
+
+    `losses` None: the controller is exact.
 
     With `windows` those of the proof are the largest of theirs.
     """
@@ -112,6 +124,7 @@ class Digital:
     ripple: Fraction
     prediction: Fraction | None
     windows: tuple[Stretch, ...] = ()
+    losses: Losses | None = None
 
     @property
     def sensible(self) -> bool:
@@ -122,6 +135,8 @@ class Digital:
         late = self.delay > self.sample_time
         if self.prediction is not None:
             late = late or self.delay > self.feedback_time
+        if self.losses is not None:
+            others = (*others, *(getattr(self.losses, item.name) for item in fields(Losses)))
         return min(above) > 0 and min(others) >= 0 and filters and not late
 
 
@@ -275,6 +290,10 @@ class Evaluation:
             (arb(0), arb(1), arb(1)) if gain is None else (gain.g, gain.most, gain.more)
         )
         self.gain = gain
+        none = Losses(feedback=Fraction(0), input=Fraction(0), estimate=Fraction(0), prediction=Fraction(0))
+        lost = at.losses or none
+        self.lost_feedback, self.lost_input = exact(lost.feedback), exact(lost.input)
+        self.lost_estimate, self.lost_prediction = exact(lost.estimate), exact(lost.prediction)
         self.beta = self.most * self.n.metric_input_gain
         self.du = self.most * self.more * self.n.feedback_gain
         self.rate = self.n.h_t + self.n.h_x * self.Y  # s1
@@ -296,12 +315,13 @@ class Evaluation:
         return self.most * (self.kb + self.ups + self.X)
 
     def _feedforward(self) -> Ball:
-        """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old."""
+        """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old, and how u is rounded."""
         if not self.promise.held:
-            return arb(0)
+            return self.lost_input
         jump = 2 * self.n.u_star
         oldest = larger(self.Ts, self.Tf) + self.tau
-        return jump if self.m.input_rate is None else smaller(jump, self.m.input_rate * oldest)
+        held = jump if self.m.input_rate is None else smaller(jump, self.m.input_rate * oldest)
+        return held + self.lost_input
 
     def needed(self) -> tuple[Ball, Ball, Ball, Ball]:
         """What Y has to exceed (H.11), and what S, N and np have to reach."""
@@ -312,8 +332,8 @@ class Evaluation:
     def serves(self) -> bool:
         """Whether the side conditions hold."""
         Y, S, N, seen = self.needed()
-        if self.gain is not None and not self.gain.sensible:
-            return False
+        if self.gain is not None and not (self.gain.sensible and self.at.losses is None):
+            return False  # theorem H-R is stated for a known B
         enough = Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)
         return bool(enough and self.bending() > 0)
 
@@ -328,6 +348,7 @@ class Evaluation:
         e = self.rate * Ts / 2 + turning * whole * apart
         e = e + m.drift_explained * (Y * Ts / 4 + self.nbar)
         e = e + self._gust() + n.B_pinv_x * self.setting.rest * apart
+        e = e + self.lost_estimate
         return (1 - self.th) / self.th * self.rate * Ts + e + self._mistaken()
 
     def _mistaken(self) -> Ball:
@@ -349,8 +370,9 @@ class Evaluation:
         slope = n.f_x + n.b_x * (n.u_star + self.ups + self.kb)
         growth = (slope * self.tau).expm1()
         mean = growth / slope if slope > 0 else self.tau * (growth + 1)  # at most tau e^(D_p tau)
-        unknown = self.most * self.X + self.g * (self.kb + self.ups)
-        return self.nbar * (growth + 1) + (n.B * unknown + self.blown + self.setting.rest) * mean
+        unknown = self.most * self.X + self.g * (self.kb + self.ups) + self.lost_input
+        drift = (n.B * unknown + self.blown + self.setting.rest) * mean
+        return self.nbar * (growth + 1) + drift + self.lost_prediction
 
     # -- the feedback
 
@@ -395,7 +417,8 @@ class Evaluation:
         )
         first = larger(oldest, self.tau)
         least = lam * self.floor
-        base = n.plan_defect_metric + self.beta * self.ups + self.pushed
+        # the sampled feedback may be above (0.5) by what it loses, which counts where d is the floor at least
+        base = n.plan_defect_metric + self.beta * self.ups + self.pushed + self.lost_feedback / self.floor
         begun = (V_d * first + self.n_M) / self.floor
         moved = (V_d * oldest + self.n_M) / self.floor
         delta_1 = larger(least, base + (ell0 + ell * first) * (1 + begun))

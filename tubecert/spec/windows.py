@@ -84,6 +84,12 @@ def check_windows(
             f"{at.path} beside a number that is to be largest",
             "give the number, or leave the windows out: each candidate would need windows of its own",
         )
+    elif machine.arithmetic is not None:
+        at.fail(
+            codes.RANGE,
+            f"{at.path} beside hardware.arithmetic: rounding is covered in one window only",
+            "leave one of the two out",
+        )
     elif plan.horizon is None or plan.bundle is not None:
         at.fail(
             codes.RANGE,

@@ -36,6 +36,10 @@ def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Inte
         return nothing, nothing
     if not problem.machine.clips_within(problem.constants.h, recipe.clip_radius):
         return nothing, nothing
+    if recipe.rounding and (
+        problem.gain is not None or recipe.windows
+    ):  # theorem H-R is for one window, a known B
+        return nothing, nothing
     if problem.machine.windows or recipe.windows:
         if problem.gain is not None:  # theorem HW is stated for a known B
             return nothing, nothing

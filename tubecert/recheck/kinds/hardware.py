@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import ClassVar
 
@@ -12,7 +12,7 @@ from tubecert.recheck.balls import exact, root
 from tubecert.recheck.clipping import clips
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome, prove
-from tubecert.recheck.digital import Digital, Loop, Promise, loop, proposed
+from tubecert.recheck.digital import Digital, Loop, Losses, Promise, loop, proposed
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
@@ -95,13 +95,14 @@ class OfMachines(Kind[HardwareSection, Digital]):
 
     def read_recipe(self, node: Node) -> Digital:
         """The machine and the numbers of the proof."""
-        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction", optional=("windows",))
+        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction", optional=("windows", "rounding"))
         found = {key: own[key].decimal() for key in (*_MACHINE, *_PROOF)}
         return Digital(
             **found,
             bandwidth=own.known("bandwidth", Node.decimal),
             prediction=own.known("prediction", Node.decimal),
             windows=own.get("windows", read_stretches) or (),
+            losses=own.get("rounding", _losses),
         )
 
     def uncovered(self, setting: Setting) -> str | None:
@@ -261,6 +262,14 @@ def _section(node: Node) -> HardwareSection:
     )
 
 
+def _losses(node: Node) -> Losses:
+    """One record, in a list: none is left out."""
+    (own,) = node.sized(1)
+    keys = tuple(item.name for item in fields(Losses))
+    members = own.closed(*keys)
+    return Losses(**{key: members[key].decimal() for key in keys})
+
+
 def _budget(node: Node) -> dict[str, Fraction]:
     own = node.closed(*SHARES, optional=OF_GAINS)
     more = {key: own.get(key, Node.number) or Fraction(0) for key in OF_GAINS}
@@ -306,6 +315,10 @@ def _agrees(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcom
         (
             asked.predict == (recipe.prediction is not None),
             "the recipe predicts otherwise than the specification",
+        ),
+        (
+            (asked.arithmetic is None) == (recipe.losses is None),
+            "the recipe rounds otherwise than the specification",
         ),
         (asked.bandwidth in (None, recipe.bandwidth), "the bandwidth is not that of the specification"),
         (len(recipe.windows) == len(section.windows), "the recipe has other windows"),

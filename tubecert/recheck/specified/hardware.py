@@ -25,7 +25,7 @@ class Hardware:
     None where the largest is asked for: then the section states it. `one_sample`: the delay is the sample time. `noise`
     is a Euclidean length, or one size per state. `held`: u* is held like the other inputs; `feedback_time`: the sample
     time of the feedback, if it has one of its own; `predict`: the feedback is that of a predicted state. `bandwidth`
-    binds no claim but that it is the one used.
+    binds no claim but that it is the one used. `arithmetic` that the controller computes in; None: it is exact.
     """
 
     sample_time: Fraction | None
@@ -37,6 +37,7 @@ class Hardware:
     feedback_time: Fraction | None
     predict: bool
     bandwidth: Fraction | None
+    arithmetic: str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +61,7 @@ def read_machine(own: Members, states: Sequence[str]) -> tuple[Hardware | None, 
 
 def _hardware(node: Node, states: Sequence[str]) -> Hardware:
     keys = ("sample_time", "delay", "noise", "feedforward", "predict", "bandwidth")
-    own = node.closed(*keys, optional=("noise_rate", "feedback_rate"))
+    own = node.closed(*keys, optional=("noise_rate", "feedback_rate", "arithmetic"))
     feedback = own.get("feedback_rate", positive)
     found = Hardware(
         sample_time=_unless(own["sample_time"], _LARGEST, positive),
@@ -72,6 +73,7 @@ def _hardware(node: Node, states: Sequence[str]) -> Hardware:
         feedback_time=None if feedback is None else 1 / feedback,
         predict=own["predict"].word("true", "false") == "true",
         bandwidth=_unless(own["bandwidth"], _AUTO, positive),
+        arithmetic=own.get("arithmetic", lambda item: item.word("single", "double")),
     )
     if found.delay is not None and found.sample_time is not None and found.delay > found.sample_time:
         raise own["delay"].refused("is longer than the sample time")
