@@ -215,7 +215,7 @@ def assumptions(
     """
     flat = all(e.is_constant for row in model.W for e in row)
     smooth, horizon, wind = spec.adaptation.smooth, spec.trajectory.horizon, spec.disturbance
-    machine = () if spec.hardware is None else (MachineAsGiven(),)
+    machine = () if spec.hardware is None else (MachineAsGiven(arithmetic=spec.hardware.arithmetic),)
     return (
         LeastFeedback(),
         StraightGeodesics() if flat else _geodesic_assumption(geodesics),

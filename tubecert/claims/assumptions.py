@@ -104,9 +104,13 @@ class UncertaintyAsGiven(Assumption):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MachineAsGiven(Assumption):
-    """The computer, its sensors and its inputs are what the section `hardware` says; for certificate H."""
+    """The computer, its sensors and its inputs are what the section `hardware` says; for certificate H.
+
+    `arithmetic` that the controller computes in, losing no more than `rounding` of the proof says; None: it is exact.
+    """
 
     tag: ClassVar[str] = "machine_as_given"
+    arithmetic: Literal["single", "double"] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
+from tubecert.export.words import brief
 from tubecert.library.exporting import Language, Precision, export
 from tubecert.printable import visible
 
@@ -15,5 +16,5 @@ def run(name: str, folder: str | None, language: Language, precision: Precision,
     found = export(name, target, language=language, precision=precision)
     if not output.quiet:
         write_stdout(f"{visible(target)}: {', '.join(sorted(found.files))}\n")
-        write_stdout("the proof is about exact arithmetic: rounding is not covered (README.md)\n")
+        write_stdout(f"{brief(found.controller)} (README.md)\n")
     return ExitCode.CERTIFIED

@@ -19,6 +19,7 @@ from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Certificate
 from tubecert.conditions.hardware import HardwareRecipe, Rounding
 from tubecert.coordinates import Coordinates, Fields, inverse
+from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
 from tubecert.expression import derivatives, free_symbols
@@ -47,13 +48,18 @@ _LONGEST: Final = 32  # characters of a name
 class Pieces:
     """A plan through knots: `start` (K,) in s, x* (K, n, 4) and u* (K, m, 2) as polynomials of t - start.
 
-    `most`: so many pieces can meet one sample at most.
+    `most`: so many pieces can meet one sample at most. `x_off` and `u_off`, of the same shapes: how far a coefficient is
+    from the exact one at most; `length` (K,) in s; `continuous`: u* does not jump.
     """
 
     start: tuple[Fraction, ...]
     x: tuple[tuple[tuple[Fraction, ...], ...], ...]
     u: tuple[tuple[tuple[Fraction, ...], ...], ...]
     most: int
+    x_off: tuple[tuple[tuple[Fraction, ...], ...], ...]
+    u_off: tuple[tuple[tuple[Fraction, ...], ...], ...]
+    length: tuple[Fraction, ...]
+    continuous: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -491,7 +497,15 @@ def _pieces(plan: PiecewisePlan, sample_time: Fraction) -> Pieces:
     shortest = min((b - a for a, b in pairwise(start)), default=sample_time)
     return Pieces(
         start=start,
-        x=tuple(tuple(tuple(map(Fraction, row)) for row in piece) for piece in found.x.mid.tolist()),
-        u=tuple(tuple(tuple(map(Fraction, row)) for row in piece) for piece in found.u.mid.tolist()),
+        x=_table(found.x.mid),
+        u=_table(found.u.mid),
         most=int(sample_time / shortest) + 2,
+        x_off=_table(found.x.rad),
+        u_off=_table(found.u.rad),
+        length=tuple(map(Fraction, found.length.hi.tolist())),
+        continuous=plan.data.interpolation == "linear" or len(found) == 1,
     )
+
+
+def _table(values: Array) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
+    return tuple(tuple(tuple(map(Fraction, row)) for row in piece) for piece in values.tolist())

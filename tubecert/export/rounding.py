@@ -22,9 +22,9 @@ from tubecert.conditions.hardware import Rounding
 from tubecert.coordinates import inverse
 from tubecert.enclosure import interval
 from tubecert.enclosure.constant import printable_above
-from tubecert.enclosure.interval import Array, Interval, sqrt, up
-from tubecert.export.controller import LEAST_SIZE, Controller
-from tubecert.export.program import GREATEST, LEAST, Place, Program, Step
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt, up
+from tubecert.export.controller import LEAST_SIZE, Controller, Pieces
+from tubecert.export.program import GREATEST, LEAST, Program, Step
 from tubecert.spec import Arithmetic
 
 _LIBRARY: Final = 8  # units of rounding that a function of math.h may be off: 4 in the last place
@@ -88,8 +88,8 @@ class _Analysis:
     def __init__(self, controller: Controller, real: Float) -> None:
         if controller.predicts:
             raise UncoveredError("the integration of a prediction")
-        if controller.pieces is not None:
-            raise UncoveredError("a plan through knots")
+        if controller.pieces is not None and not (controller.held and controller.pieces.continuous):
+            raise UncoveredError("a plan through knots whose input is not held, or jumps")
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)
         self.eta = Interval.of(real.least)
         self.m, self.n = len(controller.inputs), len(controller.states)
@@ -110,28 +110,68 @@ class _Analysis:
 
     # -- what goes in
 
-    def _time(self) -> Followed:
-        """The time of a sample, which is counted and multiplied; the code stops at the horizon."""
-        c = self.c
-        assert c.plan is not None
-        moves = any(step.operation == "input" for step in c.plan.steps if _reaches(c.plan, step))
-        if not moves:
-            return Followed(value=Interval.exact(np.zeros(1)), error=np.zeros(1))
-        if c.horizon is None:
+    def _late(self) -> Interval:
+        """How far a time is off that is at most the horizon.
+
+        The counter, Ts, their product and the horizon are rounded, and so are a node of Gauss's rule (a number of 20
+        digits) and its sum.
+        """
+        if self.c.horizon is None:
             raise UncoveredError("a plan that moves without end: the time itself loses digits")
-        end = float(c.horizon)
-        knots = np.linspace(0.0, end, _PIECES + 1)
-        value = Interval(knots[:-1], up(knots[1:]))
-        # of a time that is at most the horizon: the counter, Ts, their product and the horizon are rounded, and so are
-        # a node of Gauss's rule (a number of 20 digits) and its sum
-        late = 9 * self.u * Interval.of(max(c.horizon, c.sample_time)) + 4 * self.eta
-        return Followed(value=value, error=np.full(_PIECES, float(late.hi)))
+        return 9 * self.u * Interval.of(max(self.c.horizon, self.c.sample_time)) + 4 * self.eta
+
+    def _time(self, plan: Program) -> Followed:
+        """The time of a sample, which is counted and multiplied; the code stops at the horizon."""
+        if not _reads_input(plan):
+            return Followed(value=Interval.exact(np.zeros(1)), error=np.zeros(1))
+        late = self._late()
+        assert self.c.horizon is not None
+        knots = np.linspace(0.0, float(up(float(self.c.horizon))), _PIECES + 1)
+        return Followed(value=Interval(knots[:-1], knots[1:]), error=np.full(_PIECES, float(late.hi)))
 
     def _plan(self) -> tuple[list[Followed], list[Followed]]:
+        if self.c.pieces is not None:
+            return self._through_knots(self.c.pieces)
         assert self.c.plan is not None
-        t = self._time()
+        t = self._time(self.c.plan)
         out = self._run(self.c.plan, {"t": [t]})
         return [_over(t, x) for x in out["x"]], [_over(t, u) for u in out["u"]]
+
+    def _through_knots(self, plan: Pieces) -> tuple[list[Followed], list[Followed]]:
+        """Piece by piece; where a time near a knot is taken for one in the next piece, x* and u* go on continuously."""
+        late = self._late()
+        start, length = _fractions(plan.start), _fractions(plan.length)
+        begun = late + (self.u * Interval.exact(start.magnitude) + self.eta)
+        r = Interval(-2 * begun.hi, (length + 2 * begun).hi)
+        since = self._rounded(r, begun)
+        rows = [
+            [self._polynomial(since, late, values[:, i], off[:, i]) for i in range(values.shape[1])]
+            for values, off in (
+                (_numbers(plan.x), _numbers(plan.x_off)),
+                (_numbers(plan.u), _numbers(plan.u_off)),
+            )
+        ]
+        return rows[0], rows[1]
+
+    def _polynomial(self, r: Followed, late: Interval, values: Array, off: Array) -> Followed:
+        """a_0 + r (a_1 + r (a_2 + ...)), of every piece; `values` (K, powers) are floats, `off` bounds their errors."""
+        powers = [
+            Followed(
+                value=Interval.exact(values[:, k]) + Interval(-off[:, k], off[:, k]),
+                error=(
+                    Interval.exact(off[:, k]) + self.u * Interval.exact(np.abs(values[:, k])) + self.eta
+                ).hi,
+            )
+            for k in range(values.shape[1])
+        ]
+        found = powers[-1]
+        slope = Interval.exact(np.zeros(len(values)))
+        for k in range(len(powers) - 2, -1, -1):
+            slope = slope * r.value + found.value
+            found = self._rounded(*_combined("mul", r, found))
+            found = self._rounded(*_combined("add", powers[k], found))
+        wrong = 4 * late * Interval.exact(float(np.max(slope.sanitised().magnitude)))
+        return Followed(value=found.value, error=(Interval.exact(found.error) + wrong).hi)
 
     def _near(self, xs: Sequence[Followed]) -> list[Followed]:
         """What may be measured: in the tube around x*, and without an error, as it is what the code has."""
@@ -208,7 +248,7 @@ class _Analysis:
         assert self.c.bend is not None
         nodes = [_widened(u) for u in us]
         found = self._run(self.c.gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
-        bends = self._run(self.c.bend, {"t": [self._time()]})["u"]
+        bends = self._run(self.c.bend, {"t": [self._time(self.c.bend)]})["u"]
         share = Interval.of(self.c.sample_time**6 / _GAUSS)
         return [
             Followed(
@@ -334,13 +374,22 @@ def _steepest(name: str, x: Interval) -> Array:
     return slopes[name].sanitised().magnitude
 
 
-def _reaches(program: Program, step: Step) -> bool:
-    """Whether something that comes out of a program rests on a step."""
-    wanted: set[Place] = {place for port in program.outputs for place in port.places}
-    for place in range(len(program.steps) - 1, -1, -1):
-        if place in wanted:
-            wanted |= set(program.steps[place].places)
-    return any(program.steps[place] is step for place in wanted)
+def _reads_input(program: Program) -> bool:
+    """Whether anything but what goes in is made of what goes in."""
+    read = {place for step in program.steps for place in step.places}
+    written = {place for port in program.outputs for place in port.places}
+    given = {place for port in program.inputs for place in port.places}
+    return bool(given & (read | written))
+
+
+def _fractions(values: Sequence[Fraction]) -> Interval:
+    ends = [fraction_bounds(value) for value in values]
+    return Interval([low for low, _ in ends], [high for _, high in ends])
+
+
+def _numbers(table: Sequence[Sequence[Sequence[Fraction]]]) -> Array:
+    """A table of floats, as floats."""
+    return np.array([[[float(value) for value in row] for row in piece] for piece in table])
 
 
 def _frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:

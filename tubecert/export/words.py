@@ -31,6 +31,13 @@ def promise(controller: Controller) -> tuple[str, ...]:
     return _EXACT if controller.lost is None else _ROUNDED
 
 
+def brief(controller: Controller) -> str:
+    """The same in a line."""
+    if controller.lost is None:
+        return "the proof is about exact arithmetic: rounding is not covered"
+    return "the proof covers the rounding of this code"
+
+
 def heading(controller: Controller) -> str:
     """The first line of every file."""
     return f"{controller.system}: the controller of certificate H. Written by tubecert export; do not edit."

@@ -199,8 +199,12 @@ def assumptions(result: Result, s: System) -> Outcome:
     """The list of what is assumed is that of this format, each with the parameters of the specification."""
     geodesics = None if result.metric is None else result.metric.geodesics
     wanted = _assumed(s, geodesics)
-    if result.specification.hardware is not None:
-        wanted.append(Assumption("machine_as_given", {}))
+    machine = result.specification.hardware
+    if machine is not None:
+        arithmetic: dict[str, object] = (
+            {} if machine.arithmetic is None else {"arithmetic": machine.arithmetic}
+        )
+        wanted.append(Assumption("machine_as_given", arithmetic))
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:
             return stated(

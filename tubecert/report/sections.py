@@ -13,7 +13,8 @@ from rich.text import Text
 
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
-from tubecert.claims.family import Reason
+from tubecert.claims.assumptions import MachineAsGiven
+from tubecert.claims.family import Assumption, Reason
 from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, HARDWARE, SAMPLED
 from tubecert.kinds.alone import AloneData
@@ -410,6 +411,16 @@ def gap(item: Bound) -> str:
 # -- assumptions
 
 
+def _computes(stated: Sequence[Assumption]) -> str:
+    """How the controller of a machine computes."""
+    found = next((each.arithmetic for each in stated if isinstance(each, MachineAsGiven)), None)
+    return (
+        "it computes exactly"
+        if found is None
+        else f"it computes in {found} precision, whose rounding is covered"
+    )
+
+
 def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
     stated, declared = result.assumptions, result.declared
     believed = [
@@ -425,7 +436,7 @@ def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
     if result.decided_by == (HARDWARE.key,):
         brief = (
             "the machine is as stated: it samples on time, its inputs follow after exactly the delay, its measurements "
-            "are as good as stated, it computes exactly; the uncertainty and the wind are as specified"
+            f"are as good as stated, {_computes(stated)}; the uncertainty and the wind are as specified"
         )
         return [
             Text(line)

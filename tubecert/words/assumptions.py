@@ -31,10 +31,6 @@ _FIXED: dict[type[Assumption], str] = {
     "ball",
     HardProjection: "the projection is hard",
     PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
-    MachineAsGiven: "certificate H is about the machine of the section hardware: it samples on time, its inputs act "
-    "after exactly that delay and are held, its measurements are as good as stated, and it computes the feedback "
-    "exactly, and the estimate with B^+ (in coordinates S of the tube: (S B)^+ S); what is said here of continuous "
-    "time, of exact measurements and of the predictor is for 0, A, B and C",
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
     ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "
@@ -54,6 +50,8 @@ def assumed(item: Assumption) -> str:
             return f"the claim is for 0 <= t <= {float(item.horizon):g} s"
         case WindWithin():
             return _wind(item)
+        case MachineAsGiven():
+            return _machine(item)
         case UncertaintyAsGiven():
             others = ", or any other within the bounds h, h_x, h_t of this certificate"
             return "the uncertainty is the expression of the specification" + (
@@ -61,6 +59,21 @@ def assumed(item: Assumption) -> str:
             )
         case _:
             return _FIXED[type(item)]
+
+
+def _machine(item: MachineAsGiven) -> str:
+    computes = "it computes exactly"
+    if item.arithmetic is not None:
+        computes = (
+            f"it computes in {item.arithmetic} precision, losing no more than `rounding` of the proof says (which "
+            "tubecert export proves of the code that it writes)"
+        )
+    return (
+        "certificate H is about the machine of the section hardware: it samples on time, its inputs act after exactly "
+        f"that delay and are held, its measurements are as good as stated, and {computes}, the estimate with B^+ (in "
+        "coordinates S of the tube: (S B)^+ S); what is said here of continuous time, of exact measurements and of the "
+        "predictor is for 0, A, B and C"
+    )
 
 
 def _wind(item: WindWithin) -> str:
