@@ -30,7 +30,7 @@ def theorem(g: Given) -> dict[str, Any]:
     e_fb, n_fb = (g.np, max(n_M, mp.sqrt(g.A) * g.np)) if predicts else (nbar, n_M)
     acts, more = 1 + g.D_b, 1 / (1 - g.D_b)
     kb = more * g.du * (g.dhat + n_fb)
-    ups = min(2 * g.Dus, g.Lus * (max(Ts, Tf) + tau)) if g.held else mp.mpf(0)
+    ups = g.r_u + (min(2 * g.Dus, g.Lus * (max(Ts, Tf) + tau)) if g.held else mp.mpf(0))
     s1 = g.Dht + g.Dhx * g.Y
     b0 = min(g.DBp * g.DBx, g.DBpx * g.DB)
     step = g.Y * Ts / 2 + nbar
@@ -41,6 +41,7 @@ def theorem(g: Given) -> dict[str, Any]:
         + (g.eps_w + g.DBpx * g.D_E * step) * g.wbar
         + g.DBpx * g.D_r * step
         + g.D_b * (kb + ups + g.S + g.N + s1 * (Ts / 2 + tau))
+        + g.r_q
     )
     q["bias"] = (1 - th) / th * s1 * Ts + e_s
     q["ripple"] = 2 * th / Ts * g.n_B * g.nu + g.DBpx * (g.Y + 2 * nbar / Ts) * nbar
@@ -54,7 +55,8 @@ def theorem(g: Given) -> dict[str, Any]:
         grown = mp.exp(Dp * tau)
         q["prediction"] = (
             nbar * grown
-            + (g.DB * (acts * X + g.D_b * (kb + ups)) + g.D_E * g.wbar + g.D_r) * (grown - 1) / Dp
+            + (g.DB * (acts * X + g.D_b * (kb + ups) + g.r_u) + g.D_E * g.wbar + g.D_r) * (grown - 1) / Dp
+            + g.r_p
         )
     # (H.8), (H.9)
     LG, GG = g.L_G * g.rho**2, 2 * g.G * g.rho
@@ -101,7 +103,7 @@ def theorem(g: Given) -> dict[str, Any]:
     young, old = (mp.mpf(0), Tf) if predicts else (tau, Tf + tau)
     first = max(Tf, tau) if predicts else Tf + tau
     beta = acts * g.beta
-    base = delta + beta * ups + g.beta_w * g.wbar
+    base = delta + beta * ups + g.beta_w * g.wbar + g.r_a / g.f0
 
     def ell(age: Any) -> Any:
         return ell0 + ell1 * age
@@ -244,6 +246,9 @@ def given(problem: Any, recipe: Any) -> Given:
         "N": exact(recipe.ripple),
         "np": exact(recipe.prediction),
     }
+    for lost in recipe.rounding:
+        values |= {"r_a": exact(lost.feedback), "r_u": exact(lost.input)}
+        values |= {"r_q": exact(lost.estimate), "r_p": exact(lost.prediction)}
     if problem.gain is not None:
         values["D_b"] = most(problem.gain.error)
     if problem.wind is not None:

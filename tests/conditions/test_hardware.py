@@ -16,7 +16,7 @@ from problems import constants as tube_constants
 
 from tubecert.bounds.constants import GainConstants, ResidualConstants
 from tubecert.conditions import hardware
-from tubecert.conditions.hardware import HardwareRecipe, evaluated, loop_of, margins_hardware, plant
+from tubecert.conditions.hardware import HardwareRecipe, Rounding, evaluated, loop_of, margins_hardware, plant
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
@@ -118,12 +118,28 @@ def with_covariant(problem, **values):
     return replace(problem, machine=replace(problem.machine, covariant=covariant_constants(**values)))
 
 
+def rounded(problem):
+    """The same, for a controller that computes in double."""
+    asked = replace(problem.machine.asked, arithmetic="double")
+    return replace(problem, machine=replace(problem.machine, asked=asked))
+
+
 def with_gain(problem, error=0.03):
     return replace(problem, gain=GainConstants(error=Constant(below=0.0, above=error), matched=True))
 
 
 for _name in ("plain", "no filter", "prediction", "a slow feedback out of step", "a flat metric", "wind"):
     FORMS[f"an uncertain gain, {_name}"] = with_gain(FORMS[_name][0]), FORMS[_name][1]
+LOST = Rounding(feedback=F("0.0003"), input=F("0.002"), estimate=F("0.004"), prediction=F("0.0001"))
+for _name in (
+    "plain",
+    "no filter",
+    "prediction",
+    "a slow feedback out of step",
+    "a low floor",
+    "u* played in time",
+):
+    FORMS[f"rounding, {_name}"] = rounded(FORMS[_name][0]), FORMS[_name][1] | {"rounding": (LOST,)}
 FORMS["covariant with an uncertain gain"] = with_covariant(with_gain(alive_machine())), {}
 FORMS["covariant"] = with_covariant(alive_machine()), {}
 FORMS["covariant in wind"] = with_covariant(windy(alive_machine(), F("0.03"))), FORMS["wind"][1]
@@ -512,3 +528,34 @@ def test_a_curve_is_about_the_same_machine(lie: dict[str, F]) -> None:
     )
     judged = judge(problem, hardware.THEOREM, Proposal(decisive=own, role="machine", curve=(honest, false)))
     assert judged.curve == (honest,)
+
+
+@pytest.mark.parametrize("kind", [each.name for each in fields(Rounding)])
+def test_what_is_lost_counts(kind):
+    """Each of the four alone lowers a margin, or asks for more of the recipe."""
+    problem, changes = FORMS["prediction"]
+    problem = rounded(problem)
+    own = settled(problem, recipe(**changes))
+    none = Rounding(**{each.name: F(0) for each in fields(Rounding)})
+    lost = replace(none, **{kind: F(1, 100)})
+    before, after = (margins_hardware(problem, replace(own, rounding=(r,)))[1].lo for r in (none, lost))
+    assert before > after  # -inf where Y, S or np is not enough any more
+
+
+def test_a_controller_is_exact_or_rounds_as_the_specification_says():
+    problem, changes = FORMS["plain"]
+    own, none = recipe(**changes), Rounding(**{each.name: F(0) for each in fields(Rounding)})
+    assert hardware.THEOREM.is_about(problem, own)
+    assert not hardware.THEOREM.is_about(problem, replace(own, rounding=(none,)))
+    assert not hardware.THEOREM.is_about(rounded(problem), own)
+    assert hardware.THEOREM.is_about(rounded(problem), replace(own, rounding=(none,)))
+    less = replace(none, input=F(-1))
+    assert not hardware.THEOREM.is_about(rounded(problem), replace(own, rounding=(less,)))
+
+
+def test_rounding_is_covered_for_a_known_gain_only():
+    problem, changes = FORMS["plain"]
+    none = Rounding(**{each.name: F(0) for each in fields(Rounding)})
+    own = recipe(**changes, rounding=(none,))
+    assert margins_hardware(rounded(problem), own)[0].lo > 0
+    assert np.isneginf(margins_hardware(rounded(with_gain(problem)), own)[0].lo)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from tubecert.conditions.arithmetic import decay_mean, least_solution, log1p_ratio
 from tubecert.conditions.kernels import DistanceBound, kappa, paper_kernel, tight_kernel
-from tubecert.enclosure.interval import Interval
+from tubecert.enclosure.interval import Interval, exp
 
 RNG = np.random.default_rng(7)
 
@@ -262,3 +262,21 @@ def test_an_undecided_sign_of_q_costs_next_to_nothing(w):
     assert found.lo <= exact * (1 + 1e-12)
     assert exact <= found.hi * (1 + 1e-12)
     assert found.hi <= exact * (1 + 1e-9)
+
+
+def test_sup_D_over_a_short_horizon_where_the_filter_adds_nothing():
+    """H0 = S, which intervals cannot tell from H0 > S: D goes from d0 towards A1, and by T it is far from there."""
+    ends = Interval(0.0038491, 0.0038492)
+    rest = {
+        "d0": 0.0009,
+        "beta": 1.15,
+        "e": 0.0032,
+        "delta": 0.0022,
+        "lam": 0.4,
+        "omega": 16.0,
+        "horizon": 2.0,
+    }
+    D = DistanceBound(**{k: Interval.exact(v) for k, v in rest.items()}, H0=ends, S=ends)
+    at_the_end = D.d0 * exp(-D.lam * D.horizon) + D.ultimate() * (1 - exp(-D.lam * D.horizon))
+    assert D.supremum().hi <= at_the_end.hi * (1 + 1e-5)
+    assert D.ultimate().lo > 1.5 * at_the_end.hi

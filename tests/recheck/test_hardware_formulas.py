@@ -21,9 +21,22 @@ from tubecert.conditions.problem import Wind
 from tubecert.enclosure.constant import Constant
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import Numbers, Setting, WindNumbers
-from tubecert.recheck.digital import Bent, Digital, Evaluation, MachineNumbers, Promise, loop, proposed
+from tubecert.recheck.digital import (
+    Bent,
+    Digital,
+    Evaluation,
+    Losses,
+    MachineNumbers,
+    Promise,
+    loop,
+    proposed,
+)
 
+LOST = theorem.Rounding(
+    feedback=Fraction(1, 300), input=Fraction(1, 70), estimate=Fraction(1, 50), prediction=Fraction(1, 900)
+)
 BENT = ("drift_slope", "form_slope", "input_slope", "input_gain", "drift_metric", "curvature")
+APART = ("windows", "losses")
 WIND = ("push", "size", "explained")
 
 
@@ -102,6 +115,7 @@ def problems(draw):
         bias=Fraction(draw(st.integers(1, 90)), 30),
         ripple=Fraction(draw(st.integers(1, 90)), 300),
         prediction=Fraction(draw(st.integers(1, 90)), 3000) if predicts else None,
+        rounding=() if problem.gain is not None else draw(st.sampled_from([(), (LOST,)])),
     )
     return problem, recipe
 
@@ -135,7 +149,14 @@ def own_reading(problem, recipe) -> tuple[Setting, MachineNumbers, Promise, Digi
         numbers,
         promise,
         Digital(
-            **{item.name: getattr(recipe, item.name) for item in fields(Digital) if item.name != "windows"}
+            **{item.name: getattr(recipe, item.name) for item in fields(Digital) if item.name not in APART},
+            losses=next(
+                (
+                    Losses(**{item.name: getattr(r, item.name) for item in fields(Losses)})
+                    for r in recipe.rounding
+                ),
+                None,
+            ),
         ),
     )
 

@@ -36,6 +36,7 @@ KINDS = {
     + MACHINE.replace("0.0005, y: 0.001", "0.0002, y: 0.0002")
     + WIND.replace("bound: 0.01", "bound: 0.005, rate: 1"),
     "B and the metric turn": TURNING + "hardware: {rate: 500, noise: 0.0001}\n",
+    "rounding": SMALL + MACHINE.replace("rate: 500", "rate: 500, arithmetic: single"),
     "declared bounds": SMALL.replace('h: ["0.1*sin(t) + 0.05*x"]', "bounds: {h: 0.15, h_x: 0.05, h_t: 0.1}")
     + MACHINE,
 }
@@ -364,3 +365,43 @@ def test_claims_of_h_depend_on_all_that_they_rest_on(honest, name):
     found = [own for own in keys if own.startswith(resting)]
     assert found
     assert all(keys[own] != others[own] for own in found)
+
+
+def _more(rounding):
+    rounding["estimate"] = 0.5
+
+
+def _negative(rounding):
+    rounding["feedback"] = -1e-9
+
+
+def _unknown(rounding):
+    rounding["drift"] = 0.0
+
+
+@pytest.mark.slow
+def test_what_rounding_may_cost_is_examined():
+    document, memory = certified(KINDS["rounding"], conditions="hardware"), {}
+    assert failing(examine(document, memory=memory)) == []
+
+    def forged(change):
+        other = copy.deepcopy(document)
+        change(other["result"])
+        return other
+
+    def of_rounding(change):
+        return lambda result: change(result["proof"]["hardware"]["rounding"][0])
+
+    def twice(result):
+        result["proof"]["hardware"]["rounding"] *= 2
+
+    def exact(result):
+        del result["proof"]["hardware"]["rounding"]
+
+    def assumed(result):
+        (own,) = [item for item in result["assumptions"] if item["id"] == "machine_as_given"]
+        own["arithmetic"] = "double"
+
+    changes = (*map(of_rounding, (_more, _negative, _unknown, dict.clear)), twice, exact, assumed)
+    for change in changes:
+        assert refused(forged(change), memory), change

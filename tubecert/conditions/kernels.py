@@ -119,8 +119,12 @@ def _at(D: DistanceBound[T], t: T) -> T:
     """D(t), with K(t) = e^(-m t) t (1 - e^(-y))/y, m = min(lam, omega), y = |omega - lam| t."""
     slower = minimum(D.lam, D.omega)
     K = exp(-slower * t) * t * decay_mean(absolute(D.omega - D.lam) * t)
-    rest = D.d0 * exp(-D.lam * t) - D.ultimate() * expm1(-D.lam * t)
-    return rest + D.beta * (D.H0 - D.S) * K
+    return _monotone(D, t) + D.beta * (D.H0 - D.S) * K
+
+
+def _monotone(D: DistanceBound[T], t: T) -> T:
+    """D(t) without C1 K(t): it goes from d0 towards A1."""
+    return D.d0 * exp(-D.lam * t) - D.ultimate() * expm1(-D.lam * t)
 
 
 def _supremum(D: DistanceBound[T]) -> T:
@@ -130,15 +134,15 @@ def _supremum(D: DistanceBound[T]) -> T:
     zero = number(0, A1)
     z = (D.d0 - A1) / C1
     t1 = log1p_ratio(D1 / D.lam) / D.lam - z * log1p_ratio(z * D1)
-    last = A1
+    last = limit = A1
     if D.horizon is None:
         peak = A1 + exp(-D.lam * t1) * (C1 + (D.d0 - A1) * D1) / D.omega
     else:
-        last = _at(D, D.horizon)
+        last, limit = _at(D, D.horizon), _monotone(D, D.horizon)
         peak = _at(D, maximum(zero, minimum(t1, D.horizon)))
     ends = maximum(D.d0, last)
-    # max(d0, A1) + max(C1, 0) kappa holds in every case and bounds what an interval cannot decide
-    weak = maximum(D.d0, A1) + maximum(C1, zero) * kappa(D.lam, D.omega)
+    # D without C1 K is monotone; so this holds in every case, and bounds what an interval cannot decide, as for H0 = S
+    weak = maximum(D.d0, limit) + maximum(C1, zero) * kappa(D.lam, D.omega)
     peak = confined(maximum(ends, peak), ends, weak)
     # D rises from d0 to an interior maximum iff C1 > max(0, lam (d0 - A1)) and 1 + z D1 > 0
     rises = C1 - maximum(zero, D.lam * (D.d0 - A1))

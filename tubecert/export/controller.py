@@ -48,8 +48,8 @@ _LONGEST: Final = 32  # characters of a name
 class Pieces:
     """A plan through knots: `start` (K,) in s, x* (K, n, 4) and u* (K, m, 2) as polynomials of t - start.
 
-    `most`: so many pieces can meet one sample at most. `x_off` and `u_off`, of the same shapes: how far a coefficient is
-    from the exact one at most; `length` (K,) in s; `continuous`: u* does not jump.
+    `most`: so many pieces can meet one sample at most. `x_off` and `u_off`, of the same shapes: how far a
+    coefficient is from the exact one at most; `length` (K,) in s; `continuous`: u* does not jump.
     """
 
     start: tuple[Fraction, ...]

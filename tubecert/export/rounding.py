@@ -398,12 +398,18 @@ def _frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:
 
 def _length(vector: Sequence[Followed]) -> Interval:
     """The Euclidean length of the errors, by pieces."""
-    return sqrt(sum((Interval.exact(x.error) * Interval.exact(x.error) for x in vector), Interval.of(0)))
+    return _root([Interval.exact(x.error) for x in vector])
 
 
 def _size(vector: Sequence[Followed]) -> Interval:
     """A bound of the length of what a computer has, by pieces."""
-    return sqrt(sum((x.most * x.most for x in vector), Interval.of(0)))
+    return _root([x.most for x in vector])
+
+
+def _root(sizes: Sequence[Interval]) -> Interval:
+    """The root of a sum of squares; of 0 an enclosure may be a little below."""
+    square = sum((x * x for x in sizes), Interval.of(0))
+    return sqrt(Interval(np.maximum(square.lo, 0.0), square.hi))
 
 
 def _over(t: Followed, x: Followed) -> Followed:

@@ -1,0 +1,208 @@
+"""What exported code can lose to rounding: bounds against what it does lose, in 60 digits; and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from controllers import GIVEN, KNOTS, PATH, machine, recipe
+
+from tubecert.conditions.hardware import Rounding
+from tubecert.errors import TubecertError
+from tubecert.export.controller import assembled
+from tubecert.export.folder import exported
+from tubecert.export.program import GREATEST, LEAST, Program
+from tubecert.export.reference import execute
+from tubecert.export.rounding import UncoveredError, rounding_of, within
+from tubecert.model import build
+from tubecert.spec import load_text
+from tubecert.trajectory.pieces import piecewise_plan
+
+NONE = Rounding(feedback=Fraction(0), input=Fraction(0), estimate=Fraction(0), prediction=Fraction(0))
+ANY = Rounding(feedback=Fraction(1), input=Fraction(1), estimate=Fraction(1), prediction=Fraction(1))
+DU = Fraction("6.302")  # of the orbit's metric, from above
+
+
+def controller(name="orbit", lost=ANY, **values):
+    given = GIVEN[name]
+    return assembled(
+        replace(given, recipe=replace(given.recipe, rounding=(lost,)), feedback_gain=DU, **values)
+    )
+
+
+def exactly(program: Program, *given):
+    """What comes out of a program in 60 digits, by name; marked vectors too."""
+    values = []
+    inputs = {port.name: vector for port, vector in zip(program.inputs, given, strict=True)}
+    with mpmath.workdps(60):
+        for step in program.steps:
+            args = [values[p] for p in step.places]
+            match step.operation:
+                case "input":
+                    values.append(mpmath.mpf(inputs[step.name][step.index]))
+                case "constant":
+                    values.append(mpmath.mpf(step.value.numerator) / step.value.denominator)
+                case "neg":
+                    values.append(-args[0])
+                case "call":
+                    values.append(getattr(mpmath, step.name)(args[0]))
+                case "choose":
+                    values.append({LEAST: min, GREATEST: max}[step.name](*args))
+                case "add" | "sub" | "mul" | "div":
+                    a, b = args
+                    values.append(
+                        {"add": a + b, "sub": a - b, "mul": a * b}[step.operation]
+                        if step.operation != "div"
+                        else a / b
+                    )
+        ports = (*program.outputs, *program.marked)
+        return {port.name: [values[p] for p in port.places] for port in ports}
+
+
+def length(vector):
+    return mpmath.sqrt(sum(x * x for x in vector))
+
+
+def near_the_plan(c, count, real):
+    """Times of samples, and what may be measured at them: in the tube, often very near to the plan."""
+    generator = np.random.default_rng(5)
+    W = np.linalg.inv(np.array([[float(q) for q in row] for row in c.metric]))
+    root = np.linalg.cholesky(W)
+    for k in generator.integers(0, int((c.horizon or 6) / c.sample_time), size=count):
+        t = mpmath.mpf(int(k)) * c.sample_time.numerator / c.sample_time.denominator
+        direction = generator.normal(size=len(c.states))
+        share = 10.0 ** generator.uniform(-7, 0) * float(c.reach) * 0.999
+        away = root @ (direction / np.linalg.norm(direction)) * share
+        xs = exactly(c.plan, [t])["x"]
+        y = np.array([float(a) + b for a, b in zip(xs, away, strict=True)]).astype(real)
+        yield int(k), t, y
+
+
+@pytest.mark.parametrize(("precision", "real"), [("single", np.float32), ("double", np.float64)])
+def test_the_feedback_loses_no_more_than_is_said(precision, real):
+    c = controller(held=True)
+    bound = rounding_of(c, precision)
+    worst_a = worst_u = mpmath.mpf(0)
+    for k, t, y in near_the_plan(c, 60, real):
+        now = np.asarray(real(k) * real(float(c.sample_time)))[None, None]
+        xs, us = execute(c.plan, now, real=real)
+        (f,), (vs,) = execute(c.drift, y[None], real=real), execute(c.flow, xs, us, real=real)
+        kappa, _ = execute(c.law, y[None], f, xs, vs, us, real=real)
+        given = [float(q) for q in y]
+        plan = exactly(c.plan, [t])
+        exact = exactly(
+            c.law,
+            given,
+            exactly(c.drift, given)["f"],
+            plan["x"],
+            exactly(c.flow, plan["x"], plan["u"])["v"],
+            plan["u"],
+        )
+        found = [mpmath.mpf(float(q)) for q in kappa[0]]
+        with mpmath.workdps(60):
+            told = exact["told"]
+            limit = mpmath.mpf(DU.numerator) / DU.denominator * mpmath.sqrt(told[0])
+            beyond = max(mpmath.mpf(0), length(found) - limit)
+            inner = sum(a * b for a, b in zip(exact["c"], found, strict=True))
+            worst_a = max(worst_a, told[1] + inner)
+            off = beyond + length([mpmath.mpf(float(a)) - b for a, b in zip(us[0], plan["u"], strict=True)])
+            worst_u = max(worst_u, off)
+    assert worst_a <= mpmath.mpf(float(bound.feedback))
+    assert worst_u <= mpmath.mpf(float(bound.input))
+    assert worst_a > 5e-5 * float(bound.feedback)  # intervals take f(y) and f(x*) for independent
+
+
+@pytest.mark.parametrize(("precision", "real"), [("single", np.float32), ("double", np.float64)])
+def test_the_estimate_loses_no_more_than_is_said(precision, real):
+    """q against (1 - th) q + th sigma, all of it exact, from the same numbers."""
+    c = controller(held=True)
+    bound, generator = rounding_of(c, precision), np.random.default_rng(6)
+    samples = [y for _, _, y in near_the_plan(c, 40, real)]
+    worst = mpmath.mpf(0)
+    for y in samples:
+        last = (y + generator.normal(size=2) * 1e-2).astype(real)
+        held, before = (generator.uniform(-3, 3, size=1).astype(real) for _ in range(2))
+        q = generator.uniform(-2, 2, size=1).astype(real)
+        (f,), (last_f,) = (execute(c.drift, each[None], real=real) for each in (y, last))
+        (mean,) = execute(c.applied, held[None], before[None], real=real)
+        new, _ = execute(c.estimator, y[None], f, last[None], last_f, q[None], mean, real=real)
+        own, old = [float(v) for v in y], [float(v) for v in last]
+        with mpmath.workdps(60):
+            exact = exactly(
+                c.estimator,
+                own,
+                exactly(c.drift, own)["f"],
+                old,
+                exactly(c.drift, old)["f"],
+                [float(v) for v in q],
+                exactly(c.applied, [float(v) for v in held], [float(v) for v in before])["mean"],
+            )["q"]
+            th = 1 - mpmath.exp(-mpmath.mpf("75.96") / 500)
+            worst = max(worst, abs(mpmath.mpf(float(new[0, 0])) - exact[0]) / th)
+    assert 0.001 * float(bound.estimate) < worst <= float(bound.estimate)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_the_mean_of_a_moving_input_is_that_of_its_integral(precision):
+    """Gauss's rule in exact arithmetic against quadrature in 60 digits: less than what r_q says of it."""
+    c = controller()
+    with mpmath.workdps(60):
+        Ts = mpmath.mpf(1) / 500
+        u = lambda t: exactly(c.plan, [t])["u"][0]  # noqa: E731
+        found = mpmath.mpf(0)
+        for k in (0, 700, 1500):
+            begin = k * Ts
+            nodes = [u(begin + Ts * q) for q in (mpmath.mpf("0.11270166537925831148"), mpmath.mpf(1) / 2)]
+            nodes.append(u(begin + Ts * mpmath.mpf("0.88729833462074168852")))
+            rule = (5 * nodes[0] + 8 * nodes[1] + 5 * nodes[2]) / 18
+            found = max(found, abs(rule - mpmath.quad(u, [begin, begin + Ts]) / Ts))
+        held = rounding_of(controller(held=True), precision).estimate
+        assert found <= float(rounding_of(c, precision).estimate - held)
+
+
+def test_a_plan_through_knots_is_covered_while_its_input_is_held_and_goes_on():
+    plan = piecewise_plan(build(load_text(PATH)), KNOTS)
+    own = recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), rounding=(ANY,))
+    given = machine(PATH, plan, recipe=own, horizon=Fraction("0.31"), feedback_gain=DU)
+    assert rounding_of(assembled(replace(given, held=True)), "double").input < Fraction(1, 10**11)
+    with pytest.raises(UncoveredError, match="held"):
+        rounding_of(assembled(given), "double")
+    jumping = piecewise_plan(build(load_text(PATH)), replace(KNOTS, interpolation="hold"))
+    with pytest.raises(UncoveredError, match="jumps"):
+        rounding_of(assembled(replace(given, plan=jumping, held=True)), "double")
+
+
+@pytest.mark.parametrize("name", ["turning", "predicting_path"])
+def test_a_prediction_is_not_covered(name):
+    with pytest.raises(UncoveredError, match="prediction"):
+        rounding_of(controller(name), "double")
+
+
+def test_a_plan_without_end_is_not_covered():
+    with pytest.raises(UncoveredError, match="without end"):
+        rounding_of(controller(held=True, horizon=None), "double")
+
+
+@pytest.mark.parametrize("kind", ["feedback", "input", "estimate"])
+def test_code_that_can_lose_more_than_the_certificate_allows_is_not_written(kind):
+    own = rounding_of(controller(), "double")
+    assert within(controller(lost=own), "double")
+    less = replace(own, **{kind: getattr(own, kind) * Fraction(999, 1000)})
+    with pytest.raises(TubecertError, match="does not allow for what double loses"):
+        exported(controller(lost=less))
+    with pytest.raises(TubecertError, match="does not allow for what single loses"):
+        exported(controller(lost=own), precision="single")
+
+
+def test_the_files_say_what_is_covered():
+    own = rounding_of(controller(), "double")
+    assert all(
+        "with the rounding of its arithmetic" in t
+        for t in (exported(controller(lost=own)).files["README.md"],)
+    )
+    plain = exported(assembled(GIVEN["orbit"])).files
+    assert "EXACT arithmetic" in plain["README.md"]
+    assert "7.52316384526264e-37" not in plain["hardware_orbit.c"]  # as before: no limit of the feedback
