@@ -110,29 +110,33 @@ class _Analysis:
 
     # -- what goes in
 
+    @property
+    def _horizon(self) -> Fraction:
+        if self.c.horizon is None:
+            raise UncoveredError("a plan that moves without end: the time itself loses digits")
+        return max(self.c.horizon, self.c.sample_time)
+
     def _late(self) -> Interval:
         """How far a time is off that is at most the horizon.
 
         The counter, Ts, their product and the horizon are rounded, and so are a node of Gauss's rule (a number of 20
         digits) and its sum.
         """
-        if self.c.horizon is None:
-            raise UncoveredError("a plan that moves without end: the time itself loses digits")
-        return 9 * self.u * Interval.of(max(self.c.horizon, self.c.sample_time)) + 4 * self.eta
+        return 9 * self.u * Interval.of(self._horizon) + 4 * self.eta
 
     def _time(self, plan: Program) -> Followed:
         """The time of a sample, which is counted and multiplied; the code stops at the horizon."""
         if not _reads_input(plan):
             return Followed(value=Interval.exact(np.zeros(1)), error=np.zeros(1))
         late = self._late()
-        assert self.c.horizon is not None
-        knots = np.linspace(0.0, float(up(float(self.c.horizon))), _PIECES + 1)
+        knots = np.linspace(0.0, float(up(float(self._horizon))), _PIECES + 1)
         return Followed(value=Interval(knots[:-1], knots[1:]), error=np.full(_PIECES, float(late.hi)))
 
     def _plan(self) -> tuple[list[Followed], list[Followed]]:
         if self.c.pieces is not None:
             return self._through_knots(self.c.pieces)
-        assert self.c.plan is not None
+        if self.c.plan is None:
+            raise UncoveredError("a plan of no known form")
         t = self._time(self.c.plan)
         out = self._run(self.c.plan, {"t": [t]})
         return [_over(t, x) for x in out["x"]], [_over(t, u) for u in out["u"]]
@@ -233,7 +237,7 @@ class _Analysis:
         acted = [_within(held, pieces) for _ in range(self.m)]
         given = {"held": acted, "before": acted}
         if self.c.gauss is not None:
-            given["played"] = self._played(us)
+            given["played"] = self._played(self.c.gauss, us)
         mean = self._run(self.c.applied, given)["mean"]
         q = [_within(self._estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
@@ -242,12 +246,12 @@ class _Analysis:
         # th and pi are decimals of 50 digits at least
         return _most(_length(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
 
-    def _played(self, us: Sequence[Followed]) -> list[Followed]:
+    def _played(self, gauss: Program, us: Sequence[Followed]) -> list[Followed]:
         """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*."""
-        assert self.c.gauss is not None
-        assert self.c.bend is not None
+        if self.c.bend is None:
+            raise UncoveredError("the mean of a feedforward that moves within a sample")
         nodes = [_widened(u) for u in us]
-        found = self._run(self.c.gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
+        found = self._run(gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
         bends = self._run(self.c.bend, {"t": [self._time(self.c.bend)]})["u"]
         share = Interval.of(self.c.sample_time**6 / _GAUSS)
         return [

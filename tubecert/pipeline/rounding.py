@@ -14,6 +14,7 @@ from typing import Any
 
 from tubecert.conditions.decimals import round_up
 from tubecert.conditions.hardware import HardwareRecipe, Rounding
+from tubecert.conditions.machine import Machine as Known
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.errors import SpecError, TubecertError
 from tubecert.export.controller import Machine, assembled, looked_at
@@ -37,16 +38,16 @@ def rounded(
     first = found[HardwareRecipe].decisive
     if bounded.machine is None or bounded.machine.asked.arithmetic is None or first is None:
         return found
-    lost = _lost(bounded, first, bounded.machine.asked.arithmetic)
+    lost = _lost(bounded, bounded.machine, first, bounded.machine.asked.arithmetic)
     again = PROPOSERS[HardwareRecipe].propose(bounded.problem, replace(asked, lost=lost))
     return {**found, HardwareRecipe: again}
 
 
-def _lost(bounded: Bounded, recipe: HardwareRecipe, arithmetic: Arithmetic) -> Rounding:
+def _lost(bounded: Bounded, known: Known, recipe: HardwareRecipe, arithmetic: Arithmetic) -> Rounding:
     """With some room, as decimals."""
     gain = Fraction(bounded.problem.constants.feedback_gain.above)
     try:
-        own = rounding_of(assembled(_machine(bounded, recipe, gain)), arithmetic)
+        own = rounding_of(assembled(_machine(bounded, known, recipe, gain)), arithmetic)
     except UncoveredError as error:
         raise _refused(bounded, f"no bound of rounding is known for {error}") from error
     except TubecertError as error:
@@ -59,10 +60,9 @@ def _lost(bounded: Bounded, recipe: HardwareRecipe, arithmetic: Arithmetic) -> R
     )
 
 
-def _machine(bounded: Bounded, recipe: HardwareRecipe, gain: Fraction) -> Machine:
+def _machine(bounded: Bounded, known: Known, recipe: HardwareRecipe, gain: Fraction) -> Machine:
     """The loop that would be exported."""
-    question, known = bounded.question, bounded.machine
-    assert known is not None
+    question = bounded.question
     tube = bounded.enclosed.tube
     return Machine(
         name=question.spec.name,
