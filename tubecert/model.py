@@ -310,6 +310,10 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
                 f"{to_text(duty.argument)} {_wrong(duty, decision.at)} {place(decision.at)}"
             )
             remedy = "shrink the safe set, or rewrite the expression so that it is smooth there"
+        if duty.table:
+            at = f", at {place(decision.at)}" if decision.verdict is Verdict.REFUTED else ""
+            message = f"'{duty.text}' may leave its table, which goes {duty.table}, on {where}{at}"
+            remedy = "shrink the safe set, or add rows to the table"
         findings.append(Finding(code=code, message=message, location=location, help=remedy))
     return findings
 

@@ -34,6 +34,13 @@ foreign(Parameter, lambda value: value.ends[0] if len(value.ends) == 1 else list
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TableView:
+    """The points of a table: x, y and slope, as texts."""
+
+    points: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SystemView:
     """States, inputs, units and equations, as texts."""
 
@@ -43,6 +50,7 @@ class SystemView:
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     f: tuple[str, ...] = ()
     B: tuple[tuple[str, ...], ...] = ()
+    tables: Mapping[str, TableView] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +103,9 @@ class _View:
     obstacles: tuple[ObstacleView, ...] = ()
 
 
-for _kind in (_View, SystemView, UncertaintyView, DisturbanceView, TrajectoryView, ObstacleView, DiscView):
+for _kind in (
+    _View, SystemView, TableView, UncertaintyView, DisturbanceView, TrajectoryView, ObstacleView, DiscView,
+):  # fmt: skip
     OPEN.add(_kind)
 
 

@@ -8,10 +8,13 @@ from functools import cache
 import numpy as np
 
 from tubecert.enclosure import interval as iv
+from tubecert.enclosure import lookup
 from tubecert.enclosure.interval import Array, Interval
-from tubecert.expression import Expression, topological
+from tubecert.expression import Expression, Lookup, topological
 
-Step = tuple[str, int, tuple[int, ...], int]  # operation, target slot, argument slots, exponent or index
+Step = tuple[
+    str, int, tuple[int, ...], int
+]  # operation, target slot, argument slots, exponent, index or table
 
 
 class Tape:
@@ -28,6 +31,7 @@ class Tape:
         constants: list[tuple[int, Interval]] = []
         self._symbols: list[tuple[int, int]] = []
         self._steps: list[Step] = []
+        self._tables: list[Lookup] = []
         slot: dict[Expression, int] = {}
         free: list[int] = []
         size = 0
@@ -46,6 +50,9 @@ class Tape:
                 slot[node] = target = free.pop() if free else size
                 size += target == size
                 exponent = node.value if isinstance(node.value, int) else 0
+                if node.op == "table":
+                    exponent = len(self._tables)
+                    self._tables.append(node.lookup)
                 self._steps.append((node.op, target, arguments, exponent))
                 free.extend(
                     slot[arg]
@@ -66,7 +73,10 @@ class Tape:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
             for op, target, arguments, exponent in self._steps:
-                memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
+                if op == "table":
+                    memory[target] = lookup.values(self._tables[exponent], memory[arguments[0]])
+                else:
+                    memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
         result = np.empty((len(self._outputs), *shape))
         for row, index in enumerate(self._outputs):
             result[row] = memory[index]
@@ -79,7 +89,10 @@ class Tape:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
             for op, target, arguments, exponent in self._steps:
-                memory[target] = _INTERVALS[op]([memory[i] for i in arguments], exponent)
+                if op == "table":
+                    memory[target] = lookup.enclosure(self._tables[exponent], memory[arguments[0]])
+                else:
+                    memory[target] = _INTERVALS[op]([memory[i] for i in arguments], exponent)
         lo, hi = np.empty((len(self._outputs), *shape)), np.empty((len(self._outputs), *shape))
         for row, index in enumerate(self._outputs):
             lo[row], hi[row] = memory[index].lo, memory[index].hi

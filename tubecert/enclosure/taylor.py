@@ -8,7 +8,8 @@ because d_i^2/2 lies in r_i^2/4 -+ r_i^2/4. The part without R is affine in each
 function of it is largest at one of the sign vertices. Variables in which
 every entry is affine (the others fixed) are not expanded at all: there the vertices of the box are exact.
 A norm (|x|, in h only) has a generalised gradient but no second derivative: such functions are enclosed to first order,
-and functions that contain the gradient itself by their natural interval extension.
+and functions that contain the gradient itself by their natural interval extension. A table's function has a Lipschitz
+gradient, its derivative is expanded to first order, its second derivative not at all (theory 1b).
 """
 
 from __future__ import annotations
@@ -57,8 +58,12 @@ class MatrixFunction:
         entries = [e for matrix in matrices for row in matrix for e in row]
         self.shapes = [(len(matrix), len(matrix[0])) for matrix in matrices]
         self.variables = tuple(sorted(free_symbols(entries)))
-        ops = {node.op for node in topological(entries)}
-        self._order = min(order, 0 if "direction" in ops else 1 if "norm" in ops else 2)
+        nodes = topological(entries)
+        self._order = min([order, *map(_smoothness, nodes)])
+        # of tables alone: how entries depend on other variables is not touched by their knots
+        self._steady = self._order == 2 or (
+            self._order == 1 and order == 2 and all(node.op != "norm" for node in nodes)
+        )
         free = tuple(v for v in self.variables if v not in fixed)
         self._fixed = [i for i, v in enumerate(self.variables) if v in fixed]
         first = {v: derivatives(entries, v) for v in free} if self._order else {}
@@ -85,7 +90,7 @@ class MatrixFunction:
         self, free: tuple[str, ...], first: dict[str, list[Expression]]
     ) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Variables in which every entry is affine, and the others."""
-        if self._order < 2:
+        if not self._steady:
             return (), free
         affine = tuple(v for v in free if all(e is ZERO for e in derivatives(first[v], v)))[:MOST_VERTICES]
         return affine, tuple(v for v in free if v not in affine)
@@ -122,7 +127,7 @@ class MatrixFunction:
                 end = lo[:, i] if sign < 0 else hi[:, i]
                 point[a, :, i] = box_lo[a, :, i] = box_hi[a, :, i] = end
         point, box_lo, box_hi = (x.reshape(len(choices) * count, dim) for x in (point, box_lo, box_hi))
-        expanded = curved[: max(0, MOST_VERTICES - len(corners))] if self._order == 2 else []
+        expanded = curved[: max(0, MOST_VERTICES - len(corners))] if self._steady else []
         flips = np.array(list(product((-1.0, 1.0), repeat=len(expanded))))
         thin = self._of(point, box_lo, box_hi, self._fixed)
         base = self._unpack(self._values.run(thin), self.shapes)
@@ -141,7 +146,11 @@ class MatrixFunction:
                 if i in expanded:
                     steps.append(r * slope_mid)
                     # the product r * slope_mid is rounded once: by u of itself, u = 2**-53 < 1.2e-16
-                    rad = rad + r * (slope_rad + 4e-16 * np.abs(slope_mid))
+                    if second:
+                        rad = rad + r * (slope_rad + 4e-16 * np.abs(slope_mid))
+                    else:  # a slope over the whole box
+                        rad = rad + r * (4e-16 * np.abs(slope_mid))
+                        rest[i] += r * slope_rad
                 else:
                     rest[i] += r * (np.abs(slope_mid) + slope_rad)
                 for j2, i2 in enumerate(curved if second else []):
@@ -185,6 +194,7 @@ class MatrixFunction:
         """For each matrix its value at the centre and its change to the right end by variable, (1 + d, N, p, q), and a
         radius (N, p, q) for the rest: the mean value form, of a function of order 1.
         """
+        assert not self._affine
         centre = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
         radius = np.maximum(np.nextafter(np.maximum(hi - centre, centre - lo), np.inf), _LEAST_RADIUS)
         at = self._of(centre, lo, hi, self._fixed)
@@ -240,6 +250,13 @@ class MatrixFunction:
             Interval(lo, hi)
             for lo, hi in zip(_split(values.lo, shapes), _split(values.hi, shapes), strict=True)
         ]
+
+
+def _smoothness(node: Expression) -> int:
+    """How often a node may be differentiated in an expansion: twice if nothing stands against it."""
+    if node.op == "table":
+        return max(0, 2 - node.lookup.order)
+    return {"direction": 0, "norm": 1}.get(node.op, 2)
 
 
 class _Table:

@@ -22,7 +22,7 @@ from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
-from tubecert.expression import derivatives, free_symbols
+from tubecert.expression import derivatives, free_symbols, topological
 from tubecert.expression.matrix import Matrix, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import HARDWARE
@@ -243,6 +243,10 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
         horizon = certificate.result.spec.effective.trajectory.horizon
         return spec, piecewise_plan(model, knots, horizon), model
     x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
+    if any(node.op == "table" for node in topological([*x, *u])):
+        raise refused(
+            "a table stands in the plan, which is not exported yet", "write its numbers into a CSV plan"
+        )
     return spec, Plan(x, u, trajectory.horizon), model
 
 
@@ -252,6 +256,10 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe) -> None:
         raise refused(
             "the metric is not constant: its geodesics would have to be computed with a certified error",
             "metric: {synthesise: {degree: 0}} asks for a constant one",
+        )
+    if any(node.op == "table" for node in topological([*model.f, *(e for row in model.B for e in row)])):
+        raise refused(
+            "a table stands in f or B, which is not exported yet", "fit a polynomial, or a sum of tanh"
         )
     if model.gained:
         raise refused(

@@ -6,6 +6,7 @@ yes.
 | module | what it does |
 |---|---|
 | `graph` | the hash-consed graph, exact folding, derivatives |
+| `lookup` | functions given by tables |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
 | `number` | text -> rational number, pi and degrees rounded |
@@ -36,6 +37,7 @@ from tubecert.expression.graph import (
     tan,
     topological,
 )
+from tubecert.expression.lookup import UNKNOWN, Lookup
 from tubecert.expression.number import Side, parse_constant, parse_number, root_above
 from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse
@@ -61,9 +63,11 @@ __all__ = [
     "ONE",
     "PI",
     "RESERVED",
+    "UNKNOWN",
     "ZERO",
     "Expression",
     "ExpressionError",
+    "Lookup",
     "Obligation",
     "Parsed",
     "Side",

@@ -30,7 +30,8 @@ ELSEWHERE: Final[Mapping[str, str]] = {
         "expressions have no cases; write one smooth expression, e.g. with tanh",
     ),
     **dict.fromkeys(
-        _TABLES, "there are no tables in expressions; fit a polynomial, or a sum of tanh((x - a)/b)"
+        _TABLES,
+        "a table is a function by its own name: system.tables: {NAME: {file: NAME.csv}}, then NAME(x)",
     ),
     **dict.fromkeys(
         ("floor", "ceil", "round", "mod", "fmod", "rem"), "it has jumps; expressions are differentiable"

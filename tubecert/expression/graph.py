@@ -18,8 +18,11 @@ from math import isqrt
 from typing import Final
 from weakref import WeakValueDictionary
 
+from tubecert.expression.lookup import Lookup
+
 Number = int | Fraction
-_Row = tuple[str, Fraction | str | int | None, tuple[int, ...]]  # operation, value, places of the arguments
+Value = Fraction | str | int | Lookup | None
+_Row = tuple[str, Value, tuple[int, ...]]  # operation, value, places of the arguments
 
 _table: WeakValueDictionary[tuple[object, ...], Expression]
 _serial = count()
@@ -36,6 +39,7 @@ class Expression:
     | `add`, `mul`, `div` | two | - |
     | `pow` | base | integer exponent, not 0 or 1 |
     | a name in `FUNCTIONS` (`sqrt`, `sin`, `tanh`, ...) | one | - |
+    | `table` | one | the `Lookup` |
     | `norm` | one or more | - (Euclidean norm; of one argument: its absolute value) |
     | `direction` | those of a norm | i: component i of args/norm(args); where norm is 0, any in [-1, 1] |
     """
@@ -44,7 +48,7 @@ class Expression:
 
     op: str
     args: tuple[Expression, ...]
-    value: Fraction | str | int | None
+    value: Value
     serial: int
 
     def __add__(self, other: Expression | Number) -> Expression:
@@ -87,6 +91,13 @@ class Expression:
             raise TypeError(f"{self.op} is not a rational constant")
         return self.value
 
+    @property
+    def lookup(self) -> Lookup:
+        """The table that a `table` reads."""
+        if not isinstance(self.value, Lookup):
+            raise TypeError(f"{self.op} is no table")
+        return self.value
+
     def __copy__(self) -> Expression:
         return self
 
@@ -109,9 +120,7 @@ class Expression:
 _table = WeakValueDictionary()
 
 
-def _node(
-    op: str, args: tuple[Expression, ...] = (), value: Fraction | str | int | None = None
-) -> Expression:
+def _node(op: str, args: tuple[Expression, ...] = (), value: Value = None) -> Expression:
     key = (op, value, *(id(arg) for arg in args))
     found = _table.get(key)
     if found is None:
@@ -298,6 +307,12 @@ FUNCTIONS: Final[Mapping[str, Callable[[Expression], Expression]]] = {
 """The smooth functions of one argument, by name."""
 
 
+def table(lookup: Lookup, e: Expression) -> Expression:
+    """A table's function; of a number in its range, that exact number, unless it jumps there."""
+    known = lookup.at(e.fraction) if e.is_constant else None
+    return _node("table", (e,), lookup) if known is None else constant(known)
+
+
 def norm(args: Iterable[Expression]) -> Expression:
     """Euclidean norm of the arguments; of one argument, its absolute value."""
     kept = tuple(arg for arg in args if arg is not ZERO)
@@ -333,6 +348,8 @@ def rebuild(e: Expression, args: tuple[Expression, ...]) -> Expression:
     """The operation of `e` applied to other arguments."""
     if e.op in FUNCTIONS:
         return FUNCTIONS[e.op](args[0])
+    if e.op == "table":
+        return table(e.lookup, args[0])
     if e.op == "add":
         return add(*args)
     if e.op == "mul":
@@ -383,7 +400,7 @@ def substitute(roots: Iterable[Expression], values: Mapping[str, Expression]) ->
 
 
 def derivatives(roots: Iterable[Expression], name: str) -> list[Expression]:
-    """d(root)/d(name) for every root; of a norm its generalised gradient (see `direction`)."""
+    """d(root)/d(name) for every root; of a norm its generalised gradient (see `direction`), of a table see `Lookup`."""
     roots = list(roots)
     slope: dict[Expression, Expression] = {}
     for node in topological(roots):
@@ -438,6 +455,8 @@ def _slope(e: Expression, d: list[Expression]) -> Expression:
             return e * d[0]
         case "log":
             return d[0] / u
+        case "table":
+            return table(e.lookup.derivative, u) * d[0]
         case "norm":
             terms = (_direction(e.args, i) * slope for i, slope in enumerate(d))
             return sum(terms, start=ZERO)

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from tubecert.expression import graph
 from tubecert.expression.graph import Expression, coefficient, topological
-from tubecert.expression.parse import Duty, Obligation
+from tubecert.expression.parse import Duty, Obligation, within
 from tubecert.expression.text import to_text
 
 _Owed = tuple[Duty, Expression]
@@ -51,6 +51,9 @@ def _of_node(node: Expression) -> Iterator[_Owed]:
             yield from _simplest("nonzero", graph.cos(node.args[0]))
         case "sqrt" | "log":
             yield from _simplest("positive", node.args[0])
+        case "table":
+            for argument in within(node.lookup, node.args[0]):
+                yield from _simplest("positive", argument)
         case "asin" | "acos":
             yield from _simplest("positive", 1 - node.args[0] ** 2)
 

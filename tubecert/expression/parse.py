@@ -15,6 +15,7 @@ from typing import Final, Literal
 
 from tubecert.expression import graph
 from tubecert.expression.graph import Expression
+from tubecert.expression.lookup import Lookup
 from tubecert.expression.scan import (
     ARITIES,
     ExpressionError,
@@ -45,7 +46,8 @@ class Obligation:
     """What must hold for an operation to be defined (and C1): `argument` is `nonzero`, or `positive`.
 
     A divisor and the base of a negative power must be nonzero, so must cos(u) for tan(u); the argument of
-    sqrt and log must be positive (sqrt is not C1 at 0), so must 1 - u**2 for asin(u) and acos(u).
+    sqrt and log must be positive (sqrt is not C1 at 0), so must 1 - u**2 for asin(u) and acos(u), and the distances to
+    both ends of a table.
     `offset` and `width` locate the operation in its text, of which `text` is that part.
     """
 
@@ -54,6 +56,7 @@ class Obligation:
     offset: int
     width: int
     text: str
+    table: str = ""  # of a table: from where to where it goes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,23 +71,27 @@ def parse(
     text: str,
     *,
     symbols: Mapping[str, Expression],
+    tables: Mapping[str, Lookup] | None = None,
     kinks: bool = False,
     refused: Mapping[str, str] | None = None,
     owed: Mapping[str, tuple[Obligation, ...]] | None = None,
 ) -> Parsed:
     """The expression that `text` stands for; raises `ExpressionError`.
 
-    `symbols` are the names it may use (with what they stand for), `kinks` allows abs and norm, and `refused`
+    `symbols` are the names it may use (with what they stand for), `tables` functions beside those of the grammar,
+    `kinks` allows abs and norm, and `refused`
     gives the reason why a name that exists elsewhere is not allowed here; `owed` is what the use of a name owes, which
     stands for more than a variable. A variable with the name of a constant, a
     function or a keyword (`pi`, `True`) would be read as that: no text is parsed with one.
     """
-    for name in symbols:
+    tables = tables or {}
+    for name in (*symbols, *tables):
         if not is_name(name):
             raise ExpressionError(f"{name[:60]!r} cannot be the name of a variable", kind="symbol")
     line = normalise_spaces(text)
-    scan(line, Vocabulary(symbols=symbols.keys(), kinks=kinks, refused=refused or {}))
-    return _Lowering(line, symbols, owed or {}).run(_tree(line))
+    words = Vocabulary(symbols=symbols.keys(), tables=tables.keys(), kinks=kinks, refused=refused or {})
+    scan(line, words)
+    return _Lowering(line, symbols, tables, owed or {}).run(_tree(line))
 
 
 def _tree(line: str) -> ast.expr:
@@ -102,9 +109,13 @@ class _Lowering:
     """Builds the graph bottom-up, without recursion, and collects obligations on the way."""
 
     def __init__(
-        self, line: str, symbols: Mapping[str, Expression], owed: Mapping[str, tuple[Obligation, ...]]
+        self,
+        line: str,
+        symbols: Mapping[str, Expression],
+        tables: Mapping[str, Lookup],
+        owed: Mapping[str, tuple[Obligation, ...]],
     ) -> None:
-        self.line, self.symbols, self.owed = line, symbols, dict(owed)
+        self.line, self.symbols, self.tables, self.owed = line, symbols, tables, dict(owed)
         self.obligations: list[Obligation] = []
         self.values: dict[ast.expr, Expression] = {}
         self.growth: dict[ast.expr, int] = {}  # the product of the exponents above a leaf
@@ -140,7 +151,7 @@ class _Lowering:
                 return [left, right]
             case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
                 return [operand]
-            case ast.Call(ast.Name(name), args, []) if name in ARITIES:
+            case ast.Call(ast.Name(name), args, []) if name in ARITIES or name in self.tables:
                 return list(args)
             case ast.Name():
                 return []
@@ -179,12 +190,14 @@ class _Lowering:
         return graph.constant(Fraction(self._source(node)))
 
     def _call(self, node: ast.expr, name: str, args: list[Expression]) -> Expression:
-        arity = ARITIES[name]
+        arity = ARITIES.get(name, 1)
         if not args or (arity is not None and len(args) != arity):
             wanted = "one argument" if arity else "at least one argument"
             raise self._error(node, f"{name} takes {wanted}, not {len(args)}")
         if name in ("abs", "norm"):
             return graph.norm(args)
+        if name in self.tables:
+            return self._table(node, self.tables[name], args[0])
         if name == "tan":
             self._owe("nonzero", graph.cos(args[0]), node)
         if name in _POSITIVE:
@@ -197,6 +210,14 @@ class _Lowering:
                 raise self._error(node, f"{self._source(node)[:60]} {reason}", kind="value")
             self._owe("positive", argument, node)
         return graph.FUNCTIONS[name](args[0])
+
+    def _table(self, node: ast.expr, lookup: Lookup, argument: Expression) -> Expression:
+        if argument.is_constant and lookup.at(argument.fraction) is None:
+            message = f"{self._source(node)[:60]} lies outside of the table, which goes {_ends(lookup)}"
+            raise self._error(node, message, kind="value")
+        for distance in within(lookup, argument):
+            self._owe("positive", distance, node, _ends(lookup))
+        return graph.table(lookup, argument)
 
     def _power(self, node: ast.BinOp, left: ast.expr) -> Expression:
         base, n = self.values[left], self._exponent(node)
@@ -228,13 +249,13 @@ class _Lowering:
             )
         return value.fraction.numerator
 
-    def _owe(self, kind: Duty, argument: Expression, node: ast.expr) -> None:
+    def _owe(self, kind: Duty, argument: Expression, node: ast.expr, table: str = "") -> None:
         if argument.is_constant and argument.fraction != 0:
             return  # holds: a nonzero divisor, or an argument of sqrt that was seen to be positive
         offset, width = self._place(node)
         text = self.line[offset : offset + width]
         self.obligations.append(
-            Obligation(kind=kind, argument=argument, offset=offset, width=width, text=text)
+            Obligation(kind=kind, argument=argument, offset=offset, width=width, text=text, table=table)
         )
 
     def _bound(self, node: ast.expr) -> None:
@@ -265,6 +286,15 @@ class _Lowering:
     def _error(self, node: ast.expr, message: str, help: str = "", kind: Kind = "syntax") -> ExpressionError:
         offset, width = self._place(node)
         return ExpressionError(message, help=help, offset=offset, width=width, kind=kind)
+
+
+def within(lookup: Lookup, argument: Expression) -> tuple[Expression, Expression]:
+    """What must be positive for a table to be read: the distances of the argument to its ends."""
+    return argument - lookup.start, graph.constant(lookup.end) - argument
+
+
+def _ends(lookup: Lookup) -> str:
+    return f"from {float(lookup.knots[0]):g} to {float(lookup.knots[-1]):g}"
 
 
 def _bits(e: Expression) -> int:

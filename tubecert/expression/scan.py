@@ -53,6 +53,7 @@ class Vocabulary:
     """The names an expression may use; `refused` says of other known names why they are not allowed here."""
 
     symbols: Collection[str]
+    tables: Collection[str] = ()
     kinks: bool = False
     refused: Mapping[str, str]
 
@@ -248,9 +249,15 @@ class _Walk:
     def operand_due(self) -> bool:
         return self.last is None or (self.last.kind == "operator" and self.last.text != ")")
 
+    @property
+    def _is_function(self) -> bool:
+        """Whether the last word is one that parentheses must follow."""
+        name = self.last.text if self.last is not None and self.last.kind == "name" else ""
+        return name in FUNCTIONS or name in self.vocabulary.tables
+
     def step(self, token: _Token) -> None:
         """Takes one token."""
-        called = self.last is not None and self.last.kind == "name" and self.last.text in FUNCTIONS
+        called = self._is_function
         if called and token.text != "(":
             raise self._uncalled(token)
         if token.kind == "name":
@@ -263,7 +270,7 @@ class _Walk:
 
     def finish(self, text: str) -> None:
         """Nothing may be left open at the end."""
-        if self.last and self.last.kind == "name" and self.last.text in FUNCTIONS:
+        if self._is_function:
             raise self._uncalled()
         if self.last and self.operand_due:
             raise ExpressionError("the expression ends where a value is expected", offset=len(text.rstrip()))
@@ -316,7 +323,7 @@ class _Walk:
                 f"{name} is only allowed in h",
                 "elsewhere expressions must be differentiable; sqrt(x**2 + c) with c > 0 may serve",
             )
-        if name in words.symbols or name in FUNCTIONS or name == "pi":
+        if name in words.symbols or name in words.tables or name in FUNCTIONS or name == "pi":
             return
         if name in words.refused:
             raise token.error(words.refused[name], kind="symbol")
@@ -329,9 +336,9 @@ class _Walk:
         words = self.vocabulary
         if name in ELSEWHERE:
             return ELSEWHERE[name]
-        functions = [f for f in FUNCTIONS if words.kinks or f not in KINKED]
+        functions = [*(f for f in FUNCTIONS if words.kinks or f not in KINKED), *sorted(words.tables)]
         meant = [f for f in functions if sorted(f) == sorted(name.lower())] or near(
-            name, [*words.symbols, "pi"]
+            name, [*words.symbols, *words.tables, "pi"]
         )
         listed = sorted({*words.symbols, "pi"})
         shown = ", ".join(listed[:20]) + (", ..." if len(listed) > 20 else "")

@@ -81,6 +81,8 @@ def longest_text(e: Expression) -> int:
             own = node.fraction.numerator.bit_length() + node.fraction.denominator.bit_length() + 8
         elif node.op == "symbol":
             own = len(str(node.value))
+        elif node.op == "table":
+            own += len(str(node.value))
         elif node.op == "pow":
             own *= 1 + abs(int(str(node.value))) // _LARGEST_EXPONENT
         length[node] = own
@@ -111,6 +113,8 @@ def _node_text(e: Expression, text: dict[Expression, tuple[str, int]]) -> tuple[
             return f"{_wrap(e.args[0], _PRODUCT, text)}/{_wrap(e.args[1], _POWER, text)}", _PRODUCT
         case "pow":
             return _power_text(_wrap(e.args[0], _ATOM, text), int(str(e.value)))
+        case "table":  # a derivative gets a dash, which is not in the grammar
+            return f"{e.value}({text[e.args[0]][0]})", _ATOM
         case "norm" if len(e.args) == 1:
             return f"abs({text[e.args[0]][0]})", _ATOM
         case _:

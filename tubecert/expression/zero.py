@@ -95,6 +95,9 @@ class _Algebra:
                 return self._hyperbolic(e.op, args[0])
             case "asin" | "acos" | "atan" | "log":
                 return _variable(self._atom((e.op, _frozen(_settled(*args[0]))))), _number(Fraction(1))
+            case "table":
+                key = (e.op, e.value, _frozen(_settled(*args[0])))
+                return _variable(self._atom(key)), _number(Fraction(1))
             case "sqrt":
                 return self._root(args[0])
             case "norm":

@@ -35,6 +35,7 @@ def _unused(spec: Spec) -> Iterator[Finding]:
     text = "\n".join(re.sub(r"(^|\s)#.*", "", line) for line in spec.source.splitlines())
     words = re.findall(r"\b[A-Za-z]\w*", text)
     named = [("parameter", name) for name, _ in (*spec.parameters, *spec.ranges)]
+    named += [("table", table.name) for table in spec.tables]
     for what, name in [*named, *(("definition", name) for name in spec.definitions)]:
         if words.count(name) < 2:
             yield Finding(
@@ -51,6 +52,7 @@ def _confusable(spec: Spec) -> Iterator[Finding]:
         *spec.states,
         *spec.inputs,
         *(name for name, _ in (*spec.parameters, *spec.ranges)),
+        *(table.name for table in spec.tables),
         *spec.definitions,
     ]
     for name in names:

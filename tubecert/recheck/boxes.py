@@ -4,7 +4,8 @@ On a box with centre c and radii r, d = x - c: G(x) = G(c) + sum d_i G_i(c) + 1/
 |rest| <= 1/6 sum r_i r_j r_k sup|G_ijk|, or 1/2 sum r_i r_j sup|G_ij - G_ij(c)| where third derivatives are too many.
 The polynomial is examined at its vertices (`expansion`); where those are too many, s_i = d_i^2 is r_i^2/2 +- r_i^2/2.
 Variables in which every entry is affine are replaced by their ends, exactly. A norm is smooth where it is not 0; on
-a box on which it may be: mean value form, then natural extension.
+a box on which it may be: mean value form, then natural extension. A table is smooth where a box meets no knot of it;
+elsewhere its function has a Lipschitz gradient, so that it is expanded to second order, its derivative to first.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, magnitude
 from tubecert.recheck.expansion import Expansion
+from tubecert.recheck.lookup import smooth_on
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
-from tubecert.recheck.terms import NOUGHT, Term, function, in_order, names, slopes
+from tubecert.recheck.terms import NOUGHT, Term, function, in_order, names, slopes, table_of
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]
@@ -66,12 +68,16 @@ class Field:
         self.variables = tuple(sorted(names(entries) - self.values.keys()))
         inputs = (*self.variables, *self.values)
         kinks = [term for term in in_order(entries) if term.op in ("norm", "direction")]
-        rough = any(term.op == "direction" for term in kinks)
-        self._order = 2 if not kinked else 0 if rough else 1
-        self._kinked = Field(entries, values, kinked=True) if kinks and not kinked else None
+        tables = [term for term in in_order(entries) if term.op == "table"]
+        self._order = min([2, *map(_smoothness, (*kinks, *tables))]) if kinked else 2
+        self._kinked = Field(entries, values, kinked=True) if (kinks or tables) and not kinked else None
+        self._tables = [table_of(term) for term in tables]
+        self._looked_up = Program([term.args[0] for term in tables], inputs)
         self._sizes = Program([function("norm", *term.args) for term in kinks], inputs)
         first = {v: slopes(entries, v) for v in self.variables} if self._order else {}
-        pure = [v for v in self.variables if self._order == 2 and _all_nought(slopes(first[v], v))]
+        # of tables alone: how entries depend on other variables is not touched by their knots
+        self._steady = self._order == 2 or (self._order == 1 and not kinks)
+        pure = [v for v in self.variables if self._steady and _all_nought(slopes(first[v], v))]
         self._affine = [self.variables.index(v) for v in pure[:_CORNERS]]
         self._curved = [i for i in range(len(self.variables)) if i not in self._affine]
         curved = [self.variables[i] for i in self._curved]
@@ -86,7 +92,7 @@ class Field:
         self._program = Program(entries, inputs)
         self._centre = Combinations([*entries, *(own if self._order == 2 else ()), *second], inputs)
         self._triples: list[tuple[int, int, int]] = []
-        if self._order == 2 and count <= _TURNING:
+        if self._order == 2 and count <= _TURNING and not kinked:
             turning = {(a, b, c): slopes(e, curved[c]) for (a, b), e in bent.items() for c in range(b, count)}
             self._order, self._triples = 3, [key for key, e in turning.items() if not _all_nought(e)]
             whole = [e for key in self._triples for e in turning[key]]
@@ -122,8 +128,11 @@ class Field:
         return [x.intersection(y) if x.overlaps(y) else x for x, y in zip(found, plain, strict=True)]
 
     def _is_smooth(self, whole: Sequence[Ball]) -> bool:
-        """Whether no norm is 0 on a box."""
-        return all(size > 0 for size in self._sizes.run([*whole, *self.values.values()]))
+        """Whether no norm is 0 on a box, and no table is looked up at a knot."""
+        values = [*whole, *self.values.values()]
+        if any(not size > 0 for size in self._sizes.run(values)):
+            return False
+        return all(map(smooth_on, self._tables, self._looked_up.run(values)))
 
     def expand(self, box: Box) -> tuple[list[Expansion], list[float], list[float]]:
         """One expansion for every choice of ends of the affine variables; what each variable causes and varies."""
@@ -170,8 +179,10 @@ class Field:
             step = [radius[i] * s for s in slope]
             size = sum(float(magnitude(s)) for s in step)
             spread[i] = max(spread[i], size)
-            if second and a < _CORNERS:
+            if self._steady and a < _CORNERS:
                 steps.append(_column(step))
+                if not second:  # the slope of a mean value form is a range
+                    caused[i] += sum(float(s.rad()) for s in step)
             else:
                 rest = [r + magnitude(s) for r, s in zip(rest, step, strict=True)]
                 caused[i] += size
@@ -221,6 +232,11 @@ class Field:
     def _blame(self, key: tuple[int, ...], size: float, caused: list[float]) -> None:
         for a in set(key):
             caused[self._curved[a]] += size
+
+
+def _smoothness(term: Term) -> int:
+    """The order to which a kink, or a table at a knot, may be expanded."""
+    return max(0, 2 - table_of(term).order) if term.op == "table" else int(term.op == "norm")
 
 
 def _parts(entries: list[Ball], count: int) -> list[list[Ball]]:

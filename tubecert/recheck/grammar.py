@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.terms import NOUGHT, UNIT, Term, number, number_of, operation
+from tubecert.recheck.lookup import Table
+from tubecert.recheck.terms import NOUGHT, UNIT, Term, looked_up, number, number_of, operation
 
 PI = operation("pi")
 
@@ -52,11 +53,13 @@ def is_name(name: str) -> bool:
     return _NAME.fullmatch(name) is not None and name not in _TAKEN
 
 
-def read(text: str, symbols: Mapping[str, Term], *, kinks: bool = False) -> tuple[Term, list[Owed]]:
+def read(
+    text: str, symbols: Mapping[str, Term], *, tables: Mapping[str, Table] | None = None, kinks: bool = False
+) -> tuple[Term, list[Owed]]:
     """The term that a text stands for, and what it owes; raises `GrammarError`."""
     if len(text) > MOST_CHARACTERS:
         raise GrammarError(f"it is longer than {MOST_CHARACTERS} characters")
-    reading = _Reading(text, symbols, kinks=kinks)
+    reading = _Reading(text, symbols, tables or {}, kinks=kinks)
     value = reading.sum()
     if reading.kind:
         raise GrammarError(f"{reading.word[:40]!r} was not expected")
@@ -82,8 +85,10 @@ class _Value:
 class _Reading:
     """One pass over the tokens; each method takes what its rule of the grammar covers."""
 
-    def __init__(self, text: str, symbols: Mapping[str, Term], *, kinks: bool) -> None:
-        self._text, self._symbols, self._kinks = text.rstrip(" "), symbols, kinks
+    def __init__(
+        self, text: str, symbols: Mapping[str, Term], tables: Mapping[str, Table], *, kinks: bool
+    ) -> None:
+        self._text, self._symbols, self._tables, self._kinks = text.rstrip(" "), symbols, tables, kinks
         self._at = self._end = self._depth = 0
         self.owed: list[Owed] = []
         self.kind: str | None = None
@@ -171,7 +176,7 @@ class _Reading:
         self._next()
         if kind == "number":
             return _bounded(number(_decimal(word)), 1)
-        if word in _SMOOTH or word in _KINKS:
+        if word in _SMOOTH or word in _KINKS or word in self._tables:
             self._must("(")
             args = [self._inside()]
             while self._takes(","):
@@ -197,6 +202,8 @@ class _Reading:
         growth = max(value.growth for value in values)
         if name != "norm" and len(args) != 1:
             raise GrammarError(f"{name} takes one argument")
+        if name in self._tables:
+            return _Value(self._looked_up(self._tables[name], args[0], begin), growth)
         if name in _KINKS:
             if not self._kinks:
                 raise GrammarError(f"{name} is allowed in h only")
@@ -208,6 +215,12 @@ class _Reading:
         if name in ("asin", "acos"):
             self._owe("positive", UNIT - args[0].raised(2), begin)
         return _Value(operation(name, *args), growth)
+
+    def _looked_up(self, table: Table, x: Term, begin: int) -> Term:
+        first, last = table.ends
+        self._owe("positive", x - number(first), begin)
+        self._owe("positive", number(last) - x, begin)
+        return looked_up(table, x)
 
     def _owe(self, kind: str, argument: Term, begin: int) -> None:
         if argument.op == "const":

@@ -19,7 +19,7 @@ from tubecert.recheck.angles import by_addition
 from tubecert.recheck.terms import UNIT, Term, in_order, number, operation, remade
 
 _INDETERMINATES = frozenset(
-    {"symbol", "pi", "asin", "acos", "atan", "exp", "log", "sqrt", "norm", "direction"}
+    {"symbol", "pi", "asin", "acos", "atan", "exp", "log", "sqrt", "table", "norm", "direction"}
 )
 Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
 

@@ -27,7 +27,7 @@ _ASCENTS = 60
 
 def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
     """|G| <= limit over the tube of a plan that stays where it is; None if there is no multiplier that helps."""
-    if any(e.op in ("norm", "direction") for e in in_order(column)):
+    if any(e.op in ("norm", "direction", "table") for e in in_order(column)):
         return None  # no curvature
     square = sum((e * e for e in column), start=NOUGHT)
     variables = tuple(sorted(names([square])))

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, exact, length, power
-from tubecert.recheck.terms import Term, in_order, number_of
+from tubecert.recheck.lookup import over
+from tubecert.recheck.terms import Term, in_order, number_of, table_of
 
 
 class Program:
@@ -29,7 +30,7 @@ class Program:
                 self._inputs.append((k, column[str(term.value)]))
             else:
                 index = term.value if isinstance(term.value, int) else 0
-                kernel = term.op if term.op in ("add", "mul") else _KERNELS[term.op]
+                kernel = term.op if term.op in ("add", "mul") else _kernel(term)
                 self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
         self._outputs = [place[term] for term in outputs]
 
@@ -51,6 +52,13 @@ class Program:
                 assert not isinstance(kernel, str)
                 memory[k] = kernel([memory[i] for i in args], index)
         return [memory[k] for k in self._outputs]
+
+
+def _kernel(term: Term) -> Callable[[list[Ball], int], Ball]:
+    if term.op != "table":
+        return _KERNELS[term.op]
+    table = table_of(term)
+    return lambda args, _: over(table, args[0])
 
 
 def _direction(args: list[Ball], index: int) -> Ball:

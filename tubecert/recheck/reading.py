@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import GrammarError, Owed, read
+from tubecert.recheck.lookup import Table
 from tubecert.recheck.terms import Matrix, Term, variable
 
 TIME = "t"
@@ -21,16 +22,20 @@ class Reader:
     names: tuple[str, ...]
     kinks: bool
     duties: list[Owed]
+    tables: Mapping[str, Table]
 
     @classmethod
-    def of(cls, names: Iterable[str], *, kinks: bool = False) -> Reader:
-        """A reader that knows these names."""
-        return cls(tuple(names), kinks, [])
+    def of(
+        cls, names: Iterable[str], tables: Mapping[str, Table] | None = None, *, kinks: bool = False
+    ) -> Reader:
+        """A reader that knows these names, and these tables."""
+        return cls(tuple(names), kinks, [], tables or {})
 
     def term(self, node: Node) -> Term:
         """One expression."""
         try:
-            term, owed = read(node.text(), {name: variable(name) for name in self.names}, kinks=self.kinks)
+            symbols = {name: variable(name) for name in self.names}
+            term, owed = read(node.text(), symbols, tables=self.tables, kinks=self.kinks)
         except GrammarError as error:
             raise node.refused(f"is no expression that may stand there: {error}") from None
         self.duties.extend(owed)

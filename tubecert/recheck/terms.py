@@ -11,6 +11,9 @@ from fractions import Fraction
 from itertools import count
 from weakref import WeakValueDictionary
 
+from tubecert.recheck.lookup import Table
+
+Value = Fraction | str | int | Table | None
 Rows = Sequence[Sequence["Term"]]
 Matrix = list[list["Term"]]
 
@@ -19,7 +22,7 @@ _serial = count()
 
 
 class Term:
-    """An operation `op` on other terms; `value` is a number, a name, an exponent or an index.
+    """An operation `op` on other terms; `value` is a number, a name, an exponent, an index or a table.
 
     The operations are `const`, `symbol`, `pi`, and those of `_PARTIAL`.
     """
@@ -28,7 +31,7 @@ class Term:
 
     op: str
     args: tuple[Term, ...]
-    value: Fraction | str | int | None
+    value: Value
     serial: int
 
     def __add__(self, other: Term) -> Term:
@@ -85,7 +88,13 @@ def number_of(term: Term) -> Fraction:
     return term.value
 
 
-def _make(op: str, *args: Term, value: Fraction | str | int | None = None) -> Term:
+def table_of(term: Term) -> Table:
+    """The table that a `table` reads."""
+    assert isinstance(term.value, Table)
+    return term.value
+
+
+def _make(op: str, *args: Term, value: Value = None) -> Term:
     key = (op, value, *(id(arg) for arg in args))
     found = _known.get(key)
     if found is None:
@@ -121,6 +130,12 @@ def operation(op: str, *args: Term) -> Term:
     return _make(op, *args)
 
 
+def looked_up(table: Table, x: Term) -> Term:
+    """The function of a table; of a number, its exact value if it has one."""
+    known = table.value(number_of(x)) if x.op == "const" else None
+    return _make("table", x, value=table) if known is None else number(known)
+
+
 def remade(term: Term, args: tuple[Term, ...]) -> Term:
     """The operation of a term on other arguments."""
     match term.op:
@@ -132,6 +147,8 @@ def remade(term: Term, args: tuple[Term, ...]) -> Term:
             return args[0] / args[1]
         case "pow":
             return args[0].raised(int(str(term.value)))
+        case "table":
+            return looked_up(table_of(term), args[0])
     if args and args[0] is NOUGHT and term.op in _AT_ZERO:
         return number(_AT_ZERO[term.op])
     return _make(term.op, *args, value=term.value) if args else term
@@ -200,6 +217,7 @@ _PARTIAL: Mapping[str, Callable[[Term, int], Term]] = {
     "tanh": lambda e, i: UNIT - e.raised(2),
     "exp": lambda e, i: e,
     "log": lambda e, i: UNIT / e.args[0],
+    "table": lambda e, i: looked_up(table_of(e).slope, e.args[0]),
     "norm": lambda e, i: function("direction", *e.args, value=i),
     "direction": _turning,
 }

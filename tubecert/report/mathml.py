@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tubecert.expression import ExpressionError, is_name, parse, symbol
+from tubecert.expression import UNKNOWN, ExpressionError, is_name, parse, symbol
 
 _SUM, _PRODUCT, _SIGN, _ATOM = range(4)  # how strongly the outermost operation binds
 _LINE = 64  # characters of text on a line of an equation
@@ -123,9 +123,15 @@ def _terms(text: str) -> list[tuple[bool, ET.Element, int]]:
 def _tree(text: str) -> ast.expr | None:
     """The structure of a text that is an expression: what bounds its size and depth is the grammar's own parser."""
     line = " ".join(text.split())
-    names = {name for name in re.findall(r"[A-Za-z][A-Za-z0-9_]*", line) if is_name(name)}
+    tables = {name for name in re.findall(r"([A-Za-z][A-Za-z0-9_]*)\(", line) if is_name(name)}
+    names = {name for name in re.findall(r"[A-Za-z][A-Za-z0-9_]*", line) if is_name(name)} - tables
     try:
-        parse(line, symbols={name: symbol(name) for name in names}, kinks=True)
+        parse(
+            line,
+            symbols={name: symbol(name) for name in names},
+            tables=dict.fromkeys(tables, UNKNOWN),
+            kinks=True,
+        )
         tree = ast.parse(line, mode="eval").body
     except (ExpressionError, SyntaxError, ValueError):
         return None

@@ -5,13 +5,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 
-from tubecert.certificate.effective import Effective
+from tubecert.certificate.effective import Effective, TableView
 from tubecert.certificate.result import Certificate, Result
 from tubecert.records import to_json
 from tubecert.report.mathml import Equation, aligned
 from tubecert.report.numbers import end, exact
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
 from tubecert.report.sections import family_words, safe_set
+
+_POINTS = 8  # of a table
 
 
 def system(result: Result) -> Iterator[Block]:
@@ -54,6 +56,8 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
     model = effective.system
     if model.parameters:
         yield "parameters", Cell(text=_list(model.parameters))
+    for name, table in sorted(model.tables.items()):
+        yield f"table {name}", Cell(text=_points(table))
     if model.units:
         yield "units", Cell(text=", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items())))
     box = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in safe_set(result))
@@ -70,6 +74,16 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
         yield "obstacle", Cell(text=_list(obstacle))
     if overrides := to_json(result.overrides):
         yield "overridden by the command", Cell(text=_list(overrides))
+
+
+def _points(table: TableView) -> str:
+    """The first points of a table, and how many there are."""
+    shown = ", ".join(f"({x}, {y})" for x, y, *_ in table.points[:_POINTS])
+    more = ", ..." if len(table.points) > _POINTS else ""
+    last = table.points[-1]
+    return f"smooth through {len(table.points)} points: {shown}{more}" + (
+        f", ({last[0]}, {last[1]})" if more else ""
+    )
 
 
 def _plan(trajectory: Mapping[str, object]) -> str:

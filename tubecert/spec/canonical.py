@@ -11,9 +11,10 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from tubecert.expression import full_text, number_text
+from tubecert.expression import Lookup, full_text, number_text
 from tubecert.spec.hardware import LARGEST, ONE_SAMPLE
 from tubecert.spec.load import VERSION
+from tubecert.spec.lookup import SLOPES
 from tubecert.spec.types import (
     Bundle,
     Hardware,
@@ -72,7 +73,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
 
 
 def _system(spec: Spec) -> dict[str, Any]:
-    return {
+    data: dict[str, Any] = {
         "states": list(spec.states),
         "inputs": list(spec.inputs),
         "units": dict(spec.units),
@@ -81,6 +82,15 @@ def _system(spec: Spec) -> dict[str, Any]:
         "f": _texts(spec.drift or spec.f),
         "B": [_texts(row) for row in spec.gained or spec.B],
     }
+    if spec.tables:
+        data["tables"] = {table.name: _lookup(table) for table in spec.tables}
+    return data
+
+
+def _lookup(table: Lookup) -> dict[str, Any]:
+    """The function itself: however its slopes were found, they are what counts."""
+    rows = zip(table.knots, table.values, table.slopes, strict=True)
+    return {"interpolation": SLOPES, "points": [_numbers(row) for row in rows]}
 
 
 def _uncertainty(spec: Spec) -> dict[str, Any]:

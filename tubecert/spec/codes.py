@@ -25,6 +25,7 @@ SYMMETRY: Final = "TC116"
 STABILITY: Final = "TC117"
 PLAN_COLUMNS: Final = "TC118"
 PLAN_TIMES: Final = "TC119"
+TABLE: Final = "TC124"
 
 CODES: Final[Mapping[str, str]] = {
     UNREADABLE: "the file cannot be read",
@@ -47,4 +48,5 @@ CODES: Final[Mapping[str, str]] = {
     STABILITY: "the predictor matrix A_m does not suit P = I",
     PLAN_COLUMNS: "a plan file is not a table of t, the states and the inputs",
     PLAN_TIMES: "the times of a plan file do not increase from 0 to the horizon",
+    TABLE: "a table of a function is not rows of x and y with increasing x",
 }

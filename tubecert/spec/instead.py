@@ -84,7 +84,7 @@ _KEYS: Final[Mapping[str, str]] = {
 
 _PLACES: Final[Mapping[str, str]] = {
     **dict.fromkeys(("epsilon", "rho_a", "half_widths"), "tube"),
-    **dict.fromkeys(("states", "inputs", "parameters", "definitions", "f", "B"), "system"),
+    **dict.fromkeys(("states", "inputs", "parameters", "tables", "definitions", "f", "B"), "system"),
     "dual_metric": "metric",
     "h": "uncertainty",
     "horizon": "trajectory",

@@ -136,7 +136,7 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
         entries["system"].mapping(
-            required=("states", "inputs", "f", "B"), optional=("parameters", "definitions", "units")
+            required=("states", "inputs", "f", "B"), optional=("parameters", "tables", "definitions", "units")
         )
         if "system" in entries
         else None
@@ -223,6 +223,7 @@ def _read_named(
         units=units,
         parameters=names.parameters,
         definitions=tuple(name for name, _ in names.definitions),
+        tables=tuple(table for _, table in names.tables),
         f=known[0],
         drift=dynamics[0] if names.ranges else (),
         ranges=names.ranges,

@@ -12,7 +12,9 @@ from tubecert.expression import (
     MAX_NAME_LENGTH,
     ONE,
     RESERVED,
+    UNKNOWN,
     Expression,
+    Lookup,
     Obligation,
     Parsed,
     constant,
@@ -25,6 +27,7 @@ from tubecert.expression import (
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.instead import glued
+from tubecert.spec.lookup import read_lookup
 from tubecert.spec.reader import Field, Scope
 
 TIME: Final = "t"
@@ -51,6 +54,7 @@ class Names:
     irrational: tuple[tuple[str, Expression], ...] = ()  # parameters that contain pi
     definitions: tuple[tuple[str, Parsed], ...] = ()
     ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
+    tables: tuple[tuple[str, Lookup], ...] = ()
 
     @property
     def values(self) -> dict[str, Expression]:
@@ -63,12 +67,17 @@ class Names:
             TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
             **self._inputs_refused(),
         }
-        return self._scope(self.states, refused | self._ranges_refused())
+        refused |= {
+            name: f"{name} is a table; tables may be used in f, B, h and plans, not in a metric or in E"
+            for name, _ in self.tables
+        }
+        return self._scope(self.states, refused | self._ranges_refused(), tables=False)
 
     def of_plant(self) -> Scope:
         """For f and B: the same, and parameters of which a range is known."""
         names = (*self.states, *dict(self.ranges))
-        refused = {name: why for name, why in self.of_state().refused.items() if name not in names}
+        known = {*names, *dict(self.tables)}
+        refused = {name: why for name, why in self.of_state().refused.items() if name not in known}
         return self._scope(names, refused)
 
     def of_uncertainty(self) -> Scope:
@@ -87,17 +96,20 @@ class Names:
         refused |= {name: f"{name} is an input; a plan is a function of t alone" for name in self.inputs}
         return self._scope((TIME,), refused | self._ranges_refused())
 
-    def _scope(self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False) -> Scope:
+    def _scope(
+        self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False, tables: bool = True
+    ) -> Scope:
         """Parameters, variables, and the definitions that stand for expressions of these."""
         symbols = self.values | _symbols(variables)
         owed: dict[str, tuple[Obligation, ...]] = {name: () for name, _ in self.irrational}
         for name, parsed in self.definitions:
-            why = _foreign(name, parsed, variables, refused, kinks=kinks)
+            why = _foreign(name, parsed, variables, refused, kinks=kinks, tables=tables)
             if why is None:
                 symbols[name], owed[name] = parsed.expression, parsed.obligations
             else:
                 refused = {**refused, name: why}
-        return Scope(symbols=symbols, refused=refused, kinks=kinks, owed=owed)
+        known = dict(self.tables) if tables else {}
+        return Scope(symbols=symbols, tables=known, refused=refused, kinks=kinks, owed=owed)
 
     def _ranges_refused(self) -> dict[str, str]:
         return {
@@ -114,7 +126,13 @@ class Names:
 
 
 def _foreign(
-    name: str, parsed: Parsed, variables: Collection[str], refused: Mapping[str, str], *, kinks: bool
+    name: str,
+    parsed: Parsed,
+    variables: Collection[str],
+    refused: Mapping[str, str],
+    *,
+    kinks: bool,
+    tables: bool,
 ) -> str | None:
     """Why a definition may not be used in an expression of some variables."""
     parts = [parsed.expression, *(owed.argument for owed in parsed.obligations)]
@@ -122,6 +140,8 @@ def _foreign(
         return f"{name} depends on {variable}: {refused.get(variable, 'it is not known here')}"
     if not kinks and any(node.op == "norm" for node in topological(parts)):
         return f"{name} contains abs or norm, which are only allowed in h"
+    if not tables and any(node.op == "table" for node in topological(parts)):
+        return f"{name} contains a table; tables may be used in f, B, h and plans"
     return None
 
 
@@ -151,6 +171,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
         irrational=tuple((name, value) for name, value in values.items() if not value.is_constant),
         ranges=tuple(ranges.items()),
     )
+    names = _with_tables(names, system.get("tables"), taken)
     return _with_definitions(names, system.get("definitions"), taken)
 
 
@@ -290,6 +311,17 @@ def _rises(first: str, second: str) -> bool:
         return Fraction(first) < Fraction(second)
     except ValueError:
         return False
+
+
+def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
+    """Tables by name; one that cannot be read stands as 1 everywhere."""
+    for key, node in (field.pairs("of names to tables") or []) if field is not None else ():
+        assert field is not None
+        name = _name(key.text, _key_field(field, key), "table", taken)
+        found = read_lookup(key.text, field.child(key, node), names.values)
+        if name is not None:
+            names = replace(names, tables=(*names.tables, (name, found or UNKNOWN)))
+    return names
 
 
 def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:

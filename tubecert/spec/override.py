@@ -27,6 +27,7 @@ _PART = re.compile(rf"({_NAME})|\[({_INDEX})\]", re.ASCII)
 _OWN_NAMES: Final = (
     "system.parameters",
     "system.definitions",
+    "system.tables",
     "system.units",
 )  # their keys are the user's words
 

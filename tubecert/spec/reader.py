@@ -17,6 +17,7 @@ from tubecert.expression import (
     MAX_NUMBER_EXPONENT,
     Expression,
     ExpressionError,
+    Lookup,
     Obligation,
     Parsed,
     Side,
@@ -56,13 +57,21 @@ class Scope:
     """
 
     symbols: Mapping[str, Expression]
+    tables: Mapping[str, Lookup] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
     kinks: bool = False
     owed: Mapping[str, tuple[Obligation, ...]] = field(default_factory=dict)
 
     def parse(self, text: str) -> Parsed:
         """The expression of a text; raises `ExpressionError`."""
-        parsed = parse(text, symbols=self.symbols, kinks=self.kinks, refused=self.refused, owed=self.owed)
+        parsed = parse(
+            text,
+            symbols=self.symbols,
+            tables=self.tables,
+            kinks=self.kinks,
+            refused=self.refused,
+            owed=self.owed,
+        )
         if self.owed:
             self._check_written_out(parsed)
         return parsed
@@ -73,7 +82,8 @@ class Scope:
         try:
             if sum(map(longest_text, parts)) > 8 * MAX_LENGTH:
                 raise ExpressionError("it is longer than that", kind="limit")
-            parse(full_text(parsed.expression, parsed.obligations), symbols=self.symbols, kinks=self.kinks)
+            text = full_text(parsed.expression, parsed.obligations)
+            parse(text, symbols=self.symbols, tables=self.tables, kinks=self.kinks)
         except ExpressionError as error:
             raise ExpressionError(
                 f"with its definitions written out the expression is too large ({error.message})",

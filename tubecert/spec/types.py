@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from tubecert.expression import Expression, Obligation
+from tubecert.expression import Expression, Lookup, Obligation
 from tubecert.findings import Location
 
 Vector = tuple[Fraction, ...]
@@ -321,6 +321,7 @@ class Spec:
     definitions: tuple[str, ...] = field(
         default=(), compare=False
     )  # their names: expressions have them written out
+    tables: tuple[Lookup, ...] = ()
     f: tuple[Term, ...]
     drift: tuple[Term, ...] = ()
     B: TermMatrix

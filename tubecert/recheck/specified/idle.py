@@ -23,7 +23,10 @@ def read_idle(own: Members, plant: Plant) -> None:
         simulation = own["simulation"].closed(optional=("gains", *numbers, *texts))
         simulation.get("gains", Node.text)
         simulation.get(
-            "h", lambda item: Reader.of((*plant.states, TIME), kinks=True).column(item, len(plant.inputs))
+            "h",
+            lambda item: Reader.of((*plant.states, TIME), plant.tables, kinks=True).column(
+                item, len(plant.inputs)
+            ),
         )
         for key in numbers:
             simulation.get(key, Node.exact)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed, is_name
+from tubecert.recheck.lookup import Table
 from tubecert.recheck.reading import TIME, Column, Reader
 from tubecert.recheck.specified.numbers import Range, ends, not_negative
 from tubecert.recheck.terms import Matrix, names, number, replaced
 
 _MOST_STATES = 32
+_MOST_POINTS = 500  # of a table
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,7 @@ class Plant:
     ranges: dict[str, Range]
     unknown: Column | None
     gained: Matrix | None
+    tables: dict[str, Table] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ class Uncertainty:
 
 def read_plant(node: Node, box: Node) -> Plant:
     """`system` on the `safe_set`."""
-    own = node.closed("states", "inputs", "units", "parameters", "f", "B")
+    own = node.closed("states", "inputs", "units", "parameters", "f", "B", optional=("tables",))
     states, inputs = own["states"].texts(), own["inputs"].texts()
     n, m = len(states), len(inputs)
     if not (0 < m <= n <= _MOST_STATES):
@@ -65,8 +68,9 @@ def read_plant(node: Node, box: Node) -> Plant:
     for _, unit in own["units"].items():
         unit.text()
     ranges = _ranges(own["parameters"])
-    _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping()])
-    reader = Reader.of((*states, *ranges))
+    tables = own.get("tables", _tables) or {}
+    _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping(), *tables])
+    reader = Reader.of((*states, *ranges), tables)
     drift, B = reader.column(own["f"], n), reader.matrix(own["B"], n, m)
     gained = not names(e for row in B for e in row).isdisjoint(ranges)
     sides = box.closed(*states)
@@ -80,7 +84,27 @@ def read_plant(node: Node, box: Node) -> Plant:
         ranges=ranges,
         unknown=drift if ranges else None,
         gained=B if gained else None,
+        tables=tables,
     )
+
+
+def _tables(node: Node) -> dict[str, Table]:
+    """Functions by their points: x, y and slope, x ascending."""
+    found = {}
+    for name, value in node.items():
+        own = value.closed("interpolation", "points")
+        own["interpolation"].word("slopes")
+        rows = own["points"].entries()
+        if not 2 <= len(rows) <= _MOST_POINTS:
+            raise value.refused(f"must have 2 to {_MOST_POINTS} points")
+        points: list[tuple[Fraction, Fraction, Fraction]] = []
+        for row in rows:
+            x, y, slope = (item.exact() for item in row.sized(3))
+            if points and x <= points[-1][0]:
+                raise row.refused("does not lie above the point before it")
+            points.append((x, y, slope))
+        found[name] = Table(name, tuple(points))
+    return found
 
 
 def _ranges(node: Node) -> dict[str, Range]:
@@ -117,7 +141,7 @@ def _names(node: Node, given: Sequence[str]) -> None:
 def read_uncertainty(node: Node, plant: Plant) -> Uncertainty:
     """`uncertainty`."""
     own = node.closed(optional=("h", "bounds"))
-    reader = Reader.of((*plant.states, TIME), kinks=True)
+    reader = Reader.of((*plant.states, TIME), plant.tables, kinks=True)
     h = own.get("h", lambda item: reader.column(item, len(plant.inputs)))
     declared: dict[str, Fraction] = {}
     if "bounds" in own:

@@ -83,14 +83,15 @@ def read_trajectory(node: Node, plant: Plant) -> Trajectory:
     kind, n, m = node.mapping().get("kind"), len(plant.states), len(plant.inputs)
     if kind == "any":
         return _any(node, plant)
+    if kind == "expressions":
+        return _expressed(node, plant)
     readers: dict[object, Callable[[Node, int, int], Trajectory]] = {
         "equilibrium": _resting,
-        "expressions": _expressed,
         "csv": _tabled,
         "ilqr": _planned,
     }
     if not isinstance(kind, str) or kind not in readers:
-        raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}, any")
+        raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}, expressions, any")
     return readers[kind](node, n, m)
 
 
@@ -99,10 +100,10 @@ def _resting(node: Node, n: int, m: int) -> Resting:
     return Resting(several(own["at"], n), several(own["input"], m), own.get("horizon", positive))
 
 
-def _expressed(node: Node, n: int, m: int) -> Expressed:
+def _expressed(node: Node, plant: Plant) -> Expressed:
     own = node.closed("kind", "x", "u", "horizon")
-    reader = Reader.of((TIME,))
-    x, u = reader.column(own["x"], n), reader.column(own["u"], m)
+    reader = Reader.of((TIME,), plant.tables)
+    x, u = reader.column(own["x"], len(plant.states)), reader.column(own["u"], len(plant.inputs))
     return Expressed(x, u, positive(own["horizon"]), tuple(reader.duties))
 
 

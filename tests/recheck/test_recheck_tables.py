@@ -1,0 +1,107 @@
+"""Functions of tables in certificates: they hold the points, recheck reads and evaluates them on its own."""
+
+from __future__ import annotations
+
+import copy
+import json
+
+import pytest
+from rechecked import certified, examine, failing, respecified
+
+from tubecert import certificate, pipeline
+from tubecert.enclosure import lookup
+from tubecert.enclosure.interval import Interval
+from tubecert.errors import TubecertError
+from tubecert.spec import load_text
+
+SPEC = """
+tubecert: 1
+name: drag
+system:
+  states: [v]
+  inputs: [u]
+  tables:
+    drag: {points: [[-2, -2.1], [-1, -0.6], [0.3, 0.1], [1, 0.6], [2, 2.1]]}
+    gust: {interpolation: cubic, points: [[-2, 0], [0, 0.3], [2, 1]]}
+  f: [-drag(v)]
+  B: [[1]]
+safe_set: {v: [-2, 2]}
+uncertainty: {h: ["0.1*sin(t) + 0.05*gust(v)"]}
+trajectory: {kind: expressions, x: [0.5*sin(t)], u: [0.5*cos(t) + drag(0.5*sin(t))], horizon: 3}
+metric: {rate: 0.5, dual_metric: [["1"]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+"""
+
+
+def made() -> dict[str, object]:
+    return certified(SPEC, conditions="distance")
+
+
+def points(effective, name="drag"):
+    return effective["system"]["tables"][name]["points"]
+
+
+@pytest.mark.slow
+def test_a_table_is_certified_and_confirmed():
+    document = made()
+    assert document["result"]["verdict"] == "certified"
+    effective = document["result"]["spec"]["effective"]
+    assert [row[:2] for row in points(effective)][1:3] == [["-1", "-0.6"], ["0.3", "0.1"]]
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("row", "column"), [(1, 1), (2, 0), (3, 2)])
+def test_another_table_is_not_confirmed(row, column):
+    """Every claim as it was, one number of the table another one, and all hashes right."""
+
+    def changed(effective):
+        own = points(effective)[row]
+        own[column] = {"-0.6": "-1.5", "0.3": "-0.9"}.get(own[column], "4")
+
+    assert failing(examine(respecified(copy.deepcopy(made()), changed)))
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda own: own["drag"]["points"].reverse(), "does not lie above the point before"),
+        (lambda own: own["drag"]["points"].__delitem__(slice(1, None)), "must have 2 to 500 points"),
+        (lambda own: own["drag"]["points"][0].pop(), "has 2 entries, not 3"),
+        (lambda own: own["drag"].update(interpolation="linear"), "interpolation"),
+        (lambda own: own["drag"].update(order="1"), "is not known"),
+        (lambda own: own.update(sin=own["gust"]), "may not be used"),
+        (lambda own: own.update(v=own["gust"]), "uses a name twice"),
+        (lambda own: own.pop("drag"), "'drag' is not known"),
+    ],
+)
+def test_what_is_no_table_is_refused(change, why):
+    document = respecified(copy.deepcopy(made()), lambda effective: change(effective["system"]["tables"]))
+    with pytest.raises(TubecertError, match=why):
+        examine(document)
+
+
+@pytest.mark.slow
+def test_a_table_that_the_safe_set_leaves_is_not_confirmed():
+    def shortened(effective):
+        own = points(effective)
+        own[-1][0] = "1.9"
+
+    assert "may be undefined" in str(failing(examine(respecified(copy.deepcopy(made()), shortened))))
+
+
+@pytest.mark.slow
+def test_a_producer_whose_enclosures_are_too_narrow_is_caught(monkeypatch):
+    """Slopes of tables a tenth too small: the producer certifies what recheck does not confirm."""
+    right = lookup.enclosure
+
+    def narrow(table, x):
+        found = right(table, x)
+        share = 0.9 if table.order else 1.0
+        return Interval(found.lo * share, found.hi * share)
+
+    monkeypatch.setattr(lookup, "enclosure", narrow)
+    result = pipeline.certify(load_text(SPEC, "spec.yaml"), pipeline.Options(conditions="distance"))
+    document = json.loads(certificate.dump(certificate.seal(result.to_json(), {})))
+    assert document["result"]["verdict"] == "certified"
+    assert failing(examine(document))

@@ -1,0 +1,133 @@
+"""The tables of a system, `system.tables`: from a CSV file or points in the specification to exact functions.
+
+A row is x, y, and with `interpolation: slopes` the slope there. x increases from row to row. The first line of a file
+may name the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import Final
+
+from tubecert.expression import Expression, Lookup
+from tubecert.findings import capped
+from tubecert.spec import codes
+from tubecert.spec.interpolation import cubic_slopes, monotone_slopes
+from tubecert.spec.reader import Field
+from tubecert.spec.sheet import ENOUGH, Cell, Sheet, is_decimal, number, opened, rows
+
+MOST_KNOTS: Final = 500
+SLOPES: Final = "slopes"
+_MADE: Final[Mapping[str, Callable[[Sequence[Fraction], Sequence[Fraction]], tuple[Fraction, ...]]]] = {
+    "monotone": monotone_slopes,
+    "cubic": cubic_slopes,
+}
+INTERPOLATIONS: Final = (*_MADE, SLOPES)
+
+Row = Sequence[Fraction]
+
+
+def read_lookup(name: str, entry: Field, parameters: Mapping[str, Expression]) -> Lookup | None:
+    """One table; None if anything is wrong with it, which has been reported."""
+    own = entry.mapping(optional=("file", "points", "interpolation"))
+    if own is None:
+        return None
+    kind = own["interpolation"].word(INTERPOLATIONS) if "interpolation" in own else "monotone"
+    if ("file" in own) == ("points" in own):
+        message = f"{entry.path} needs {'either ' if 'file' in own else ''}a file or points"
+        entry.fail(codes.MISSING_KEY, message, "write {file: NAME.csv}, or {points: [[x, y], [x, y]]}")
+        return None
+    if kind is None:
+        return None
+    width = 3 if kind == SLOPES else 2
+    found = _from_file(own["file"], width) if "file" in own else _points(own["points"], width, parameters)
+    if found is None:
+        return None
+    x, y, *slopes = zip(*found, strict=True)
+    return Lookup(name, x, y, slopes[0] if slopes else _MADE[kind](x, y))
+
+
+def _points(entry: Field, width: int, parameters: Mapping[str, Expression]) -> list[Row] | None:
+    items = entry.items(None, "points", "write [[x, y], [x, y]]")
+    if items is None:
+        return None
+    if not 2 <= len(items) <= MOST_KNOTS:
+        entry.fail(codes.TABLE, f"{entry.path} has {len(items)} points; a table has 2 to {MOST_KNOTS}")
+        return None
+    found: list[Row] = []
+    for item in items:
+        row = item.numbers(width, parameters)
+        if row is None:
+            return None
+        if found and row[0] <= found[-1][0]:
+            item.fail(codes.TABLE, f"{item.path}: {_order(str(float(row[0])))}", _SORTED)
+            return None
+        found.append(row)
+    return found
+
+
+def _from_file(entry: Field, width: int) -> list[Row] | None:
+    file = opened(entry)
+    if file is None:
+        return None
+    found = _read(file.sheet, width)
+    entry.reader.findings.extend(capped(file.sheet.findings, codes.LIMIT, ENOUGH))
+    return None if file.sheet.findings else found
+
+
+def _read(sheet: Sheet, width: int) -> list[Row]:
+    """The rows; the lines of a file are shown once one of them is a row of a table."""
+    found: list[Row] = []
+    for place, cells in enumerate(rows(sheet, "a table")):
+        if len(cells) != width:
+            _wrong_width(sheet, cells, width)
+            return found
+        if not place and not any(is_decimal(cell) for cell in cells):
+            continue  # names of the columns
+        row = _numbers(sheet, cells)
+        if row is not None:
+            sheet.shown = True
+            if found and row[0] <= found[-1][0]:
+                sheet.fail(cells[0], codes.TABLE, _order(cells[0].text), _SORTED)
+            found.append(row)
+        if len(sheet.findings) >= ENOUGH:
+            return found
+        if len(found) > MOST_KNOTS:
+            sheet.fail(
+                cells[0], codes.LIMIT, f"a table has at most {MOST_KNOTS} rows", "give every second one"
+            )
+            return found
+    if len(found) < 2 and not sheet.findings:
+        last = Cell(text="", line=max(len(sheet.source.lines) - 1, 0), column=0)
+        sheet.fail(last, codes.TABLE, f"a table needs 2 rows of numbers or more, not {len(found)}")
+    return found
+
+
+def _numbers(sheet: Sheet, cells: Sequence[Cell]) -> Row | None:
+    if not sheet.shown:
+        strange = [cell for cell in cells if not is_decimal(cell)]
+        for cell in strange:  # of a file that may be something else no text is shown
+            sheet.fail(
+                cell, codes.NUMBER, "this cell is not a decimal number", "a row is x,y in plain decimals"
+            )
+        if strange:
+            return None
+    found = [value for value in (number(sheet, cell) for cell in cells) if value is not None]
+    return found if len(found) == len(cells) else None
+
+
+def _wrong_width(sheet: Sheet, cells: Sequence[Cell], width: int) -> None:
+    count = "1 cell" if len(cells) == 1 else f"{len(cells)} cells"
+    columns = "x,y" if width == 2 else "x,y,slope"
+    help = f"columns are {columns}, separated by commas"
+    more = "; slopes belong to interpolation: slopes" if len(cells) == 3 else ""
+    where = cells[min(len(cells), width) - 1]
+    sheet.fail(where, codes.TABLE, f"the row has {count}; a table has {width} columns", help + more)
+
+
+def _order(text: str) -> str:
+    return f"x = {text[:40]} does not lie above the x before it"
+
+
+_SORTED: Final = "sort the rows by x, and give every x once"
