@@ -20,6 +20,7 @@ from tubecert.conditions.hardware.loop import WindowProof
 from tubecert.conditions.machine import Window as Known
 from tubecert.enclosure.constant import Constant
 from tubecert.recheck import along as own
+from tubecert.recheck.balls import exact
 
 KEPT = ("h_initial", "initial_distance")  # those of the start are of the whole tube
 
@@ -121,6 +122,18 @@ def compare(problem, recipe, module=own) -> None:
             same(stage.left.top, x.supremum)
             same(stage.at_end(), x.end)
             same(stage.left.ultimate, x.at.course.bound.ultimate())
+
+
+@pytest.mark.slow
+@settings(deadline=None, max_examples=3)
+@given(courses())
+def test_an_uncertain_gain_beside_windows_is_refused_by_the_windows_themselves(case):
+    windows, promise = read(*case)
+    Delta = exact(Fraction(1, 10))
+    uncertain = [replace(each, setting=replace(each.setting, gain=Delta)) for each in windows]
+    assert own.along(uncertain, promise) is None
+    with pytest.raises(ValueError, match="a B that is known"):
+        own.stages(uncertain, promise)
 
 
 PLANTED = {

@@ -18,6 +18,7 @@ from tubecert.expression import constant, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.recheck.document import CertificateError
 from tubecert.recheck.run import recheck
+from tubecert.report import planned
 from tubecert.report.sections import excursion
 from tubecert.spec import Knots, load
 from tubecert.trajectory.defect import Defect
@@ -165,6 +166,20 @@ def test_a_certificate_of_such_a_plan_is_confirmed_and_forgeries_are_not(tmp_pat
     drawn = replace(result.plan.samples, x=tuple((x + 0.1, y) for x, y in result.plan.samples.x))
     (line,) = excursion(replace(result, plan=replace(result.plan, samples=drawn)))
     assert line.startswith("between its knots the plan takes x 0.1")
+    between = result.plan.exact_knots()
+    far = tuple(("9", row[1]) if k % 2 else row for k, row in enumerate(result.plan.knots.x))
+    beside = replace(result.plan, samples=drawn, knots=replace(result.plan.knots, x=far))
+    assert list(excursion(replace(result, plan=beside))) == [line], (
+        "x between two knots is no part of the curve"
+    )
+    (curve,) = planned.inputs(result)
+    t, u = map(np.array, zip(*curve, strict=True))
+    assert len(curve) > 4 * len(between.t) / 2
+    for k in range(0, len(between.t) - 1, 2):
+        rows = slice(k, k + 3)
+        own = np.polyfit([float(s) for s in between.t[rows]], [float(v) for (v,) in between.u[rows]], 2)
+        here = (t >= float(between.t[k])) & (t <= float(between.t[k + 2]))
+        assert np.abs(u[here] - np.polyval(own, t[here])).max() < 1e-9
     data = certificate.dump(certificate.seal(result.to_json(), {}))
     assert checked(data) == "confirmed"
 

@@ -47,6 +47,8 @@ def along(windows: Sequence[Window], promise: Promise) -> tuple[Passed, ...] | N
     for window in windows:
         if window.at.losses is not None:  # theorem H-R is stated for one window
             return None
+        if window.setting.gain is not None:  # (H.21) and (H.22) are stated for a B that is known
+            return None
         if not window.at.sensible or promise.predicts != (window.at.prediction is not None):
             return None
         if window.length < pad(window.at):
@@ -72,6 +74,8 @@ class Stage(Evaluation):
     """One window after another one, or the first one; `left` is what follows in it."""
 
     def __init__(self, window: Window, promise: Promise, before: Stage | None) -> None:
+        if window.setting.gain is not None:  # the filter of such a loop forgets at omega_b, not at omega
+            raise ValueError("windows are proven for a B that is known")
         self.before, self.length, self.own_level = before, window.length, window.at.level
         system = replace(window.setting.system, horizon=window.length)
         setting = replace(window.setting, system=system)

@@ -36,17 +36,18 @@ def proven(result: Result) -> Iterator[str]:
     for own in result.inputs:
         if own.verdict is Verdict.CERTIFIED:
             yield f"The input {own.input} stays within its limits, on the plan and in the loop."
-    for key, words in _CLAIMS.items():
+    for key, words in CLAIMS.items():
         section = result.sections.get(key)
         if section is not None and section.verdict is Verdict.CERTIFIED:
             yield f"{NAMES[key]}: {words}"
 
 
-_CLAIMS = {
+CLAIMS = {  # of each kind, what is certified by it
     "no_adaptation": "the feedback alone, without adaptation, keeps the state in the tube.",
     "conditions_26": "the conditions (26a), (26b) and (26c), corrected, hold at its gains.",
     "distance": "the Riemannian distance to the plan stays below its bound at its gains.",
     "sampled": "the same with adaptation in samples, at its sample time.",
+    "hardware": "the loop as its machine runs it, sampled, delayed and noisy, keeps the state in the tube.",
 }
 _DECLARED = {"h": "|h|", "h_x": "|dh/dx|", "h_t": "|dh/dt|"}
 

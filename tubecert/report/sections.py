@@ -25,6 +25,7 @@ from tubecert.report.machine import lines as machine_lines
 from tubecert.report.machine import proven as hardware_proven
 from tubecert.report.machine import section_of
 from tubecert.report.numbers import UNKNOWN, down, end, exact, percent, short, up
+from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
@@ -222,7 +223,7 @@ def excursion(result: Result) -> Iterator[str]:
         return
     for name, own, curve in zip(
         result.spec.effective.system.states,
-        zip(*knots.x, strict=True),
+        zip(*ends_of_pieces(knots).x, strict=True),
         zip(*drawn.x, strict=True),
         strict=True,
     ):
