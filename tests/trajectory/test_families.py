@@ -367,15 +367,24 @@ def test_samples_of_a_family_are_refused(document):
         examine(forged)
 
 
-def test_a_family_is_no_plan_that_a_loop_can_follow(tmp_path, monkeypatch):
+@pytest.mark.slow
+def test_a_plan_of_ones_own_is_followed_if_it_is_of_the_family(tmp_path, monkeypatch, document):
     from typer.testing import CliRunner
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "any.yaml").write_text(FAMILY)
-    done = CliRunner().invoke(app, ["simulate", "any.yaml"])
+    (tmp_path / "any.json").write_text(json.dumps(document))
+    rest = "trajectory: {kind: equilibrium, at: [0, 0], input: [0], horizon: 1}"
+    (tmp_path / "rest.yaml").write_text(FAMILY.replace(OWN, rest))
+    (tmp_path / "far.yaml").write_text(FAMILY.replace(OWN, rest.replace("input: [0]", "input: [2]")))
+    arguments = ["simulate", "any.yaml", "--certificate", "any.json", "--runs", "2", "--plan"]
+    done = CliRunner().invoke(app, [*arguments, "rest.yaml"])
+    assert done.exit_code == 0, done.output
+    assert "not falsified" in done.output
+    done = CliRunner().invoke(app, [*arguments, "far.yaml"])
     assert done.exit_code == 2
-    assert "TC708" in done.output
-    assert "--bandwidth" in done.output
+    assert "TC411" in done.output
+    assert "u* goes 1 beyond its range" in done.output
 
 
 def test_the_report_names_the_family(document):

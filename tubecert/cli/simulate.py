@@ -20,6 +20,7 @@ from tubecert.library.simulating import (
     campaign_of,
     controllers_of,
     require_extra,
+    require_members,
     simulation_numbers,
     wishes_of,
 )
@@ -50,6 +51,7 @@ class Given:
     metric: Path | None
     controllers: str | None
     gains: str | None
+    plan: Path | None
     numbers: Mapping[str, str | None]
     folder: str | None
 
@@ -68,13 +70,12 @@ def run(given: Given, output: Output) -> ExitCode:
         from tubecert.spec.metric_file import with_metric
 
         system = with_metric(system, str(given.metric))
-    wishes = wishes_of(system, numbers, chosen, given.gains)
+    wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = given.folder or f"{Path(given.spec).stem}.simulation"
-    from tubecert.simulate.certified import require_plan
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
 
-    require_plan(system)
+    require_members(system, wishes, flag)
     terminal = Terminal.stderr(color=output.color)
     wanted = not (output.no_progress or output.quiet)
     with prepared(folder), progress.shown(terminal, wanted=wanted) as report:

@@ -19,6 +19,7 @@ Examples:
   tubecert simulate plant.yaml --controllers ccm,l1,sampled --control-rate 500
   tubecert simulate plant.yaml --certificate plant.certificate.json --controller plant.controller
   tubecert simulate plant.yaml --bandwidth 20 --adaptation-rate 1e5
+  tubecert simulate family.yaml --certificate family.certificate.json --members 1000 --runs 4000
 
 \b
 Exit codes: 0 nothing was falsified (which proves nothing); 1 a promise is broken, or a loop that adapts
@@ -73,6 +74,14 @@ def simulate(
     replay: Annotated[
         str | None, number_option("--replay", "Draw this random run in place of the specification's h.")
     ] = None,
+    members: Annotated[
+        str | None,
+        number_option("--members", "Of a family: so many random plans of it share the runs.  [20]"),
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of a family: this plan (CSV or specification), if it is one."),
+    ] = None,
     duration: Annotated[
         str | None, number_option("--duration", "How long, in s.  [the horizon, else 10/rate]")
     ] = None,
@@ -114,6 +123,8 @@ def simulate(
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context
         )
+    if members is not None and plan is not None:
+        raise typer.BadParameter("a plan of your own, or random ones: --plan or --members", ctx=context)
     if controller is not None and certificate is None:
         raise typer.BadParameter("a controller is that of a certificate: --certificate FILE", ctx=context)
     with guarded(how):
@@ -131,6 +142,7 @@ def simulate(
                 metric=metric,
                 controllers=controllers,
                 gains=None if gains is None else str(gains),
+                plan=plan,
                 numbers={
                     "epsilon": epsilon,
                     "rho_a": rho_a,
@@ -142,6 +154,7 @@ def simulate(
                     "runs": runs,
                     "seed": seed,
                     "replay": replay,
+                    "members": members,
                 },
                 folder=output,
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, cast
 
@@ -15,28 +15,33 @@ from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression import suggestion
-from tubecert.findings import Finding
+from tubecert.findings import Finding, Severity
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
 from tubecert.library.asked import Named, one_of
 from tubecert.library.certification import Certification, read
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import File, Specifiable, spec_of
+from tubecert.printable import visible
 from tubecert.progress import Progress
 from tubecert.records import Json
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
+from tubecert.trajectory.make import plan_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tubecert.simulate.campaign import Campaign
     from tubecert.simulate.loops import Controller
+    from tubecert.simulate.members import Drawing
     from tubecert.simulate.runs import Runs
+    from tubecert.simulate.setting import Setting
     from tubecert.simulate.summary import Summary
 
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 RUNS: Final = 100
+MEMBERS: Final = 20  # random plans of a family
 SEED: Final = 0
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
 
@@ -145,6 +150,8 @@ def simulate(
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
     sample_time: Number | None = None,
+    members: int | None = None,
+    plan: File | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
     """Integrates the closed loops of a certificate, or of the file of one, and attacks the tube: `tubecert simulate`.
@@ -163,18 +170,19 @@ def simulate(
         runs=runs,
         seed=seed,
         replay=replay,
+        members=members,
     )
     numbers = simulation_numbers(texts, str)
     chosen = controllers_of(controllers, str)
     one_of("gains", gains, words_of(ADAPTIVE))
-    from tubecert.simulate.certified import adopted, require_plan, require_tube
+    from tubecert.simulate.certified import adopted, require_tube
 
     found = result if isinstance(result, Certification) else read(result)
     system = _specification(found) if spec is None else spec_of(spec)
-    require_plan(system)
+    wishes = wishes_of(system, numbers, chosen, gains, plan)
+    require_members(system, wishes, str)
     system = adopted(system, found.result)
     require_tube(found.result)
-    wishes = wishes_of(system, numbers, chosen, gains)
     campaign = campaign_of(system, found.result, wishes, timed(progress))
     return Simulation(campaign=campaign, compared_with=found.hash)
 
@@ -204,6 +212,8 @@ class Wishes:
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
     sample_time: Fraction | None
+    members: int | None
+    plan: str | None
 
 
 def require_extra() -> None:
@@ -229,6 +239,7 @@ class SimulationNumbers:
     runs: int | None
     seed: int | None
     replay: int | None
+    members: int | None
 
 
 def simulation_numbers(given: Mapping[str, str | None], named: Named) -> SimulationNumbers:
@@ -255,6 +266,7 @@ def simulation_numbers(given: Mapping[str, str | None], named: Named) -> Simulat
         runs=whole("runs"),
         seed=whole("seed"),
         replay=whole("replay"),
+        members=numbers.count(named("members"), given["members"]),
     )
     numbers.check()
     return found
@@ -274,7 +286,21 @@ def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str
     return words
 
 
-def wishes_of(system: Spec, numbers: SimulationNumbers, chosen: tuple[str, ...], gains: str | None) -> Wishes:
+def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
+    """Raises TC708 where a plan of a family is asked for, and there is no family."""
+    from tubecert.simulate.certified import require_family
+
+    asked = ("members", wishes.members is not None), ("plan", wishes.plan is not None)
+    require_family(system, [named(name) for name, wanted in asked if wanted])
+
+
+def wishes_of(
+    system: Spec,
+    numbers: SimulationNumbers,
+    chosen: tuple[str, ...],
+    gains: str | None,
+    plan: File | None = None,
+) -> Wishes:
     """What is simulated of a specification."""
     from tubecert.simulate.promise import KINDS
     from tubecert.spec import Simulation as Section
@@ -294,6 +320,8 @@ def wishes_of(system: Spec, numbers: SimulationNumbers, chosen: tuple[str, ...],
         bandwidth=numbers.bandwidth,
         adaptation_rate=numbers.adaptation_rate,
         sample_time=numbers.sample_time,
+        members=numbers.members,
+        plan=None if plan is None else os.fspath(plan),
     )
 
 
@@ -303,11 +331,13 @@ def _first(asked: int | None, default: int | None, otherwise: int) -> int:
 
 def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress | None) -> Campaign:
     """Every loop that is wished for, integrated and attacked."""
+    from tubecert.simulate.campaign import follow
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
-    from tubecert.simulate.setting import Choice, loop_of, setting_of
+    from tubecert.simulate.members import members_of
+    from tubecert.simulate.setting import Choice, loop_of
 
-    setting = setting_of(system, result, wishes.duration)
+    setting, drawing = _setting(system, result, wishes)
     choice = Choice(
         source=wishes.gains,
         bandwidth=wishes.bandwidth,
@@ -318,7 +348,40 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress |
     also = ("hardware",) if wishes.defaulted and setting.certified.machine else ()
     names = dict.fromkeys((*wishes.controllers, *also))
     loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in names]
+    asked = MEMBERS if wishes.members is None else wishes.members
+    each = wishes.runs if drawing is None else -(-wishes.runs // asked)
     with told(report):
-        return campaign(
-            setting, loops, count=wishes.runs, seed=wishes.seed, replay=wishes.replay, report=report
-        )
+        own = campaign(setting, loops, count=each, seed=wishes.seed, replay=wishes.replay, report=report)
+        further = asked - 1  # the first plan has an adversary of its own
+        if drawing is None or not each or not further or own.interrupted:
+            return own
+        plans = members_of(drawing, wishes.seed, asked)
+        found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
+        return replace(own, members=found, interrupted=found is None or found.plans < further)
+
+
+def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Drawing | None]:
+    """The setting; of a family that of the plan that is given, or of a random one, and what draws others."""
+    from tubecert.model import build
+    from tubecert.simulate.members import drawing_of, member
+    from tubecert.simulate.setting import horizon_of, setting_of
+
+    if system.trajectory.bundle is None:
+        return setting_of(system, result, wishes.duration), None
+    model = build(system)
+    if wishes.plan is not None:
+        own = _member(system, wishes.plan)
+        return setting_of(own, result, wishes.duration, plan_of(own, model)), None
+    drawing = drawing_of(system, model, horizon_of(system, wishes.duration))
+    return setting_of(system, result, wishes.duration, member(drawing, wishes.seed, 0)), drawing
+
+
+def _member(system: Spec, path: str) -> Spec:
+    """The specification of a plan in a file that is proven to be one of the family; raises `SpecError` if not."""
+    from tubecert.pipeline.membership import member_spec, membership
+
+    own = member_spec(path, system)
+    missed = [item for item in membership(own, system, visible(path)) if item.severity is Severity.ERROR]
+    if missed:
+        raise SpecError(missed)
+    return own

@@ -5,18 +5,22 @@ Everything is proven over the whole horizon; nothing is decided at samples.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import isfinite
+from pathlib import Path
 
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
+from tubecert.errors import SpecError
 from tubecert.expression import ZERO, Expression
 from tubecert.findings import Finding, Severity
 from tubecert.model import ControlAffineModel, build
-from tubecert.spec import Knots, Spec
+from tubecert.printable import visible
+from tubecert.spec import Knots, Spec, canonical, load, load_text
 from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import plan_of
@@ -150,3 +154,29 @@ def _kept(found: Supremum, limit: Fraction) -> bool | None:
     if isfinite(found.above) and Fraction(found.above) <= limit:
         return True
     return False if isfinite(found.below) and Fraction(found.below) > limit else None
+
+
+def member_spec(path: str, family: Spec) -> Spec:
+    """The family's system with one plan; raises `SpecError` if the file has none that fits."""
+    if Path(path).suffix.lower() == ".csv":
+        table = {"kind": "csv", "file": Path(path).name}
+        kept = ("tubecert", "name", "system", "safe_set", "uncertainty")
+        own = {key: value for key, value in canonical(family).items() if key in kept} | {"trajectory": table}
+        return load_text(json.dumps(own), str(Path(path).with_name("family")))
+    spec = load(path)
+    if _system(spec) != _system(family):
+        message = f"{visible(path)} is about another system than the family"
+        help = "states, inputs, parameters, f and B must be the same"
+        raise SpecError([Finding(code="TC604", message=message, location=spec.location("system"), help=help)])
+    if spec.trajectory.task is not None or spec.trajectory.bundle is not None:
+        message = f"{visible(path)} has no plan that could be compared"
+        help = "give a plan with its own x and u: expressions, an equilibrium or a CSV file"
+        location = spec.location("trajectory.kind")
+        raise SpecError([Finding(code="TC411", message=message, location=location, help=help)])
+    return replace(family, trajectory=spec.trajectory)
+
+
+def _system(spec: Spec) -> object:
+    """What must be the same for a plan to be compared: names, f and B."""
+    B = [[term.expression for term in row] for row in spec.B]
+    return spec.states, spec.inputs, [term.expression for term in spec.f], B

@@ -17,6 +17,7 @@ from tubecert.simulate.summary import (
     ComparisonData,
     GainsData,
     LoopData,
+    MembersData,
     RunAt,
     StoppedData,
     Summary,
@@ -127,6 +128,9 @@ def _parts(data: Summary) -> Iterator[_Part]:
         ):
             if found is not None:
                 yield _Part(loop=attack.loop, comparison=found.comparison, what=words)
+    if (members := data.members) is not None:
+        words = f"random plans, run {{run}} ({members.runs_each} along each), seed {data.seed}"
+        yield from (_Part(loop=own.loop, comparison=own.comparison, what=words) for own in members.loops)
 
 
 def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[RenderableType]]]:
@@ -146,6 +150,8 @@ def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[Renderab
     )
     if data.attacks:
         yield f"Attacks within the class, seed {data.seed}", [_class(data), _attacks(data)]
+    if data.members is not None:
+        yield "Random plans of the family", [*_members(data.members)]
     if any(part.counts for part in parts):
         yield "Largest share of every bound", [_bounds(data)]
     if inputs := _inputs(data):
@@ -244,6 +250,28 @@ def _attacks(data: Summary) -> Table:
             settled,
         )
     return table
+
+
+def _members(members: MembersData) -> Iterator[RenderableType]:
+    """What the loops did along further plans of the family."""
+    plans, asked = members.plans, members.asked
+    drawn = f"{plans} further plans" if plans == asked else f"{plans} of {asked} further plans"
+    yield Text(
+        f"{drawn}, {_runs(members.runs_each)} along each, every one with its own start and uncertainty; x* and "
+        f"u* keep to the boxes, |x*' - f - B u*| <= {short(members.largest_defect)} (in many points, not proven)"
+    )
+    table = _table("controller", "runs", "left the tube", "no result", "max d/bound", "settled")
+    for own in members.loops:
+        found = own.comparison
+        table.add_row(
+            own.loop.controller,
+            str(found.runs),
+            str(found.left_the_tube),
+            str(found.no_result + len(found.stopped)),
+            _share(found, "distance"),
+            UNKNOWN if found.settled is None else f"{short(found.settled)} s",
+        )
+    yield table
 
 
 def _bounds(data: Summary) -> Table:

@@ -17,6 +17,7 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
 | `certified`, `promise` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |
+| `members` | random plans of a family |
 | `uncertainty` | random members and adversaries of the certified class |
 | `monte_carlo`, `campaign` | many runs and the search for the worst; all that one command simulates |
 | `compare`, `clearance` | runs against promises; distances from obstacles |

@@ -5,7 +5,7 @@ Interruption keeps what is finished; `interrupted` says that something is missin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,13 +14,23 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.clearance import Clearance, of_curve, of_tube
-from tubecert.simulate.compare import Comparison, check_class, compare
+from tubecert.simulate.compare import Comparison, check_class, compare, merged
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.monte_carlo import ATTACKS, Case, Sample, attack, case, disturbance_of, monte_carlo
+from tubecert.simulate.monte_carlo import (
+    ATTACKS,
+    Case,
+    Sample,
+    along,
+    attack,
+    case,
+    disturbance_of,
+    monte_carlo,
+)
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import usual
+from tubecert.trajectory import Plan
 
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
@@ -55,8 +65,30 @@ class Attack:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Followed:
+    """What random runs along random plans of a family found against a loop: run i is along plan 1 + i // `each`."""
+
+    loop: Loop
+    comparison: Comparison
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Members:
+    """Further random plans of a family: `each` runs of every loop along each; `asked` is how many there were to be.
+
+    `defect` is the largest |x*' - f - B u*| of them that was seen.
+    """
+
+    asked: int
+    plans: int
+    each: int
+    defect: float
+    followed: tuple[Followed, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Campaign:
-    """Everything that was simulated; `uncertainty` says which h is drawn."""
+    """Everything that was simulated; `uncertainty` says which h is drawn, `members`: further plans of a family."""
 
     setting: Setting
     uncertainty: str
@@ -67,6 +99,7 @@ class Campaign:
     count: int
     seed: int
     interrupted: bool
+    members: Members | None = None
 
     @property
     def comparisons(self) -> tuple[tuple[Loop, Comparison], ...]:
@@ -78,7 +111,8 @@ class Campaign:
             for found in (item.comparison, item.worst_comparison)
             if found is not None
         ]
-        return (*drawn, *attacked)
+        followed = self.members.followed if self.members else ()
+        return (*drawn, *attacked, *((item.loop, item.comparison) for item in followed))
 
     @property
     def falsified(self) -> bool:
@@ -168,6 +202,50 @@ def simulate(
         count=count,
         seed=seed,
         interrupted=interrupted,
+    )
+
+
+def follow(
+    setting: Setting,
+    loops: Sequence[Loop],
+    plans: Iterator[tuple[Plan, float]],
+    *,
+    asked: int,
+    each: int,
+    seed: int,
+    report: Progress | None = None,
+) -> Members | None:
+    """Every loop that adapts along `asked` plans with their defects, `each` runs along each of them.
+
+    Of an interruption what is finished is kept; None if nothing is.
+    """
+    found: list[tuple[Comparison, ...]] = []
+    defects: list[float] = []
+    tested = [loop for loop in loops if loop.tested]
+    try:
+        for number, (plan, defect) in enumerate(plans, start=1):
+            if report is not None:
+                name = "random plans of the family"
+                report(Step(phase=Phase.SIMULATION, name=name, done=(number - 1) * each, of=asked * each))
+            around = setting.along(plan)
+            numbers = range(number * each, (number + 1) * each)
+            runs = [along(around, loop.along(plan), seed, numbers) for loop in tested]
+            found.append(
+                tuple(compare(around, own, loop.promise) for own, loop in zip(runs, tested, strict=True))
+            )
+            defects.append(defect)
+    except KeyboardInterrupt:
+        pass
+    if not found:
+        return None
+    return Members(
+        asked=asked,
+        plans=len(found),
+        each=each,
+        defect=max(defects),
+        followed=tuple(
+            Followed(loop=loop, comparison=merged([row[i] for row in found])) for i, loop in enumerate(tested)
+        ),
     )
 
 

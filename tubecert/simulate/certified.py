@@ -6,7 +6,7 @@ Nothing is believed that the hash does not cover; nothing is proven here either 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Final
@@ -137,15 +137,12 @@ def adopted(spec: Spec, result: Result) -> Spec:
     return replace(spec, metric=other.metric, synthesis=other.synthesis)
 
 
-def require_plan(spec: Spec) -> None:
-    """Raises TC708 for a family of plans: a loop follows one plan."""
-    if spec.trajectory.bundle is None:
+def require_family(spec: Spec, options: Sequence[str]) -> None:
+    """Raises TC708 if there is one plan only, and options say which of many is to be followed."""
+    if spec.trajectory.bundle is not None or not options:
         return
-    message = "a family of plans cannot be simulated: a loop follows one plan"
-    help = (
-        "write the specification of a plan of the family (its own trajectory and initial_state), and choose the "
-        "gains of the family's certificate: --bandwidth W --adaptation-rate G"
-    )
+    message = f"{' and '.join(options)}: this specification has one plan, not a family of them"
+    help = "leave it away, or certify a family: trajectory: {kind: any, x: {...}, u: {...}}"
     raise TubecertError(
         [Finding(code="TC708", message=message, location=spec.location("trajectory.kind"), help=help)]
     )

@@ -6,7 +6,9 @@ All numbers of a run are known up to its own error estimate, relative to rho: a 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
@@ -101,6 +103,51 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
         first_exit=_first_exit(setting, runs, sorted(lanes)),
         unresolved=tuple((lane, float(runs.unresolved[lane])) for lane in unreliable),
         inputs=used(setting.spec, runs, usable, promise.ranges if promise else ()),
+    )
+
+
+def merged(parts: Sequence[Comparison]) -> Comparison:
+    """One comparison of runs along several plans; lanes are numbered through."""
+    starts = [0, *accumulate(part.count for part in parts)]
+    shifted = [_shifted(part, start) for part, start in zip(parts, starts, strict=False)]
+    settled = [part.settled for part in parts]
+    return Comparison(
+        count=starts[-1],
+        uses={
+            name: max((part.uses[name] for part in shifted if name in part.uses), key=lambda use: use.value)
+            for name in SHOWN
+            if any(name in part.uses for part in shifted)
+        },
+        violations=tuple(item for part in shifted for item in part.violations),
+        outside=tuple(lane for part in shifted for lane in part.outside),
+        unreliable=tuple(lane for part in shifted for lane in part.unreliable),
+        error=max(part.error for part in parts),
+        settled=None if None in settled else max(t for t in settled if t is not None),
+        final=max((part.final for part in parts if part.final is not None), default=None),
+        failures=tuple(item for part in shifted for item in part.failures),
+        first_exit=min(
+            (part.first_exit for part in shifted if part.first_exit is not None),
+            key=lambda exit: exit[1],
+            default=None,
+        ),
+        unresolved=tuple(item for part in shifted for item in part.unresolved),
+        inputs=tuple(
+            reduce(InputUse.joined, same) for same in zip(*(p.inputs for p in parts if p.inputs), strict=True)
+        ),
+    )
+
+
+def _shifted(part: Comparison, start: int) -> Comparison:
+    """The comparison with its lanes counted from `start` on."""
+    return replace(
+        part,
+        uses={name: replace(use, lane=start + use.lane) for name, use in part.uses.items()},
+        violations=tuple(replace(item, lane=start + item.lane) for item in part.violations),
+        outside=tuple(start + lane for lane in part.outside),
+        unreliable=tuple(start + lane for lane in part.unreliable),
+        failures=tuple((start + lane, t, reason) for lane, t, reason in part.failures),
+        first_exit=None if part.first_exit is None else (start + part.first_exit[0], part.first_exit[1]),
+        unresolved=tuple((start + lane, t) for lane, t in part.unresolved),
     )
 
 

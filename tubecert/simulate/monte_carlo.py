@@ -102,6 +102,13 @@ def monte_carlo(
     return Sample(runs=joined(parts), cases=tuple(cases), asked=count) if parts else None
 
 
+def along(setting: Setting, loop: Loop, seed: int, numbers: Sequence[int]) -> Runs:
+    """The runs of some numbers, without what only drawings need."""
+    kind = setting.class_of(loop)
+    cases = [case(setting, kind, seed, number) for number in numbers]
+    return _slim(_run(setting, kind, with_times(loop.problem, TIMES), cases))
+
+
 def _batches(setting: Setting, kind: Class, count: int, seed: int) -> Iterator[list[Case]]:
     for first in range(0, count, BATCH):
         yield [case(setting, kind, seed, number) for number in range(first, min(first + BATCH, count))]

@@ -62,6 +62,10 @@ class Loop:
     promise: Promise | None
     caution: str = ""
 
+    def along(self, plan: Plan) -> Loop:
+        """The same around another plan."""
+        return replace(self, problem=replace(self.problem, plan=plan))
+
     @property
     def controller(self) -> Controller:
         """Its controller."""
@@ -110,6 +114,11 @@ class Setting:
             return np.asarray(self.centre + self.within * radius * direction / length)
         return np.asarray(self.x0 + self.spread * direction)
 
+    def along(self, plan: Plan) -> Setting:
+        """The same around another plan of the family that is certified; the state starts on it, or `within` of it."""
+        start = _start_of(plan)
+        return replace(self, plan=plan, x0=start, centre=start)
+
     def class_of(self, loop: Loop) -> Class:
         """What may act on a loop."""
         return self.on_machine if loop.problem.terms.measures and self.on_machine else self.uncertainty
@@ -150,23 +159,25 @@ class Setting:
         return np.array(self.certified.half_widths)
 
 
-def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> Setting:
-    """The setting of a specification and its certification, which has a tube."""
+def setting_of(
+    spec: Spec, result: Result, duration: Fraction | None = None, plan: Plan | None = None
+) -> Setting:
+    """The setting of a specification and its certification, which has a tube; `plan` is one of a family."""
     model = build(spec)
-    plan = certified_plan(spec, model, result)
-    horizon = _horizon(spec, duration)
+    single = certified_plan(spec, model, result) if plan is None else plan
+    horizon = horizon_of(spec, duration)
     certified = read_numbers(result)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
-    centre = Tape(plan.start, ()).run_floats([], ())
+    centre = _start_of(single)
     n, m = len(spec.states), len(spec.inputs)
     return Setting(
         spec=spec,
         certified=certified,
         model=model,
-        plan=plan,
+        plan=single,
         horizon=horizon,
         times=np.linspace(0.0, horizon, TIMES),
-        x0=np.array([float(value) for value in spec.x0]),
+        x0=centre if plan is not None else np.array([float(value) for value in spec.x0]),
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
@@ -258,7 +269,12 @@ def _inputs_at(model: ControlAffineModel, x: Array) -> Array:
     )
 
 
-def _horizon(spec: Spec, duration: Fraction | None) -> float:
+def _start_of(plan: Plan) -> Array:
+    """x*(0), (n,)."""
+    return Tape(plan.start, ()).run_floats([], ())
+
+
+def horizon_of(spec: Spec, duration: Fraction | None) -> float:
     """The duration asked for; else the plan's horizon; else ten time constants of the metric."""
     wanted = duration or (spec.simulation.duration if spec.simulation else None) or spec.trajectory.horizon
     if wanted is None:

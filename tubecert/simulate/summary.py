@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.records import INLINE, Json, to_json
-from tubecert.simulate.campaign import Attack, Campaign, Drawn
+from tubecert.simulate.campaign import Attack, Campaign, Drawn, Members
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
 from tubecert.simulate.inputs import InputUse
@@ -172,6 +172,25 @@ class AttackData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FollowedData:
+    """Random runs of a loop along random plans of a family."""
+
+    loop: LoopData = field(metadata=INLINE)
+    comparison: ComparisonData = field(metadata=INLINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MembersData:
+    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one."""
+
+    asked: int
+    plans: int
+    runs_each: int
+    largest_defect: float
+    loops: tuple[FollowedData, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObstaclesData:
     """How far the plan and its tube stay from every obstacle."""
 
@@ -206,6 +225,7 @@ class Summary:
     loops: tuple[DrawnData, ...]
     attacks: tuple[AttackData, ...]
     obstacles: ObstaclesData
+    members: MembersData | None = None
 
     def to_json(self) -> Json:
         """What `summary.json` holds."""
@@ -247,6 +267,21 @@ def summary(campaign: Campaign, certificate: str) -> Summary:
         obstacles=ObstaclesData(
             plan=tuple(map(_clearance, campaign.plan_clearance)),
             tube=tuple(map(_clearance, campaign.tube_clearance)),
+        ),
+        members=None if campaign.members is None else members_data(campaign.members),
+    )
+
+
+def members_data(found: Members) -> MembersData:
+    """What further plans of a family came to."""
+    return MembersData(
+        asked=found.asked,
+        plans=found.plans,
+        runs_each=found.each,
+        largest_defect=found.defect,
+        loops=tuple(
+            FollowedData(loop=_loop(item.loop), comparison=_comparison(item.comparison))
+            for item in found.followed
         ),
     )
 

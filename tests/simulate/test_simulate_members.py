@@ -1,0 +1,140 @@
+"""Random plans of a family: they are members, the certified loop keeps to all of them, and a broken promise is seen."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from proven import proven
+from typer.testing import CliRunner
+
+from tubecert.certificate.result import Certificate
+from tubecert.cli.app import app
+from tubecert.errors import TubecertError
+from tubecert.findings import Severity
+from tubecert.model import build
+from tubecert.pipeline.membership import membership
+from tubecert.records import to_json
+from tubecert.simulate import members
+from tubecert.simulate.campaign import follow
+from tubecert.simulate.certified import adopted
+from tubecert.simulate.compare import Comparison, Use, merged
+from tubecert.simulate.members import drawing_of, member, members_of
+from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.summary import members_data
+from tubecert.spec import load_text
+from tubecert.spec.types import Table
+
+FAMILY = """
+tubecert: 1
+name: any_plan
+system:
+  states: [x1, x2]
+  inputs: [u]
+  f: [-x1 + 2*x2, -0.25*x2**3 - 3*x1 + 4*x2]
+  B: [[0.5], [-2]]
+safe_set: {x1: [-6, 6], x2: [-6, 6]}
+uncertainty: {h: ["-2*sin(2*t) - 0.1*norm(x1, x2)"]}
+trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}
+initial_state: {within: 0.05}
+metric: {rate: 1.74, dual_metric: [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]}
+tube: {epsilon: 0.6, rho_a: 0.1}
+conditions: {decides: B}
+"""
+
+
+def followed(count, each, choice=None):
+    """Members that the adaptive loop follows, for 1 s, and what the setting of the first one is."""
+    result = Certificate.from_json(proven(FAMILY)).result
+    spec = adopted(load_text(FAMILY), result)
+    drawing = drawing_of(spec, build(spec), 1.0)
+    setting = setting_of(spec, result, Fraction(1), member(drawing, 3, 0))
+    loop = loop_of(setting, "l1", choice or Choice())
+    return setting, follow(setting, [loop], members_of(drawing, 3, count), asked=count - 1, each=each, seed=3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_is_drawn_is_proven_to_be_of_the_family(number):
+    """The proof is that of `check --family`, which knows nothing of how plans are drawn."""
+    spec = load_text(FAMILY)
+    plan = member(drawing_of(spec, build(spec), 2.0), 7, number)
+    table = Table(file="drawn.csv", sha256="", knots=plan.data)
+    trajectory = replace(spec.trajectory, kind="csv", bundle=None, table=table, horizon=Fraction(2))
+    (finding,) = membership(replace(spec, trajectory=trajectory), spec, "drawn")
+    assert finding.severity is Severity.NOTE, finding.message
+    x = np.array(plan.data.x, dtype=float)
+    assert np.ptp(x, axis=0).max() > 0.2  # it goes somewhere
+
+
+@pytest.mark.slow
+def test_plans_differ_and_can_be_repeated():
+    spec = load_text(FAMILY)
+    drawing = drawing_of(spec, build(spec), 1.0)
+    first, second = member(drawing, 0, 0), member(drawing, 0, 1)
+    assert first.data != second.data
+    assert member(drawing, 0, 0).data == first.data
+
+
+def test_a_family_whose_plans_cannot_be_kept_to_is_told(monkeypatch):
+    monkeypatch.setattr(members, "_STARTS", 2)
+    monkeypatch.setattr(members, "_AGAIN", 3)
+    text = FAMILY.replace("u: {u: [-1, 1]}", "u: {u: [0.9, 1]}")
+    spec = load_text(text)
+    with pytest.raises(TubecertError, match="no random plan 0 was found"):
+        member(drawing_of(spec, build(spec), 60.0), 0, 0)
+
+
+@pytest.mark.slow
+def test_the_certified_loop_keeps_to_every_plan():
+    setting, found = followed(4, 2)
+    assert (found.plans, found.each) == (3, 2)
+    (loop,) = found.followed
+    assert loop.comparison.count == 6
+    assert not loop.comparison.outside
+    assert not loop.comparison.violations
+    assert loop.comparison.uses["distance"].bound <= setting.reach
+    assert 0.005 < found.defect <= 0.01
+    data = json.loads(json.dumps(to_json(members_data(found))))
+    assert data["loops"][0]["runs"] == 6
+    assert data["largest_defect"] == found.defect
+
+
+@pytest.mark.slow
+def test_gains_that_are_too_small_leave_some_tube():
+    """What is reported of further plans is measured: a filter that is far too slow leaves the tube along them."""
+    slow = Choice(bandwidth=Fraction(1, 5), adaptation_rate=Fraction(100))
+    _, found = followed(3, 2, slow)
+    assert found.followed[0].comparison.outside
+    assert found.followed[0].comparison.first_exit is not None
+
+
+def test_runs_along_several_plans_are_numbered_through():
+    use = Use(value=0.5, bound=1.0, lane=0, time=0.1)
+    own = Comparison(
+        count=2, uses={"distance": use}, violations=(), outside=(), unreliable=(), error=0.0, settled=0.0
+    )
+    more = replace(own, uses={"distance": replace(use, value=0.7, lane=1)}, outside=(0,), first_exit=(0, 1.5))
+    found = merged([own, more, replace(more, first_exit=(1, 0.5), outside=(1,), settled=0.2)])
+    assert found.count == 6
+    assert found.outside == (2, 5)
+    assert found.first_exit == (5, 0.5)
+    assert found.uses["distance"] == Use(value=0.7, bound=1.0, lane=3, time=0.1)
+    assert found.settled == 0.2
+    assert merged([own, replace(own, settled=None)]).settled is None
+
+
+@pytest.mark.parametrize("option", ["--members", "--plan"])
+def test_one_plan_has_no_members(option, tmp_path):
+    text = FAMILY.split("trajectory:", maxsplit=1)[0] + (
+        "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}\ntube: {epsilon: 0.6, rho_a: 0.1}\n"
+        "metric: {rate: 1.74, dual_metric: [[4, -1], [-1, 4]]}\n"
+    )
+    (tmp_path / "one.yaml").write_text(text)
+    done = CliRunner().invoke(app, ["simulate", str(tmp_path / "one.yaml"), option, "3"])
+    assert done.exit_code == 2
+    assert "TC708" in done.output
+    assert "not a family" in done.output
