@@ -46,12 +46,12 @@ conditions: {decides: B}
 """
 
 
-def followed(count, each, choice=None):
-    """Members that the adaptive loop follows, for 1 s, and what the setting of the first one is."""
+def followed(count, each, choice=None, seconds=1):
+    """Members that the adaptive loop follows, and what the setting of the first one is."""
     result = Certificate.from_json(proven(FAMILY)).result
     spec = adopted(load_text(FAMILY), result)
-    drawing = drawing_of(spec, build(spec), 1.0)
-    setting = setting_of(spec, result, Fraction(1), member(drawing, 3, 0))
+    drawing = drawing_of(spec, build(spec), float(seconds))
+    setting = setting_of(spec, result, Fraction(seconds), member(drawing, 3, 0))
     loop = loop_of(setting, "l1", choice or Choice())
     return setting, follow(setting, [loop], members_of(drawing, 3, count), asked=count - 1, each=each, seed=3)
 
@@ -106,8 +106,8 @@ def test_the_certified_loop_keeps_to_every_plan():
 @pytest.mark.slow
 def test_gains_that_are_too_small_leave_some_tube():
     """What is reported of further plans is measured: a filter that is far too slow leaves the tube along them."""
-    slow = Choice(bandwidth=Fraction(1, 5), adaptation_rate=Fraction(100))
-    _, found = followed(3, 2, slow)
+    slow = Choice(bandwidth=Fraction(1, 20), adaptation_rate=Fraction(100))
+    _, found = followed(3, 6, slow, seconds=3)
     assert found.followed[0].comparison.outside
     assert found.followed[0].comparison.first_exit is not None
 
