@@ -4,6 +4,7 @@ import re
 
 import proven
 import pytest
+from systems import IN_WINDOWS, SMALL
 from typer.testing import CliRunner
 
 from tubecert.certificate.result import Certificate
@@ -13,6 +14,7 @@ from tubecert.report import console, pages
 from tubecert.report.terminal import Terminal
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS
+from tubecert.words.machine import CAUSES
 
 PLANT = """
 tubecert: 1
@@ -31,9 +33,54 @@ conditions: {decides: H}
 """
 
 
+MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
+WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
+FAMILY = "{kind: any, x: {x: [-0.2, 0.2], y: [-0.2, 0.2]}, u: {u: [-0.5, 0.5]}, defect: 0.001}"
+SCREENS = {
+    "0": (SMALL, "none"),
+    "A, B, C": (SMALL, "all"),
+    "B with wind": (SMALL + WIND, "distance"),
+    "H with wind": (SMALL + MACHINE + WIND, "hardware"),
+    "H in windows": (IN_WINDOWS, "hardware"),
+    "H with an uncertain gain": (
+        SMALL.replace("  f: [", "  parameters: {m: [0.97, 1.03]}\n  f: [")
+        .replace("[1]]", '["1/m"]]', 1)
+        .replace("0.3*sin(x)", "0.3*m*sin(x)")
+        .replace("input: [0]", "input: [0.01]")
+        + MACHINE.replace("0.0005, y: 0.001", "0.0002, y: 0.0002")
+        + WIND.replace("bound: 0.01", "bound: 0.005, rate: 1"),
+        "hardware",
+    ),
+    "half-widths": (SMALL.replace("{epsilon: 0.2, rho_a: 0.1}", "{half_widths: {x: 0.3}}"), "all"),
+    "a family": (
+        SMALL.replace("{kind: equilibrium, at: [0, 0], input: [0]}", FAMILY).replace(
+            "{at: [0.05, 0]}", "{within: 0.01}"
+        ),
+        "distance",
+    ),
+    "undecided": (SMALL + WIND, "26"),
+    "refuted": (SMALL.replace("rate: 0.8", "rate: 3"), "26"),
+}
+
+
+# nouns of the sentences, and what no page is about: names of the specification, prepositions
+WORDS = (
+    *("filter bandwidth", "adaptation rate", "half-widths", "feedback alone", "uncertainty", "dbar"),
+    *("dhat", "Metric", "over the tube", "safe set", "geodesics", "predictor", "saturation", "estimate"),
+    *("windows", "every plan of the family", "for all t >= 0", "in the long run", "supports rates up to"),
+    *("Euclidean norm over all states", "wind", "noise", "delay", "parameters", "the plan's own defect"),
+    *("sha256", "Not certified", "contraction", "certified", "refuted", "undecided"),
+)
+NAMED = ("for", "t", "x", "y", "z", "v", "it")
+
+
 @pytest.fixture(scope="module")
 def screen():
-    sealed = Certificate.from_json(proven.proven(PLANT) | {"run": {}})
+    return first_screen(PLANT)
+
+
+def first_screen(text, **options):
+    sealed = Certificate.from_json(proven.proven(text, **options) | {"run": {}})
     terminal = Terminal(stream=None, colored=False, width=100, interactive=False)
     return terminal.text(console.report(sealed, target="cart.json", verbose=False))
 
@@ -41,12 +88,20 @@ def screen():
 def labels(shown):
     """Titles of parts, heads of columns, what stands before a colon, and symbols that have a value."""
     found = [line for line in shown.splitlines() if re.fullmatch(r"[A-Z][a-z, ]+", line)]
-    found += re.split(r"\s{2,}", shown.split("Gains\n")[1].splitlines()[0].strip())
+    table = shown.partition("\nGains\n")[2].split("\n  Each")[0].splitlines()
+    found += re.split(r"\s{2,}", table[0].strip()) if table else []
+    for row in table[1:]:  # the certificate, what its gains were chosen for, the condition that is nearest
+        cells = re.split(r"\s{2,}", row.strip())
+        found += [cell.removesuffix(" *") for cell in cells[: 1 + (not row.startswith("   "))]]
+        found += re.findall(r"% (\S+)$", row)
+    found += re.findall(
+        r"([a-z0-9_]+) -?[\d.]+(?:e-?\d+)?(?=,|\n|$)", "".join(re.findall(r"margins: (.*\n)", shown))
+    )
     found += re.findall(r"^  ([a-z-]+(?: [a-z-]+){0,3}):", shown, re.MULTILINE)
-    found += [
-        name for name in re.findall(r"\b([A-Za-z_]+) (?:=|<) [-\d.]", shown) if name not in ("for", "t")
-    ]
-    return list(dict.fromkeys(word.strip() for word in found))
+    found += [name for name in re.findall(r"\b([A-Za-z_]+) (?:=|<|<=) [-\d.]", shown) if name not in NAMED]
+    return list(
+        dict.fromkeys(word.strip() for word in found if word not in ("state", "alone"))
+    )  # ends of sentences
 
 
 def test_every_label_of_the_first_screen_has_a_page(screen):
@@ -62,6 +117,27 @@ def test_every_label_of_the_first_screen_has_a_page(screen):
         "filter",
     } <= set(found)
     assert [word for word in found if pages.find(word) is None] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SCREENS)
+def test_every_label_of_every_first_screen_has_a_page(kind):
+    text, conditions = SCREENS[kind]
+    shown = first_screen(text, conditions=conditions)
+    assert len(labels(shown)) >= 5
+    assert [word for word in labels(shown) if pages.find(word) is None] == []
+    assert [word for word in WORDS if word in shown and pages.find(word) is None] == []
+
+
+def test_what_fills_a_tube_and_every_condition_has_a_page():
+    assert [
+        word for word in [*CAUSES.values(), "26a", "26b", "26c", "C1", "C2", "C3"] if not pages.find(word)
+    ] == []
+
+
+def test_words_of_the_theory_have_a_page():
+    words = ["kappa", "Lyapunov", "contraction", "matched", "geodesic", "witness", "L1", "class", "predictor"]
+    assert [word for word in words if not isinstance(pages.find(word), pages.WordPage)] == []
 
 
 def test_every_certificate_verdict_and_choice_of_gains_has_a_page():
