@@ -1,7 +1,9 @@
 """What all tests share."""
 
+import gc
 import os
 import signal
+import sys
 
 import pytest
 import shared
@@ -10,6 +12,17 @@ from hypothesis import HealthCheck, settings
 # how long an example takes is the machine's affair, and its other users'
 settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("tests")
+
+# the rewritten assertions of all files and the modules of every `tubecert` that a test starts, compiled once
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+gc.disable()  # thousands of tests are collected, and none of them is garbage
+
+
+def pytest_collection_finish():
+    """What stays until the end need not be looked through again and again."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

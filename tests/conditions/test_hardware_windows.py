@@ -8,7 +8,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from machines import alive_machine, windy
-from scipy.signal import lfilter
 
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import HardwareRecipe, WindowProof, margins_hardware
@@ -157,6 +156,8 @@ STEEPER = {
 
 def followed(problem, r: HardwareRecipe):
     """D by its differential equation, window by window: what holds of it, and its path there, in steps of STEP."""
+    from scipy.signal import lfilter  # a second
+
     found = course_of(problem, r)
     ends = [0.0, *(float(w.end) for w in problem.machine.windows)]
     t_a, push = forcing(found, r, ends)

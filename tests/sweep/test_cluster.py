@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
 
 import pytest
 from test_sweep import ONE, bytes_in
@@ -16,8 +17,13 @@ from test_sweep import ONE, bytes_in
 from tubecert.executor import Cluster, WorkerError
 from tubecert.libraries import versions
 
-pytest.importorskip("distributed")
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(280)]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.timeout(280),
+    pytest.mark.skipif(
+        find_spec("distributed") is None, reason="an extra"
+    ),  # a second to import, for all tests
+]
 OVER = ("--over", "tube.epsilon=.2:.4:6")
 
 
