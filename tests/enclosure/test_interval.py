@@ -403,6 +403,7 @@ def test_documented_library_error_is_covered():
 
 def unsafe(name, monkeypatch):
     monkeypatch.setattr(iv, name, np.asarray)
+    monkeypatch.setattr(iv, {"up": "_above", "down": "_below"}[name], float)
 
 
 @pytest.mark.parametrize("name", ["up", "down"])
@@ -435,6 +436,52 @@ def test_a_library_believed_exact_is_noticed(name, monkeypatch):
     if name == "sin":
         monkeypatch.setattr(iv, "_wave", lambda a, f, *_: Interval(f(a.lo), f(a.hi)))
     assert not all(within(exact(arb(float(at))), function(Interval.exact(at))) for at in x)
+
+
+GREATEST = np.finfo(float).max
+STRANGE = np.array(
+    [0.0, 5e-324, 2e-308, 1e-300, 1 / 3, 1.0, 3.0, 1e16, 1e200, 2.0**1023, GREATEST, np.inf, np.nan]
+)
+BOTH_SIGNS = np.concatenate([STRANGE, -STRANGE])
+
+
+def pairs_of(left, right):
+    """All pairs as columns, and as intervals of one number each: without an axis, with one, the second exact."""
+    first, second = (side.ravel() for side in np.meshgrid(left, right))
+    yield Interval(first, second), [Interval(*ends) for ends in zip(first, second, strict=True)]
+    yield Interval(first, second), [Interval([a], [b]) for a, b in zip(first, second, strict=True)]
+    yield Interval.exact(first), [Interval.exact(a) for a in first]
+
+
+def assert_same_bits(many, single):
+    with np.errstate(all="ignore"):
+        for side in ("lo", "hi"):
+            found = [getattr(each, side).item() for each in single]
+            assert np.array_equal(getattr(many, side), found, equal_nan=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ARITHMETIC)
+def test_one_number_is_computed_to_the_bit_like_many(name):
+    """Numbers take a way of their own, without arrays."""
+    operation, _ = ARITHMETIC[name]
+    rng = np.random.default_rng(0)
+    some = np.ldexp(rng.normal(size=40), rng.integers(-900, 900, 40))
+    with np.errstate(all="ignore"):
+        for many, single in pairs_of(BOTH_SIGNS[::2], np.concatenate([BOTH_SIGNS[1::2], some])):
+            for lo, hi in ((-2.0, 3.0), (1 / 3, 1 / 3), (0.0, np.inf), (-1e300, -5e-324), (np.nan, 1.0)):
+                end = Interval(lo, hi) if lo < hi else Interval.exact(lo)
+                assert_same_bits(operation(many, end), [operation(each, end) for each in single])
+                assert_same_bits(operation(end, many), [operation(end, each) for each in single])
+
+
+@pytest.mark.parametrize("n", [-2, 2, 3, 4, 5])
+def test_a_power_of_one_number_is_computed_to_the_bit_like_many(n):
+    with np.errstate(all="ignore"):
+        for many, single in pairs_of(BOTH_SIGNS, BOTH_SIGNS[::3]):
+            assert_same_bits(many**n, [each**n for each in single])
+        for step in (iv.up, iv.down):
+            assert np.array_equal(step(BOTH_SIGNS), [step(x) for x in BOTH_SIGNS], equal_nan=True)
 
 
 def test_steps_outward_reach_at_least_the_next_float():
