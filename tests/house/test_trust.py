@@ -63,18 +63,34 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 TRUSTED = [path for path in MODULES if room_of(name_of(path)) in TRUSTED_ROOMS]
 
 
+@pytest.fixture(scope="module")
+def nodes():
+    """What the rules below look at, of every module, which is read once: imports, calls and attributes."""
+    kinds = (ast.ImportFrom, ast.Import, ast.Call, ast.Attribute)
+    found = {}
+    for path in MODULES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        asked = compared(tree)
+        found[name_of(path)] = [(node, node in asked) for node in ast.walk(tree) if isinstance(node, kinds)]
+    return found
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("path", TRUSTED, ids=name_of)
-def test_what_is_trusted_imports_only_what_is_trusted(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
-        if isinstance(node, ast.ImportFrom):
-            names = [node.module or ""]
-        elif isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        for name in names:
-            if name.startswith("tubecert."):
-                assert room_of(name) in TRUSTED_ROOMS, f"line {node.lineno} imports {name}"
+def test_what_is_trusted_imports_only_what_is_trusted(nodes):
+    wrong = []
+    for module in map(name_of, TRUSTED):
+        for node, _ in nodes[module]:
+            names = []
+            if isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            wrong += [
+                f"{module}:{node.lineno} imports {name}"
+                for name in names
+                if name.startswith("tubecert.") and room_of(name) not in TRUSTED_ROOMS
+            ]
+    assert not wrong
 
 
 def compared(tree: ast.AST) -> set[ast.AST]:
@@ -91,37 +107,35 @@ def compared(tree: ast.AST) -> set[ast.AST]:
     return found
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_gains_become_certified_in_one_module_only(path):
+@pytest.mark.slow
+def test_gains_become_certified_in_one_module_only(nodes):
     """`Verdict.CERTIFIED` may be compared with anywhere; of gains it is made in the kernel alone."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    asked = compared(tree)
-    made = [
-        node.lineno
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and node.attr == "CERTIFIED" and node not in asked
+    made = {
+        module
+        for module, each in nodes.items()
+        for node, asked in each
+        if isinstance(node, ast.Attribute) and node.attr == "CERTIFIED" and not asked
         if isinstance(node.value, ast.Name) and node.value.id == "Verdict"
-    ]
-    assert not made or name_of(path) in {SAYS_CERTIFIED, *ALSO_SAY}, made
+    }
+    assert made == {SAYS_CERTIFIED, *ALSO_SAY}
+
+
+PROOFS = {  # by whom alone each is called
+    "Proof": {SAYS_CERTIFIED},
+    "MetricProof": {"metric/verify.py"},
+    "Containment": {"tube/containment.py", "bounds/compute.py", "bounds/level.py"},
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_proofs_are_made_by_the_kernel_alone(path):
+def test_proofs_are_made_by_the_kernel_alone(nodes):
     """Nobody else calls `Proof`, nor goes round its constructor."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    called = {
-        node.func.id
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    }
-    assert "Proof" not in called or name_of(path) == SAYS_CERTIFIED
-    assert "MetricProof" not in called or name_of(path) == "metric/verify.py"
-    assert "Containment" not in called or name_of(path) in {
-        "tube/containment.py",
-        "bounds/compute.py",
-        "bounds/level.py",
-    }
+    called = {name: set() for name in PROOFS}
+    for module, each in nodes.items():
+        for node, _ in each:
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in PROOFS:
+                called[node.func.id].add(module)
+    assert called == PROOFS
 
 
 _BOUND = "the safe side of a constant, which is a float by definition"
@@ -158,13 +172,13 @@ TAKES_FLOATS = {  # `Interval.exact`, by module: why the float is what is meant,
 
 
 @pytest.mark.slow
-def test_floats_are_taken_as_exact_where_they_are():
+def test_floats_are_taken_as_exact_where_they_are(nodes):
     """A float that was computed, measured or sampled says nothing of its error, and bounds nothing."""
     found = {
-        name_of(path)
-        for path in TRUSTED
-        if room_of(name_of(path)) != "recheck"
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        module
+        for module in map(name_of, TRUSTED)
+        if room_of(module) != "recheck"
+        for node, _ in nodes[module]
         if isinstance(node, ast.Attribute) and ast.unparse(node) == "Interval.exact"
     }
     assert found == set(TAKES_FLOATS)
