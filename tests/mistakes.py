@@ -661,7 +661,7 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
         "TC103",
         28,
         30,
-        "gains are found",
+        "it is called bandwidth",
     ),
     (
         "simulation:",

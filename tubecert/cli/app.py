@@ -116,6 +116,7 @@ def certify(
         typer.Option(
             help="Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
             show_default=False,
+            case_sensitive=False,
         ),
     ] = None,
     formulas: Annotated[

@@ -29,7 +29,10 @@ def proven(result: Result) -> Iterator[str]:
     if metric is not None and metric.unique_geodesics is not None and metric.unique_geodesics.holds:
         yield "Minimising geodesics in the tube are unique."
     if count := len(result.constants):
-        yield f"Each of the {count} constants below is enclosed from both sides by interval arithmetic."
+        yield (
+            f"Each of the {count} constants below is bounded from below and from above by interval arithmetic; "
+            "the proof uses the safe side."
+        )
     if result.formulas == "as-printed":
         yield "Nothing about the gains: the formulas are those that the paper prints, and several of them are wrong."
         return

@@ -141,7 +141,8 @@ def _gains(result: Result) -> list[RenderableType]:
             body.append(
                 Text(
                     "Each row was proven on its own: do not take omega from one row and Gamma from another. The row "
-                    "marked * decides the verdict. omega is in rad/s, Ts in s.",
+                    "marked * decides the verdict. omega is in rad/s, Ts in s. Gains are the least that are proven, so "
+                    "a margin of next to nothing is no sign of danger.",
                     style="dim",
                 )
             )

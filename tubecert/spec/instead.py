@@ -18,6 +18,8 @@ _SAME: Final[Mapping[str, str]] = {
     **dict.fromkeys(("u", "u0", "u_star", "ustar", "inputs", "ue", "u_eq"), "input"),
     **dict.fromkeys(("path", "filename", "csv", "data"), "file"),
     **dict.fromkeys(("Ts", "dt", "T_s", "period", "sampling_time", "step"), "sample_time"),
+    **dict.fromkeys(("omega", "w_c", "cutoff"), "bandwidth"),
+    **dict.fromkeys(("Gamma", "gamma"), "adaptation_rate"),
     **dict.fromkeys(("latency", "lag", "dead_time", "deadtime", "computation_time"), "delay"),
     **dict.fromkeys(("noise_bound", "measurement_noise", "sensor_noise"), "noise"),
     **dict.fromkeys(("r", "size"), "radius"),
