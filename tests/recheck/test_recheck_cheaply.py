@@ -17,7 +17,7 @@ from tubecert.recheck.place import Place
 from tubecert.recheck.relative import drift_difference, drift_difference_metric
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import number
+from tubecert.recheck.terms import number, replaced
 from tubecert.recheck.turning import feedback_curvature
 
 # f_x = [[y, x], [x, -y]] - diag(1, 2): for W = I, T_v = 2 [[v_y, v_x], [v_x, -v_y]], |T_v| = 2 |v|
@@ -127,3 +127,11 @@ def test_every_input_has_the_clip_of_its_own():
         except TubecertError:
             pytest.fail("it is of the form")
         assert "hardware: what is added to u*" in names
+
+
+def test_a_start_on_a_plan_with_roots_is_on_it_exactly():
+    """sqrt(1 + (c sin t)^2) is 1 at t = 0: no ball is so small that it would show it."""
+    (slant,) = terms(["0.3*sqrt(1 + (0.1*sin(t))**2)"], ["t"])
+    (start,) = replaced([slant], {"t": number(Fraction(0))})
+    assert start is number(Fraction(3, 10))
+    assert replaced([slant], {"t": number(Fraction(1))})[0] is not number(Fraction(3, 10))

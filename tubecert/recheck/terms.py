@@ -124,10 +124,8 @@ def function(op: str, *args: Term, value: int | None = None) -> Term:
 
 
 def operation(op: str, *args: Term) -> Term:
-    """An operation of the grammar on terms: `pi`, or a function; its value where the argument is the constant 0."""
-    if args and args[0] is NOUGHT and op in _AT_ZERO:
-        return number(_AT_ZERO[op])
-    return _make(op, *args)
+    """An operation of the grammar on terms: `pi`, or a function; its value where that is known exactly."""
+    return _known_value(op, args) or _make(op, *args)
 
 
 def looked_up(table: Table, x: Term) -> Term:
@@ -149,9 +147,14 @@ def remade(term: Term, args: tuple[Term, ...]) -> Term:
             return args[0].raised(int(str(term.value)))
         case "table":
             return looked_up(table_of(term), args[0])
-    if args and args[0] is NOUGHT and term.op in _AT_ZERO:
-        return number(_AT_ZERO[term.op])
-    return _make(term.op, *args, value=term.value) if args else term
+    return _known_value(term.op, args) or (_make(term.op, *args, value=term.value) if args else term)
+
+
+def _known_value(op: str, args: tuple[Term, ...]) -> Term | None:
+    """The value of a function at the constants 0 and 1, where it is a whole number."""
+    if args and args[0] is NOUGHT and op in _AT_ZERO:
+        return number(_AT_ZERO[op])
+    return UNIT if op == "sqrt" and args[0] is UNIT else None
 
 
 _AT_ZERO = {"sin": 0, "tan": 0, "asin": 0, "atan": 0, "sinh": 0, "tanh": 0, "cos": 1, "cosh": 1, "exp": 1}
