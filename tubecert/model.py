@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.independence import Dependence
@@ -327,7 +328,7 @@ def _wrong(duty: Obligation, at: dict[str, float]) -> str:
 
 def place(at: dict[str, float]) -> str:
     """A point in words."""
-    return ", ".join(f"{name} = {value:.6g}" for name, value in at.items()) or "every point"
+    return ", ".join(f"{name} = {near(value)}" for name, value in at.items()) or "every point"
 
 
 def _nonzero(e: Expression, ranges: dict[str, Range], effort: Effort) -> Decision:

@@ -26,6 +26,7 @@ ROOMS = [
     "progress",
     "expression",
     "records",
+    "digits",
     "recheck",
     "spec",
     "enclosure",

@@ -15,6 +15,7 @@ TRUSTED_ROOMS = {
     "findings",
     "claims",
     "records",
+    "digits",
     "verdict",
     "letters",
     "progress",

@@ -25,13 +25,13 @@ from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.family import Assumption
 from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
+from tubecert.digits import percent, up
 from tubecert.expression import to_text
 from tubecert.pipeline import Options, certify
 from tubecert.records import from_json
 from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
 from tubecert.report.figures_tube import Plane
-from tubecert.report.numbers import percent, up
 from tubecert.report.outline import Outline
 from tubecert.report.page_sections import page_of
 from tubecert.spec import load, load_text

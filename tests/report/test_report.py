@@ -13,10 +13,10 @@ from rich.text import Text
 
 from tubecert.certificate import seal
 from tubecert.certificate.result import Certificate, Result
+from tubecert.digits import down, end, exact, percent, short, up
 from tubecert.findings import Finding, Location, Severity
 from tubecert.records import to_json
 from tubecert.report import console, findings
-from tubecert.report.numbers import down, end, exact, percent, short, up
 from tubecert.report.terminal import Terminal
 
 RESULTS = {

@@ -10,6 +10,7 @@ from math import isfinite
 from tubecert.certificate.result import Result
 from tubecert.claims.family import Reason
 from tubecert.claims.metric import METRIC_CLAIMS, MetricFound
+from tubecert.digits import near
 from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
@@ -170,7 +171,7 @@ def _ranges(spec: Spec, expect: Expectation, found: Outcome) -> Iterator[Finding
         value = numbers.get(name)
         if value is not None and least <= Fraction(str(value)) <= most:
             continue
-        shown = "is not in the certificate" if value is None else f"is {value:g}"
+        shown = "is not in the certificate" if value is None else f"is {near(value)}"
         yield Finding(
             code=RANGE_MISMATCH,
             message=f"{name} {shown}, expected: [{number_text(least)}, {number_text(most)}]",

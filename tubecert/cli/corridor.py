@@ -13,6 +13,7 @@ from tubecert import certificate
 from tubecert.claims.advice import HardwarePart
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
+from tubecert.digits import near
 from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import number_text
 from tubecert.findings import Finding
@@ -191,7 +192,7 @@ def _radius_settings(radius: Fraction, asked: Asked) -> list[Setting]:
     own = spec.tube.epsilon + spec.tube.rho_a
     start = Fraction(0) if tube is None else tube.rho - own
     if start >= radius:
-        help = f"the start alone takes {float(start):.4g}: ask for more"
+        help = f"the start alone takes {near(start, 4)}: ask for more"
         raise refused(CORRIDOR, f"no tube has the radius {number_text(radius)}", help)
     share = (radius - start) / own
     keys = {"epsilon": spec.tube.epsilon, "rho_a": spec.tube.rho_a}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
+from tubecert.digits import near
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding
 from tubecert.library.certification import read
@@ -63,10 +64,12 @@ def drive(
 def _text(done: Driven, folder: str) -> str:
     lines = [
         f"{'not falsified' if done.fine else 'FALSIFIED'}: {folder} drove {done.runs} runs of {done.samples} samples",
-        f"  d(x*, x) reached {done.distance:.4g}; {done.level:g} is proven; {len(done.escapes)} runs reached that",
-        f"  largest difference to the reference at a sample: {done.difference:.3g} ({done.precision}; inputs up to "
-        f"{done.scale:.3g})",
-        f"  a step takes {1e6 * done.step:.2g} us here, at most {1e6 * done.worst:.3g} us (called from Python)",
+        f"  d(x*, x) reached {near(done.distance, 4)}; {near(done.level)} is proven; "
+        f"{len(done.escapes)} runs reached that",
+        f"  largest difference to the reference at a sample: {near(done.difference, 3)} "
+        f"({done.precision}; inputs up to {near(done.scale, 3)})",
+        f"  a step takes {near(1e6 * done.step, 2)} us here, at most {near(1e6 * done.worst, 3)} us "
+        "(called from Python)",
     ]
     if done.told:
         lines.append(f"  {done.told} steps said that an assumption does not hold")

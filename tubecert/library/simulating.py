@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, cast
 import numpy as np
 
 from tubecert.certificate.result import Result
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression import suggestion
@@ -132,7 +133,9 @@ class Simulation:
 
         style = "falsified" if self.falsified else ""
         reach, attacks = self.campaign.setting.reach, self.campaign.attacks
-        rows = [(item.loop.controller, f"largest d/dbar {item.greatest / reach:.4g}") for item in attacks]
+        rows = [
+            (item.loop.controller, f"largest d/dbar {near(item.greatest / reach, 4)}") for item in attacks
+        ]
         return notebook.of_line(str(self), self.campaign.setting.spec.name, style, rows)
 
 

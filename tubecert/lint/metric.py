@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, is_zero
@@ -73,7 +74,7 @@ def _at(spec: Spec, point: Array) -> str:
 def _indefinite(spec: Spec, point: Array, lowest: float) -> Finding:
     return Finding(
         code=codes.INDEFINITE,
-        message=f"W is not positive definite: its smallest eigenvalue is {lowest:.3g} at {_at(spec, point)}",
+        message=f"W is not positive definite: its smallest eigenvalue is {near(lowest, 3)} at {_at(spec, point)}",
         location=spec.location("metric.dual_metric"),
         help="give another dual metric, or shrink the safe set",
     )
@@ -111,10 +112,13 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
     k = int(np.argmin(largest))
     rate = nearest(model.rate)
     if largest[k] < rate - _ROUNDING * max(rate, abs(float(largest[k]))):
-        word = f"it supports {largest[k]:.4g} at most" if largest[k] > 0 else "it does not contract at all"
+        word = (
+            f"it supports {near(largest[k], 4)} at most" if largest[k] > 0 else "it does not contract at all"
+        )
         yield Finding(
             code=codes.NOT_CONTRACTING,
-            message=f"C2 fails at {_at(spec, points[k])}: at rate {rate:g} the metric does not contract; there {word}",
+            message=f"C2 fails at {_at(spec, points[k])}: at rate {near(rate)} the metric does not contract; "
+            f"there {word}",
             location=spec.location("metric.rate"),
             help="lower metric.rate, shrink the safe set, or give another dual metric",
         )
@@ -144,10 +148,10 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
             yield Finding(
                 code=codes.BROKEN_METRIC_BOUND if broken else codes.LOOSE_METRIC_BOUND,
                 severity=Severity.ERROR if broken else Severity.WARNING,
-                message=f"{name} is declared as {declared:g}, but an eigenvalue of M is {found:.4g} at "
+                message=f"{name} is declared as {near(declared)}, but an eigenvalue of M is {near(found, 4)} at "
                 f"{_at(spec, points[at])}"
                 if broken
-                else f"{name} is declared as {declared:g}, but about {found:.3g} would do",
+                else f"{name} is declared as {near(declared)}, but about {near(found, 3)} would do",
                 location=spec.location(f"metric.bounds.{name}"),
                 help="declare what holds, or remove metric.bounds: they are derived",
             )
@@ -174,8 +178,8 @@ def _modes(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
             yield Finding(
                 code=codes.SLOW_MODE,
                 severity=Severity.WARNING,
-                message=f"at the equilibrium, inputs do not reach a mode with eigenvalue {value.real:.4g} 1/s: "
-                f"no metric contracts at the rate {rate:g}",
+                message=f"at the equilibrium, inputs do not reach a mode with eigenvalue {near(value.real, 4)} 1/s: "
+                f"no metric contracts at the rate {near(rate)}",
                 location=spec.location("metric.rate"),
                 help="lower metric.rate, or add an input that reaches this mode",
             )

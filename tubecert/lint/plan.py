@@ -12,6 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import number_text
@@ -111,10 +112,10 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     k, i, beyond = _excess(spec, curve.x)
     scale = float(np.max(np.abs(_sides(spec))))
     if beyond > (0.0 if len(curve.t) == 1 else _ROUNDING * scale):
-        when = "" if len(curve.t) == 1 else f" at t = {curve.t[k]:.4g} s"
+        when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
         yield Finding(
             code=codes.PLAN_OUTSIDE,
-            message=f"the plan leaves the safe set{when}: {spec.states[i]} = {curve.x[k, i]:.6g}",
+            message=f"the plan leaves the safe set{when}: {spec.states[i]} = {near(curve.x[k, i])}",
             location=spec.location(curve.path),
             help=f"enlarge safe_set.{spec.states[i]}, or plan inside it",
         )
@@ -143,11 +144,11 @@ def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     k, i, beyond = _excess(spec, curve.x)
     if not math.isfinite(rho) or beyond + rho <= _ROUNDING * rho:
         return
-    when = "" if len(curve.t) == 1 else f" at t = {curve.t[k]:.4g} s"
+    when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
     yield Finding(
         code=codes.NO_ROOM,
-        message=f"the tube needs a radius of at least {rho:.4g} (epsilon + rho_a + initial offset), but{when} "
-        f"the plan is only {-beyond:.4g} from the {spec.states[i]} side of the safe set",
+        message=f"the tube needs a radius of at least {near(rho, 4)} (epsilon + rho_a + initial offset), but{when} "
+        f"the plan is only {near(-beyond, 4)} from the {spec.states[i]} side of the safe set",
         location=spec.location("tube") or spec.location("safe_set"),
         help="reduce tube.epsilon, tube.rho_a or the initial offset, or enlarge the safe set",
     )
@@ -178,7 +179,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
         yield Finding(
             code=codes.NO_EQUILIBRIUM,
             severity=Severity.WARNING if notable else Severity.NOTE,
-            message=f"the point is no equilibrium: |f + B u| = {worst:.3g} there ({', '.join(states)} would move)",
+            message=f"the point is no equilibrium: |f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)",
             location=spec.locations.get("trajectory.input") or spec.location("trajectory.at"),
             help="choose at and input with f(at) + B(at) input = 0; what is missing is paid for in the gains",
         )
@@ -186,7 +187,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
         yield Finding(
             code=codes.PLAN_DEFECT,
             severity=Severity.WARNING,
-            message=f"the plan misses x*' = f + B u* by {worst:.3g} at t = {curve.t[k]:.4g} s",
+            message=f"the plan misses x*' = f + B u* by {near(worst, 3)} at t = {near(curve.t[k], 4)} s",
             location=spec.location("trajectory.u"),
             help="correct x or u there; what is missing is paid for in the gains",
         )
@@ -209,7 +210,7 @@ def _obstacles(spec: Spec, curve: _Curve) -> Iterator[Finding]:
             yield Finding(
                 code=codes.COLLISION,
                 severity=Severity.WARNING,
-                message=f"the plan meets the obstacle at t = {hit:.4g} s",
+                message=f"the plan meets the obstacle at t = {near(hit, 4)} s",
                 location=spec.location(path),
                 help="plan around it; a certificate says nothing about obstacles",
             )

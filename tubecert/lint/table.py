@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.findings import Finding, Location, Severity
@@ -90,8 +91,8 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
         others = "" if len(apart) <= _ROWS else f"; so do {len(apart) - _ROWS} more rows"
         yield _finding(
             codes.PLAN_DEFECT,
-            f"the row at t = {points.t[k]:.4g} s does not belong: the plan misses x*' = f + B u* by "
-            f"{_beside(size, k):.3g} beside it, and by {float(np.median(size)):.3g} elsewhere{others}",
+            f"the row at t = {near(points.t[k], 4)} s does not belong: the plan misses x*' = f + B u* by "
+            f"{near(_beside(size, k), 3)} beside it, and by {near(np.median(size), 3)} elsewhere{others}",
             places[k],
             "correct the row, or leave it out",
         )
@@ -99,8 +100,8 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
         k = int(np.argmax(size))
         yield _finding(
             codes.PLAN_DEFECT,
-            f"the plan misses x*' = f + B u* by {worst:.3g} between t = {points.t[k]:.4g} s and "
-            f"t = {points.t[k + 1]:.4g} s",
+            f"the plan misses x*' = f + B u* by {near(worst, 3)} between t = {near(points.t[k], 4)} s and "
+            f"t = {near(points.t[k + 1], 4)} s",
             places[k],
             "see whether it is a plan of this system, in its units, and give more knots there; what is missing is "
             "paid for in the gains",
@@ -118,8 +119,8 @@ def _time_unit(table: Table, points: _Points, dynamics: _Dynamics, worst: float)
         return None
     return _finding(
         codes.PLAN_TIME_UNIT,
-        f"the times seem to be in {unit}: the plan misses x*' = f + B u* by {worst:.3g}, and by {other:.3g} with t "
-        f"divided by {factor:g}",
+        f"the times seem to be in {unit}: the plan misses x*' = f + B u* by {near(worst, 3)}, "
+        f"and by {near(other, 3)} with t divided by {near(factor)}",
         table.header,
         "give t in s",
     )
@@ -139,8 +140,8 @@ def _exchanged(
         return None
     return _finding(
         codes.PLAN_EXCHANGED,
-        f"the columns {one} and {another} seem to be exchanged: the plan misses x*' = f + B u* by {worst:.3g}, and by "
-        f"{other:.3g} with the two exchanged",
+        f"the columns {one} and {another} seem to be exchanged: the plan misses x*' = f + B u* by "
+        f"{near(worst, 3)}, and by {near(other, 3)} with the two exchanged",
         table.header,
         "exchange the two names in the first line",
     )

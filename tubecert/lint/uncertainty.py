@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.objective import SumOfNorms
@@ -94,7 +95,7 @@ def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None)
         yield Finding(
             code=codes.LOOSE_BOUND,
             severity=Severity.WARNING,
-            message=f"{name} is declared as {nearest(declared):g}, but on the safe set {above:.3g} suffices",
+            message=f"{name} is declared as {near(nearest(declared))}, but on the safe set {near(above, 3)} suffices",
             location=spec.location(path),
             help="declare less, or remove it: it is derived from the expression; a loose bound costs gain",
         )
@@ -102,8 +103,8 @@ def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None)
         yield Finding(
             code=codes.BROKEN_BOUND,
             severity=Severity.WARNING,
-            message=f"{name} is declared as {nearest(declared):g}, but its expression reaches {needed.below:.4g} "
-            f"in the safe set, at {place(needed.at)}",
+            message=f"{name} is declared as {near(nearest(declared))}, but its expression reaches "
+            f"{near(needed.below, 4)} in the safe set, at {place(needed.at)}",
             location=spec.location(path),
             help="declare more, unless the tube stays away from there",
         )

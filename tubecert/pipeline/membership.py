@@ -12,6 +12,7 @@ from fractions import Fraction
 from math import isfinite
 from pathlib import Path
 
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
@@ -73,14 +74,14 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
         return missed
     defect = parts[-1].words
     message = f"{name} is a plan of the family: {defect}"
-    help = f"the state must start within {float(family.within or 0):g} of where the plan starts"
+    help = f"the state must start within {near(family.within or 0)} of where the plan starts"
     return [Finding(code=NO_MEMBER, severity=Severity.NOTE, message=message, help=help)]
 
 
 def _horizon(plan: Plan, family: Spec) -> Iterator[_Part]:
     limit = family.trajectory.horizon
     if limit is not None and (plan.horizon is None or plan.horizon > limit):
-        words = f"it lasts longer than the {float(limit):g} s that the family is certified for"
+        words = f"it lasts longer than the {near(limit)} s that the family is certified for"
         yield _Part(kept=False, words=words)
 
 
@@ -113,7 +114,7 @@ def _at_knots(
 
 
 def _exactly(name: str, most: Fraction, limit: Fraction) -> _Part:
-    words = f"{name} goes {float(most - limit):.3g} beyond its range"
+    words = f"{name} goes {near(most - limit, 3)} beyond its range"
     return _Part(kept=most <= limit, words=words)
 
 
@@ -125,10 +126,10 @@ def _stays(name: str, curve: Expression, plan: Plan, limit: Fraction, effort: Ef
     fine = Effort(gap=_FINE, absolute=width, budget=effort.budget)
     found = supremum(scalar(curve, plan.fixed), plan.domain, fine)
     t = plan.moment(found.at)
-    where = "" if t is None else f" at t = {t:.4g} s"
+    where = "" if t is None else f" at t = {near(t, 4)} s"
     return _Part(
         kept=_kept(found, limit),
-        words=f"{name} goes {max(0.0, found.below - float(limit)):.3g} beyond its range{where}",
+        words=f"{name} goes {near(max(0.0, found.below - float(limit)), 3)} beyond its range{where}",
     )
 
 
@@ -143,10 +144,10 @@ def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction, effort: Effo
         if kept is not None:
             break
     t = plan.moment(found.at)
-    where = "" if t is None or kept else f" at t = {t:.4g} s"
+    where = "" if t is None or kept else f" at t = {near(t, 4)} s"
     size = found.above if kept else found.below
-    words = f"it misses x' = f + B u by {'at most' if kept else 'up to'} {size:.3g}{where}"
-    return _Part(kept=kept, words=f"{words}, {float(limit):.3g} is allowed")
+    words = f"it misses x' = f + B u by {'at most' if kept else 'up to'} {near(size, 3)}{where}"
+    return _Part(kept=kept, words=f"{words}, {near(limit, 3)} is allowed")
 
 
 def _kept(found: Supremum, limit: Fraction) -> bool | None:

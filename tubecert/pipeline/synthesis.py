@@ -43,6 +43,7 @@ from tubecert.claims.failures import (
 from tubecert.claims.family import Reason, Relax
 from tubecert.claims.metric import MetricFound
 from tubecert.claims.tube import TubeInSafeSet
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
@@ -249,7 +250,7 @@ class SynthesisRun:
             spec = self._with(metric)
         except SpecError:  # too long to be written, see `_written`
             return row
-        self._say(f"rate {float(metric.rate):.4g}: certifying")
+        self._say(f"rate {near(metric.rate, 4)}: certifying")
         options = replace(
             self.options,
             gap=max(self.options.gap, _GAP_OF_MACHINE if self._by_machine else _GAP),

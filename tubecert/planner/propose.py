@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 import tubecert
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.errors import SpecError
 from tubecert.expression import number_text
@@ -131,7 +132,7 @@ def _planned(
 
 
 def _step(number: int, cost: float) -> Step:
-    return Step(phase=Phase.PLAN, name=f"cost {cost:.4g}", count=number, unit=Unit.STEPS)
+    return Step(phase=Phase.PLAN, name=f"cost {near(cost, 4)}", count=number, unit=Unit.STEPS)
 
 
 def _problem(course: Course, dynamics: Dynamics) -> ilqr.Problem:
@@ -167,7 +168,7 @@ def _failure(spec: Spec, proposal: ilqr.Proposal) -> Finding:
         return _diverged(spec)
     return Finding(
         code="TC402",
-        message=f"the planner misses the target by {proposal.miss:.3g} at the end of the horizon",
+        message=f"the planner misses the target by {near(proposal.miss, 3)} at the end of the horizon",
         location=location,
         help="lengthen trajectory.horizon, raise trajectory.knots, or set trajectory.goal: false",
     )

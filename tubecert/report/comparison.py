@@ -17,9 +17,9 @@ from typing import Final
 
 from tubecert.certificate.effective import Tree
 from tubecert.certificate.result import Certificate, Result
+from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
 from tubecert.report.figures_comparison import comparison_figures
-from tubecert.report.numbers import UNKNOWN, down, exact, percent, up
 from tubecert.report.page import Block, Cell, Figures, Page, Section, Table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
 from tubecert.words.conditions import SECTIONS

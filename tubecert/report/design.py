@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tubecert.digits import exact, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
 from tubecert.report import sections
 from tubecert.report.console import verdict_line
 from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
-from tubecert.report.numbers import exact, percent, up
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 

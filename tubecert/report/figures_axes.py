@@ -13,7 +13,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from tubecert.report.numbers import short
+from tubecert.digits import short
 
 Point = tuple[float, float]
 WIDTH, HEIGHT = 400, 270

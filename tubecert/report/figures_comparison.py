@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from tubecert.digits import short
 from tubecert.report.figures_axes import WIDTH, Axis, blank, number, path, text
-from tubecert.report.numbers import short
 from tubecert.report.page import Figure
 from tubecert.report.quantities import Quantity
 from tubecert.verdict import Verdict

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from tubecert.certificate.result import Result
+from tubecert.digits import exact
 from tubecert.kinds import HARDWARE, SAMPLED
 from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.gains import NAMES, Gains, rows
-from tubecert.report.numbers import exact
 from tubecert.report.page import Figure
 
 STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b", "sampled": "c", "hardware": "h"}

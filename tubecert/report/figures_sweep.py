@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 from math import log, sqrt
 
+from tubecert.digits import short
 from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
 from tubecert.report.figures_gains import STYLES
-from tubecert.report.numbers import short
 from tubecert.report.page import Figure
 from tubecert.report.quantities import Quantity
 from tubecert.report.sweep import ERROR, Row, SweepTable

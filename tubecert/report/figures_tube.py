@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from tubecert.certificate.effective import ObstacleView
 from tubecert.certificate.result import Result
+from tubecert.digits import near
 from tubecert.enclosure.constant import Witness
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
 from tubecert.report.outline import Outline, domain_outline, tube_outline
@@ -229,4 +230,4 @@ def _close(
 
 
 def _pair(plane: Plane, value: Point) -> str:
-    return f"{plane.names[0]} = {value[0]:.4g}, {plane.names[1]} = {value[1]:.4g}"
+    return f"{plane.names[0]} = {near(value[0], 4)}, {plane.names[1]} = {near(value[1], 4)}"

@@ -8,9 +8,9 @@ from math import isfinite
 
 from tubecert.certificate.result import Result
 from tubecert.conditions.hardware import LEVEL
+from tubecert.digits import exact, percent
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import Pair
-from tubecert.report.numbers import exact, percent
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS
 

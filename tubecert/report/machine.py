@@ -11,9 +11,9 @@ from fractions import Fraction
 
 from tubecert.certificate.result import Result
 from tubecert.conditions.hardware import Budget
+from tubecert.digits import down, exact, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData, WindowData
-from tubecert.report.numbers import down, exact, percent, up
 from tubecert.verdict import Verdict
 from tubecert.words.machine import CAUSES
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from math import isfinite
 
 from tubecert.certificate.result import Result
+from tubecert.digits import UNKNOWN, down, up
 from tubecert.enclosure.constant import Constant
 from tubecert.report.gains import NAMES
-from tubecert.report.numbers import UNKNOWN, down, up
 from tubecert.report.page import Block, Cell, Table, Words
 from tubecert.words.conditions import SAYS, SHOWN, condition_name, equation
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
+from tubecert.digits import percent, up
 from tubecert.kinds.hardware import HardwareData
 from tubecert.report.figures_axes import Axis, Chart
 from tubecert.report.machine import (
@@ -18,7 +19,6 @@ from tubecert.report.machine import (
     section_of,
     start_share,
 )
-from tubecert.report.numbers import percent, up
 from tubecert.report.page import Block, Cell, Facts, Figure, Figures, Table
 from tubecert.verdict import Verdict
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from tubecert.certificate.effective import Effective, TableView
 from tubecert.certificate.result import Certificate, Result
+from tubecert.digits import end, exact
 from tubecert.records import to_json
 from tubecert.report.mathml import Equation, aligned
-from tubecert.report.numbers import end, exact
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
 from tubecert.report.sections import family_words, safe_set
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
+from tubecert.digits import UNKNOWN, down, end, exact, short, up
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
@@ -17,7 +18,6 @@ from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.machine import proven as proven_machine
 from tubecert.report.mathml import matrix, named
-from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import (
     Block,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
+from tubecert.digits import exact, up
 from tubecert.report.gains import NAMES
-from tubecert.report.numbers import exact, up
 from tubecert.report.sections import plan_words
 from tubecert.verdict import Verdict
 

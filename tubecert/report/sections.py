@@ -15,6 +15,7 @@ from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
 from tubecert.claims.assumptions import MachineAsGiven
 from tubecert.claims.family import Assumption, Reason
+from tubecert.digits import UNKNOWN, down, end, exact, near, percent, short, up
 from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, HARDWARE, SAMPLED
 from tubecert.kinds.alone import AloneData
@@ -24,7 +25,6 @@ from tubecert.report.layout import plain_table
 from tubecert.report.machine import lines as machine_lines
 from tubecert.report.machine import proven as hardware_proven
 from tubecert.report.machine import section_of
-from tubecert.report.numbers import UNKNOWN, down, end, exact, percent, short, up
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
@@ -231,8 +231,8 @@ def excursion(result: Result) -> Iterator[str]:
         low, high = float(min(own)), float(max(own))
         beyond = max(low - min(curve), max(curve) - high)
         if beyond > _NOTABLE * (high - low):
-            span = f"[{low:.4g}, {high:.4g}]"
-            yield f"between its knots the plan takes {name} {beyond:.3g} beyond all of them, which are in {span}"
+            span = f"[{near(low, 4)}, {near(high, 4)}]"
+            yield f"between its knots the plan takes {name} {near(beyond, 3)} beyond all of them, which are in {span}"
 
 
 def is_radius(result: Result) -> bool:

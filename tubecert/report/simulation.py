@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 from rich.table import Table
 from rich.text import Text
 
+from tubecert.digits import UNKNOWN, down, short, up
 from tubecert.report.layout import indented, titled
-from tubecert.report.numbers import UNKNOWN, down, short, up
 from tubecert.simulate.inputs import InputUse
 from tubecert.simulate.summary import (
     ClearanceData,

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Final
 from rich.text import Text
 
 from tubecert.certificate.result import Certificate
+from tubecert.digits import exact, up
 from tubecert.report.console import STYLES
 from tubecert.report.gains import deciding
 from tubecert.report.layout import plain_table
-from tubecert.report.numbers import exact, up
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Point

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tubecert.digits import up
 from tubecert.report.figures_sweep import sweep_figures
-from tubecert.report.numbers import up
 from tubecert.report.page import Block, Cell, Figures, Page, Section, Table, Words
 from tubecert.report.sweep import SweepTable, summary
 

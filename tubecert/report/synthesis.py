@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tubecert.digits import UNKNOWN, down, end, exact, short, up
 from tubecert.report.layout import indented, plain_table, titled
-from tubecert.report.numbers import UNKNOWN, down, end, exact, short, up
 from tubecert.report.sections import VERDICTS, place
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome

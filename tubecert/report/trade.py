@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 from rich.text import Text
 
 from tubecert.claims.advice import HardwarePart
+from tubecert.digits import down, exact, up
 from tubecert.records import Json
 from tubecert.report import sections
 from tubecert.report.console import verdict_line
@@ -18,7 +19,6 @@ from tubecert.report.figures_axes import Axis, Chart
 from tubecert.report.figures_file import svg_file
 from tubecert.report.gains import NAMES, rows
 from tubecert.report.layout import plain_table, titled
-from tubecert.report.numbers import down, exact, up
 from tubecert.report.page import Figure
 from tubecert.words.advice import advice
 from tubecert.words.claims import sentence

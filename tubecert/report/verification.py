@@ -13,11 +13,11 @@ from rich.text import Text
 
 from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricKilling
+from tubecert.digits import down, end, exact, up
 from tubecert.enclosure.constant import Constant
 from tubecert.printable import printable_json, visible
 from tubecert.records import to_json
 from tubecert.report.layout import indented
-from tubecert.report.numbers import down, end, exact, up
 from tubecert.report.sections import VERDICTS, place
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence

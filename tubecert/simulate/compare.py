@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
@@ -267,7 +268,7 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
         if excess[lane, step] > bound * (1 + _EXACT):
             message = (
                 f"the uncertainty leaves the class that was certified: {words[name]} is "
-                f"{excess[lane, step]:.6g} > {bound:.6g} at t = {runs.t[step]:.4g}"
+                f"{near(excess[lane, step])} > {near(bound)} at t = {near(runs.t[step], 4)}"
             )
             help = f"certify with {name if name != 'h_initial' else 'h'} declared in uncertainty.bounds"
             raise TubecertError(

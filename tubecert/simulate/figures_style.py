@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
+from tubecert.digits import near
 from tubecert.simulate.campaign import Campaign, Drawn
 from tubecert.simulate.setting import Setting
 
@@ -81,7 +82,7 @@ def labelled(setting: Setting, name: str) -> str:
 def title(campaign: Campaign) -> str:
     """What a figure is about."""
     setting = campaign.setting
-    return f"{setting.spec.name}: rho = {setting.rho:.4g}, uncertainty {campaign.uncertainty}"
+    return f"{setting.spec.name}: rho = {near(setting.rho, 4)}, uncertainty {campaign.uncertainty}"
 
 
 def finish(figure: Figure, bottom: Axes, legend: Axes, campaign: Campaign) -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.simulate.computer import Computer
@@ -61,7 +62,9 @@ def _ticks(problem: LoopProblem, period: float | None, delay: float) -> Array:
         return np.zeros(0)
     end = problem.horizon
     if end / period > MOST_STEPS:
-        raise ValueError(f"a sample time of {period:g} s needs more than {MOST_STEPS} samples in {end:g} s")
+        raise ValueError(
+            f"a sample time of {near(period)} s needs more than {MOST_STEPS} samples in {near(end)} s"
+        )
     ticks = np.arange(math.floor(end / period * (1 + 1e-12)) + 1) * period + delay
     return np.asarray(ticks[ticks <= end * (1 + 1e-12)])
 
@@ -203,7 +206,7 @@ def computer(problem: LoopProblem) -> Computer | None:
             every = round(Ts * rate)
             if every < 1 or abs(Ts * rate - every) > 1e-6 * every:
                 raise ValueError(
-                    f"the sample time {Ts:g} s must be a multiple of the control period {dt:g} s"
+                    f"the sample time {near(Ts)} s must be a multiple of the control period {near(dt)} s"
                 )
         weight, growth = g / math.expm1(g * Ts), math.exp(g * Ts)
     decay = math.exp(-gains.bandwidth * dt) if gains is not None else 1.0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression
 from tubecert.simulate.loops import DESIGNS
@@ -217,7 +218,7 @@ class _Lanes:
 
 
 def _diverged(problem: LoopProblem) -> str:
-    beyond = "" if np.isinf(problem.limit) else f": |x - x*| exceeds {problem.limit:.4g}"
+    beyond = "" if np.isinf(problem.limit) else f": |x - x*| exceeds {near(problem.limit, 4)}"
     return f"the state diverges from the plan{beyond}"
 
 

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
@@ -234,6 +235,6 @@ def _none(drawing: Drawing, number: int) -> Finding:
     return Finding(
         code="TC708",
         message=f"no random plan {number} was found that keeps x* and u* in their boxes for "
-        f"{float(drawing.horizon):g} s",
+        f"{near(drawing.horizon)} s",
         help="give a plan of your own with --plan FILE, or a shorter --duration",
     )

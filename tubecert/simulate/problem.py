@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression, free_symbols
 from tubecert.expression.matrix import Matrix
@@ -130,7 +131,7 @@ class LoopProblem:
         if not (np.isfinite(self.horizon) and self.horizon > 0):
             raise ValueError(f"horizon must be a positive time, not {self.horizon}")
         if self.plan.horizon is not None and self.horizon > float(self.plan.horizon) * (1 + 1e-12):
-            raise ValueError(f"the plan ends at {float(self.plan.horizon):g} s, before {self.horizon:g} s")
+            raise ValueError(f"the plan ends at {near(self.plan.horizon)} s, before {near(self.horizon)} s")
         if not len(self.times) or np.any(np.diff(self.times) <= 0):
             raise ValueError("times must increase")
         if self.times[0] < 0 or self.times[-1] > self.horizon * (1 + 1e-12):

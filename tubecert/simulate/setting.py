@@ -16,6 +16,7 @@ import numpy as np
 from tubecert.bounds.wind import Beside
 from tubecert.certificate.result import Result
 from tubecert.coordinates import Coordinates, Fields
+from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
@@ -281,7 +282,7 @@ def horizon_of(spec: Spec, duration: Fraction | None) -> float:
         assert spec.metric is not None
         wanted = 10 / spec.metric.rate
     if spec.trajectory.horizon is not None and wanted > spec.trajectory.horizon:
-        message = f"the plan ends at {float(spec.trajectory.horizon):g} s, before {float(wanted):g} s"
+        message = f"the plan ends at {near(spec.trajectory.horizon)} s, before {near(wanted)} s"
         raise TubecertError([Finding(code="TC704", message=message, help="ask for a shorter duration")])
     return float(wanted)
 
@@ -397,8 +398,10 @@ def _caution(setting: Setting, problem: LoopProblem) -> str:
     if growth(*own, 1 / rate) <= 1:
         return ""
     least = least_rate(*own, rate)
-    remedy = f": it needs {least:.4g} Hz" if math.isfinite(least) else ""
-    return f"the adaptation with Gamma = {gains.adaptation_rate:.4g} is unstable at {rate:g} Hz{remedy}"
+    remedy = f": it needs {near(least, 4)} Hz" if math.isfinite(least) else ""
+    return (
+        f"the adaptation with Gamma = {near(gains.adaptation_rate, 4)} is unstable at {near(rate)} Hz{remedy}"
+    )
 
 
 def _tuning(setting: Setting, controller: Controller, choice: Choice) -> _Tuning:
@@ -453,27 +456,27 @@ def _on_ticks(
         return tuning
     assert tuning.gains is not None
     held = float(every / rate)
-    shortened = f"the sample time {sample_time:.4g} s cut to {every} control periods, {held:.4g} s"
+    shortened = f"the sample time {near(sample_time, 4)} s cut to {every} control periods, {near(held, 4)} s"
     gains = replace(tuning.gains, sample_time=held)
     return replace(tuning, gains=gains, words=f"{tuning.words}, {shortened}")
 
 
 def _off_ticks(setting: Setting, chosen: Fraction, rate: Fraction) -> Finding:
     every = math.floor(chosen * rate)
-    near = " or ".join(str(count / rate) for count in (every, every + 1) if count)
+    fitting = " or ".join(str(count / rate) for count in (every, every + 1) if count)
     period = float(1 / rate)
     return Finding(
         code="TC707",
-        message=f"the sample time {float(chosen):.6g} s is no multiple of the control period {period:.6g} s",
+        message=f"the sample time {near(chosen)} s is no multiple of the control period {near(period)} s",
         location=_place_of_rate(setting, rate),
-        help=f"choose --sample-time {near}, or another control rate",
+        help=f"choose --sample-time {fitting}, or another control rate",
     )
 
 
 def _too_slow(setting: Setting, Ts: Fraction, rate: Fraction) -> Finding:
     return Finding(
         code="TC707",
-        message=f"the control period {float(1 / rate):.6g} s is longer than the sample time {float(Ts):.6g} s",
+        message=f"the control period {near(1 / rate)} s is longer than the sample time {near(Ts)} s",
         location=_place_of_rate(setting, rate),
         help=f"the control rate must be {math.ceil(1 / Ts)} Hz at least, or choose a longer --sample-time",
     )

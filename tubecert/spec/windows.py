@@ -8,6 +8,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Final
 
+from tubecert.digits import near
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
@@ -107,13 +108,13 @@ def _check_lengths(field: Field, ends: tuple[Fraction, ...], horizon: Fraction, 
     if ends[-1] != horizon or any(b <= a for a, b in pairwise(ends)):
         field.fail(
             codes.RANGE,
-            f"{field.path} does not end before the horizon of {float(horizon):.6g} s",
+            f"{field.path} does not end before the horizon of {near(horizon)} s",
             "give times between 0 and the horizon",
         )
     elif min(b - a for a, b in pairwise(ends)) < pad:
         field.fail(
             codes.RANGE,
-            f"{field.path}: a window is shorter than two samples and the delay, {float(pad):.6g} s",
+            f"{field.path}: a window is shorter than two samples and the delay, {near(pad)} s",
             "take fewer of them, or a faster computer",
         )
 

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from tubecert.claims.advice import CorrectPlan, MoreKnots, OtherInterpolation, PlanRemedy
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import fraction_bounds
 from tubecert.errors import SpecError
@@ -85,7 +86,7 @@ def refusal(spec: Spec, task: Task, knots: Knots) -> Finding | None:
         gap = sum(((a - b) ** 2 for a, b in zip(knots.x[-1], task.target, strict=True)), Fraction(0))
         return Finding(
             code="TC402",
-            message=f"the planner misses the target by {float(gap) ** 0.5:.3g} at the end of the horizon",
+            message=f"the planner misses the target by {near(float(gap) ** 0.5, 3)} at the end of the horizon",
             location=spec.location("trajectory.kind"),
             help="lengthen trajectory.horizon, raise trajectory.knots, or set trajectory.goal: false",
         )

@@ -8,5 +8,4 @@ In: `claims`. Out: English, for reports and findings. Nothing is decided by what
 | `advice` | what would help |
 | `assumptions` | what is assumed |
 | `conditions` | what the conditions of the certificates say |
-| `digits` | six digits, rounded so that what is said stays true |
 """

@@ -43,7 +43,7 @@ from tubecert.claims.advice import (
     TurnKnob,
 )
 from tubecert.claims.family import Relax
-from tubecert.words.digits import ceiling_text, floor_text
+from tubecert.digits import down, near, up
 from tubecert.words.machine import CAUSES, PARTS
 
 
@@ -89,8 +89,8 @@ def _better(item: HalveHardware) -> str:
 
 def _easier(item: EaseHardware) -> str:
     unit = " s" if item.part in ("sample_time", "delay") else ""
-    rate = f" ({float(1 / item.value):.4g} Hz)" if item.part == "sample_time" else ""
-    return f"bring {PARTS[item.part]} down to {float(item.value):.4g}{unit}{rate}, which is proven to serve"
+    rate = f" ({near(1 / item.value, 4)} Hz)" if item.part == "sample_time" else ""
+    return f"bring {PARTS[item.part]} down to {near(item.value, 4)}{unit}{rate}, which is proven to serve"
 
 
 def _filled(items: Sequence[LessenCause]) -> str:
@@ -111,7 +111,7 @@ def _turns(items: Sequence[TurnKnob]) -> str:
 
 
 def _turn(item: TurnKnob) -> str:
-    share = f"{float(100 * item.value):.3g} %"
+    share = f"{near(100 * item.value, 3)} %"
     match item.knob:
         case "start":
             whole = "start where the plan starts"
@@ -122,7 +122,7 @@ def _turn(item: TurnKnob) -> str:
             return f"{item.term} in the h of {item.input} at {share} of its size"
         case "uncertainty":
             return f"all of h at {share} of its size"
-    return f"{_KNOBS[item.knob]} {float(item.value):.4g} in place of {float(item.now):.4g}"
+    return f"{_KNOBS[item.knob]} {near(item.value, 4)} in place of {near(item.now, 4)}"
 
 
 _KNOBS: Mapping[Knob, str] = {
@@ -144,17 +144,17 @@ def _none_alone(item: NoKnobAlone) -> str:
     tried = f"nothing that was tried serves alone ({', '.join(_KNOBS[knob] for knob in item.tried)})"
     if item.uncertainty is None:
         return tried
-    tube = [] if item.epsilon is None else [f"epsilon {float(item.epsilon):.4g}"]
-    tube += [] if item.half_widths is None else [f"all half-widths at {float(100 * item.half_widths):.3g} %"]
-    share = f"all of h at {float(100 * item.uncertainty):.3g} % of its size"
+    tube = [] if item.epsilon is None else [f"epsilon {near(item.epsilon, 4)}"]
+    tube += [] if item.half_widths is None else [f"all half-widths at {near(100 * item.half_widths, 3)} %"]
+    share = f"all of h at {near(100 * item.uncertainty, 3)} % of its size"
     return f"{tried}; together these are proven to serve: {' and '.join([*tube, share])}"
 
 
 def _plan(item: MendPlan) -> str:
-    where = "" if item.t is None else f" (at t = {item.t:.4g} s)"
+    where = "" if item.t is None else f" (at t = {near(item.t, 4)} s)"
     return (
-        f"the plan misses x' = f + B u by up to {item.defect:.3g}{where}, which alone takes {100 * item.share:.2g} % "
-        f"of the tube: {_remedy(item.remedy)}"
+        f"the plan misses x' = f + B u by up to {near(item.defect, 3)}{where}, which alone takes "
+        f"{near(100 * item.share, 2)} % of the tube: {_remedy(item.remedy)}"
     )
 
 
@@ -163,7 +163,7 @@ def _remedy(item: PlanRemedy) -> str:
         case CorrectPlan():
             return "correct x or u there"
         case OtherInterpolation():
-            return f"with interpolation: {item.interpolation} it would be {item.defect:.3g}"
+            return f"with interpolation: {item.interpolation} it would be {near(item.defect, 3)}"
         case MoreKnots():
             return "give more knots, or integrate the dynamics between them"
     raise TypeError(item)
@@ -174,25 +174,25 @@ def _action(item: Relax) -> str:
 
 
 def _lower_rate(item: LowerRate) -> str:
-    return "lower the rate" if item.to is None else f"lower metric.rate to {floor_text(item.to)}"
+    return "lower the rate" if item.to is None else f"lower metric.rate to {down(item.to, 6)}"
 
 
 def _metric_bound(item: DeclareMetricBound) -> str:
     if item.side is None or item.value is None:
         return "declare metric.bounds"
-    rounded = floor_text if item.side == "lower" else ceiling_text
-    return f"declare {item.side}: {rounded(item.value)}"
+    rounded = down if item.side == "lower" else up
+    return f"declare {item.side}: {rounded(item.value, 6)}"
 
 
 def _uncertainty_bound(item: DeclareUncertaintyBound) -> str:
-    return f"declare {item.constant}: {'-' if item.value is None else ceiling_text(item.value)}"
+    return f"declare {item.constant}: {'-' if item.value is None else up(item.value, 6)}"
 
 
 def _smaller_set(item: ShrinkSafeSet) -> str:
     if item.factor is None or item.rate is None:
         return "shrink the safe set"
-    shrunk = f"the safe set shrunk to {item.factor:.3g} of its size about its centre"
-    return f"{shrunk}, where {float(item.rate):g} works"
+    shrunk = f"the safe set shrunk to {near(item.factor, 3)} of its size about its centre"
+    return f"{shrunk}, where {near(item.rate)} works"
 
 
 _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
@@ -209,11 +209,11 @@ _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
     OtherMetric: lambda item: "give another dual metric",
     DeclareMetricBound: _metric_bound,
     DeclareUncertaintyBound: _uncertainty_bound,
-    AskForRateBelow: lambda item: f"ask for a rate below {float(item.rate):.6g}",
-    AskForRateUpTo: lambda item: f"a rate up to {float(item.rate):g}, which works on this box",
+    AskForRateBelow: lambda item: f"ask for a rate below {near(item.rate)}",
+    AskForRateUpTo: lambda item: f"a rate up to {near(item.rate)}, which works on this box",
     GiveInput: lambda item: "give it an input",
     OtherVariables: lambda item: "choose other variables, or leave them to tubecert",
     LowerDegree: lambda item: "ask for a lower degree",
     HigherDegree: lambda item: f"a degree above {item.degree}, or auto",
-    RaiseConditionNumber: lambda item: f"raise condition_number to {item.to:.4g}",
+    RaiseConditionNumber: lambda item: f"raise condition_number to {near(item.to, 4)}",
 }

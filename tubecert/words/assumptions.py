@@ -20,7 +20,7 @@ from tubecert.claims.assumptions import (
     WindWithin,
 )
 from tubecert.claims.family import Assumption
-from tubecert.words.digits import ceiling_text, floor_text
+from tubecert.digits import down, near, up
 
 _FIXED: dict[type[Assumption], str] = {
     LeastFeedback: "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, "
@@ -45,9 +45,9 @@ def assumed(item: Assumption) -> str:
         case ExactGeodesics():
             return _geodesics(item)
         case SmoothProjection():
-            return f"the projection is smooth with layer {float(item.layer):g}"
+            return f"the projection is smooth with layer {near(item.layer)}"
         case UpToHorizon():
-            return f"the claim is for 0 <= t <= {float(item.horizon):g} s"
+            return f"the claim is for 0 <= t <= {near(item.horizon)} s"
         case WindWithin():
             return _wind(item)
         case MachineAsGiven():
@@ -77,8 +77,8 @@ def _machine(item: MachineAsGiven) -> str:
 
 
 def _wind(item: WindWithin) -> str:
-    size = "bounded" if item.bound is None else f"|w| <= {float(item.bound):g}"
-    rate = "" if item.rate is None else f", |dw/dt| <= {float(item.rate):g} 1/s"
+    size = "bounded" if item.bound is None else f"|w| <= {near(item.bound)}"
+    rate = "" if item.rate is None else f", |dw/dt| <= {near(item.rate)} 1/s"
     return f"a wind acts as E(x) w beside the inputs, {size}{rate}, and is otherwise arbitrary"
 
 
@@ -87,9 +87,9 @@ def _geodesics(item: ExactGeodesics) -> str:
     if item.value is None:
         return f"{exact}, and it is unique in the tube (not proven here)"
     if item.uniqueness == "proven":
-        most = ceiling_text(item.value.above)
+        most = up(item.value.above, 6)
         return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {most}"
-    size = f"reaches {floor_text(item.value.below)}"
+    size = f"reaches {down(item.value.below, 6)}"
     if item.value.below < 1:
         size = "could not be bounded by less than 1"
     return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"

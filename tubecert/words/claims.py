@@ -33,10 +33,10 @@ from tubecert.claims.metric import (
 )
 from tubecert.claims.outcomes import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
 from tubecert.claims.tube import PlanBounded, TubeInSafeSet, TubeRadius
+from tubecert.digits import down, near
 from tubecert.spec.codes import CODES
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation
-from tubecert.words.digits import floor_text
 
 _OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
 _WITHOUT_MARGIN = (
@@ -130,39 +130,39 @@ def _killing(claim: MetricKilling, reason: Reason) -> str:
     condition = "C3 (the Killing condition)"
     if claim.residual is None:
         return f"{condition} could not be proven exactly for input {claim.input}"
-    return f"{condition} fails for input {claim.input}: its residual is {claim.residual:.3g}"
+    return f"{condition} fails for input {claim.input}: its residual is {near(claim.residual, 3)}"
 
 
 def _contraction(claim: MetricContraction, reason: Reason) -> str:
     below, above = claim.largest_rate.below, claim.largest_rate.above
     if reason.verdict is Verdict.REFUTED:
-        return f"C2 fails at rate {float(claim.rate):g}: {_supported(below, above)}"
-    lies = f"the largest rate lies in [{below:.10g}, {above:.10g}]"
-    return f"{lies}, too close to the rate {float(claim.rate):g} to tell"
+        return f"C2 fails at rate {near(claim.rate)}: {_supported(below, above)}"
+    lies = f"the largest rate lies in [{near(below, 10)}, {near(above, 10)}]"
+    return f"{lies}, too close to the rate {near(claim.rate)} to tell"
 
 
 def _supported(below: float, above: float) -> str:
     if above <= 0:
         return "this metric supports no positive rate"
     if below > 0:
-        return f"the largest rate that this metric supports is {floor_text(below)}"
+        return f"the largest rate that this metric supports is {down(below, 6)}"
     return "no rate could be proven"
 
 
 def _metric_bound(claim: MetricBound, reason: Reason) -> str:
     eigenvalue = "lmin(M)" if claim.side == "lower" else "lmax(M)"
     reaches = _reached(claim.reaches)
-    return f"metric.bounds.{claim.side} is {float(claim.declared):g}, but {eigenvalue} reaches {reaches}"
+    return f"metric.bounds.{claim.side} is {near(claim.declared)}, but {eigenvalue} reaches {reaches}"
 
 
 def _uncertainty_bound(claim: UncertaintyBound, reason: Reason) -> str:
     reaches = _reached(claim.reaches)
-    declared = f"uncertainty.bounds.{claim.constant} is {claim.declared:g}"
+    declared = f"uncertainty.bounds.{claim.constant} is {near(claim.declared)}"
     return f"{declared}, but the expression reaches {reaches} on the tube"
 
 
 def _reached(value: float | None) -> str:
-    return "infinity" if value is None else f"{value:.8g}"
+    return "infinity" if value is None else near(value, 8)
 
 
 def _radius(claim: TubeRadius, reason: Reason) -> str:
@@ -173,15 +173,15 @@ def _radius(claim: TubeRadius, reason: Reason) -> str:
         case "metric_unbounded":
             return "the metric could not be bounded over the tube"
         case "not_settled":
-            return f"{rho} did not settle: it grows with the tube beyond {float(claim.radius):.6g}"
+            return f"{rho} did not settle: it grows with the tube beyond {near(claim.radius)}"
 
 
 def _in_safe_set(claim: TubeInSafeSet, reason: Reason) -> str:
     lies = "leaves" if reason.verdict is Verdict.REFUTED else "could not be proven to stay in"
-    when = "" if reason.at is None or reason.at.t is None else f", at t = {reason.at.t:.6g}"
-    excess = f", by {claim.excess:.3g}" if claim.excess > 0 else ""
+    when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
+    excess = f", by {near(claim.excess, 3)}" if claim.excess > 0 else ""
     return (
-        f"the tube of radius {float(claim.radius):.6g} {lies} the safe set through the {claim.side} bound of "
+        f"the tube of radius {near(claim.radius)} {lies} the safe set through the {claim.side} bound of "
         f"{claim.state}{when}{excess}"
     )
 
@@ -200,21 +200,21 @@ def _cleared(claim: ObstacleCleared, reason: Reason) -> str:
     low, high = claim.clearance.below, claim.clearance.above
     if reason.verdict is Verdict.REFUTED:
         return "the tube contains a point of the obstacle"
-    told = f"the tube keeps away from it by {low:.4g} at least" if low > 0 else "the tube may meet it"
-    return f"{told}; at its nearest by {high:.4g}"
+    told = f"the tube keeps away from it by {near(low, 4)} at least" if low > 0 else "the tube may meet it"
+    return f"{told}; at its nearest by {near(high, 4)}"
 
 
 def _within(claim: InputWithinLimits, reason: Reason) -> str:
-    beyond = f"{'below' if claim.side == 'lower' else 'above'} {float(claim.limit):.6g}"
+    beyond = f"{'below' if claim.side == 'lower' else 'above'} {near(claim.limit)}"
     if reason.verdict is Verdict.REFUTED:
         return f"the plan itself has {claim.input}* = {_reached(claim.plan)}, {beyond}"
     if claim.reaches is None or claim.feedback is None or claim.adaptation is None:
         return "no bound of it could be proven"
-    added = f"feedback may add {claim.feedback:.4g}"
+    added = f"feedback may add {near(claim.feedback, 4)}"
     if claim.adaptation:
-        added += f" and adaptation {claim.adaptation:.4g}"
+        added += f" and adaptation {near(claim.adaptation, 4)}"
     planned = f"{claim.input}* reaches {_reached(claim.plan)}"
-    return f"it may reach {claim.reaches:.6g}, {beyond}: {planned}, to which {added}"
+    return f"it may reach {near(claim.reaches)}, {beyond}: {planned}, to which {added}"
 
 
 # -- gains
@@ -223,9 +223,11 @@ def _within(claim: InputWithinLimits, reason: Reason) -> str:
 def _suffice(claim: GainsSuffice, reason: Reason) -> str:
     if len(claim.margins) == 1:
         (margin,) = claim.margins.values()
-        predictor = "" if claim.predictor_gain is None else f", with A_m = -{float(claim.predictor_gain):g} I"
-        return f"proven margin {margin:.2g} of dbar{predictor}"
-    margins = ", ".join(f"{condition} {margin:.2g}" for condition, margin in sorted(claim.margins.items()))
+        predictor = "" if claim.predictor_gain is None else f", with A_m = -{near(claim.predictor_gain)} I"
+        return f"proven margin {near(margin, 2)} of dbar{predictor}"
+    margins = ", ".join(
+        f"{condition} {near(margin, 2)}" for condition, margin in sorted(claim.margins.items())
+    )
     binds = "" if claim.binds is None else f"{equation(claim.binds)} sets the bandwidth; "
     said = f"{binds}proven margins: {margins}"
     if claim.below_twice_rate:
@@ -240,7 +242,7 @@ def _condition(claim: ConditionHolds, reason: Reason) -> str:
         return unbounded(claim.constant or "")
     said = SAYS[claim.condition]
     if claim.needed is not None and claim.allowed is not None:
-        return f"{said}: {claim.needed:.4g} is needed, {claim.allowed:.4g} is allowed"
+        return f"{said}: {near(claim.needed, 4)} is needed, {near(claim.allowed, 4)} is allowed"
     if claim.condition in _WITHOUT_MARGIN:
         return said
     return f"{said}: {_margin(claim)}{_predictor(claim)}"
@@ -249,7 +251,7 @@ def _condition(claim: ConditionHolds, reason: Reason) -> str:
 def _predictor(claim: ConditionHolds) -> str:
     if claim.predictor_gain is None or claim.condition not in _OF_PREDICTOR:
         return ""
-    return f" (with A_m = -{float(claim.predictor_gain):g} I)"
+    return f" (with A_m = -{near(claim.predictor_gain)} I)"
 
 
 def _margin(claim: ConditionHolds) -> str:
@@ -261,10 +263,10 @@ def _margin(claim: ConditionHolds) -> str:
     low, high = (-inf, inf) if claim.margin is None else (claim.margin.below, claim.margin.above)
     if low == -inf:
         below = "its margin could not be bounded from below"
-        return below if high == inf else f"{below}; it is {high:.3g} at most"
-    if (shown := f"{low:.3g}") == f"{high:.3g}":
+        return below if high == inf else f"{below}; it is {near(high, 3)} at most"
+    if (shown := near(low, 3)) == near(high, 3):
         return f"its margin is {shown}"
-    return f"its margin lies in [{shown}, {high:.3g}]"
+    return f"its margin lies in [{shown}, {near(high, 3)}]"
 
 
 # -- a metric that was looked for
@@ -276,10 +278,10 @@ def _found(claim: MetricFound, reason: Reason) -> str:
 
 def _mode(item: UncontrollableMode, reason: Reason) -> str:
     real, imaginary = item.mode
-    pair = f" +- {abs(imaginary):.6g}i" if abs(imaginary) > 1e-9 else ""
+    pair = f" +- {near(abs(imaginary))}i" if abs(imaginary) > 1e-9 else ""
     return (
-        f"the linearisation at an equilibrium has the uncontrollable mode {real:.6g}{pair}: no metric has a rate above "
-        f"{float(item.limit):.12g}"
+        f"the linearisation at an equilibrium has the uncontrollable mode {near(real)}{pair}: "
+        f"no metric has a rate above {near(item.limit, 12)}"
     )
 
 
@@ -303,7 +305,7 @@ def _nothing(item: NothingFound, reason: Reason) -> str:
 
 
 def _none_certified(item: NoneCertified, reason: Reason) -> str:
-    slowest, fastest = f"{float(item.slowest):g}", f"{float(item.fastest):g}"
+    slowest, fastest = near(item.slowest), near(item.fastest)
     slow = message(Reason(claim=item.slow, verdict=item.slow_verdict))
     fast = message(Reason(claim=item.fast, verdict=item.fast_verdict))
     if item.compared == 1:
@@ -330,8 +332,8 @@ def outcome(item: Outcome) -> str:
 
 
 def _above_limit(item: ConditionNumber, reason: Reason) -> str:
-    number = f"{item.condition_number:.5g}"
-    return f"the least condition number found at rate {float(item.rate):g} is {number}, above the limit"
+    number = near(item.condition_number, 5)
+    return f"the least condition number found at rate {near(item.rate)} is {number}, above the limit"
 
 
 def _as_written(item: NotProvenAsWritten, reason: Reason) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from tubecert.digits import near
 from tubecert.letters import NAMES
 from tubecert.progress import Phase, Step
 
@@ -77,5 +78,5 @@ def _now(step: Step) -> str:
     if step.count:
         words += f", {step.count:,} {step.unit}"
     if math.isfinite(step.below) and math.isfinite(step.above):
-        words += f", between {step.below:.4g} and {step.above:.4g}"
+        words += f", between {near(step.below, 4)} and {near(step.above, 4)}"
     return words

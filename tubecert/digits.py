@@ -1,7 +1,12 @@
-"""How numbers are shown: bounds from above rounded up, bounds from below rounded down, so both stay true."""
+"""Numbers as text for a reader: bounds from above rounded up, bounds from below rounded down, so both stay true.
+
+In: numbers. Out: text, which nothing reads again. Exact text, as it stands in specifications and certificates, is
+`expression.number_text` and `records.exact_json`. Trusted: yes; it decides nothing.
+"""
 
 from __future__ import annotations
 
+import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import Final
@@ -16,6 +21,13 @@ _LONG: Final = 16
 def short(value: Number | None, digits: int = 4) -> str:
     """The nearest number of `digits` significant digits."""
     return _shown(value, digits, ROUND_HALF_EVEN)
+
+
+def near(value: Number, digits: int = 6) -> str:
+    """The same in a sentence, where a number is one that is known: infinity is infinite."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return "no number" if math.isnan(value) else "infinity" if value > 0 else "-infinity"
+    return short(value, digits)
 
 
 def up(value: Number | None, digits: int = 4) -> str:
@@ -59,7 +71,7 @@ def _decimal(value: Number | Decimal) -> Decimal:
     if isinstance(value, str) and "/" in value:
         ratio = Fraction(value)
         return Decimal(ratio.numerator) / Decimal(ratio.denominator)
-    return Decimal(value if isinstance(value, str) else repr(value))
+    return Decimal(value if isinstance(value, str | int) else repr(float(value)))
 
 
 def _shown(value: Number | Decimal | None, digits: int | None, rounding: str) -> str:
