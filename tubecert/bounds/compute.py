@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from tubecert.model import TIME
 from tubecert.tube import Containment, containment
 from tubecert.verdict import Verdict
 
+T = TypeVar("T")
 Box = tuple[tuple[Fraction, Fraction], ...]
 Obstacle = Literal["out_of_range", "metric_unbounded", "not_settled"]
 _ROUNDS = 60
+OF_UNCERTAINTY = ("h", "h_x", "h_t", "h_initial")
 _CLOSE = 1 + Fraction(1, 10**4)
 _INFLATION = 1 + Fraction(1, 10**6)
 
@@ -97,40 +99,59 @@ def least_radius(
     return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle="not_settled")
 
 
+class Recall(Protocol):
+    """What is known of constants by their names, or what `compute` makes of them."""
+
+    def __call__(self, names: tuple[str, ...], compute: Callable[[], T]) -> T:
+        """It."""
+        ...
+
+
+def _computed(names: tuple[str, ...], compute: Callable[[], T]) -> T:
+    del names
+    return compute()
+
+
 def bound_constants(
     suprema: Suprema,
     start: InitialState,
     metric: tuple[Constant, Constant],
     declared: Mapping[str, Constant],
+    recall: Recall = _computed,
 ) -> BoundConstants:
     """Every constant over the tube, in its coordinates.
 
     `metric` is (a, A) over the tube; `declared` may hold h, h_x, h_t, which then take the place of derived bounds.
+    `recall` is given the names of constants that are computed together, and what computes them to their gaps.
     """
     fields = suprema.fields
-    declared, derived = uncertainty_bounds(suprema, start, declared)
-    delta_p, delta = suprema.plan_defect()
+    declared, derived = recall(OF_UNCERTAINTY, lambda: uncertainty_bounds(suprema, start, declared))
+    delta_p, delta = recall(("plan_defect", "plan_defect_metric"), suprema.plan_defect)
+
+    def one(name: str, compute: Callable[[], Constant]) -> Constant:
+        return recall((name,), compute)
+
     constants = BoundConstants(
         lower=metric[0],
         upper=metric[1],
-        f=suprema.norms("f", [fields.f]),
-        f_x=suprema.norms("f_x", [fields.f_x]),
-        B=suprema.norms("B", [fields.B]),
-        B_x=suprema.norms("B_x", fields.B_x),
-        b_x=suprema.norms("b_x", fields.b_x),
-        B_pinv=suprema.norms("B_pinv", [fields.B_pinv]),
-        B_pinv_x=suprema.norms("B_pinv_x", fields.B_pinv_x),
-        M_x=suprema.metric_slope(),
-        u_star=suprema.input_on_plan(),
+        f=one("f", lambda: suprema.norms("f", [fields.f])),
+        f_x=one("f_x", lambda: suprema.norms("f_x", [fields.f_x])),
+        B=one("B", lambda: suprema.norms("B", [fields.B])),
+        B_x=one("B_x", lambda: suprema.norms("B_x", fields.B_x)),
+        b_x=one("b_x", lambda: suprema.norms("b_x", fields.b_x)),
+        B_pinv=one("B_pinv", lambda: suprema.norms("B_pinv", [fields.B_pinv])),
+        B_pinv_x=one("B_pinv_x", lambda: suprema.norms("B_pinv_x", fields.B_pinv_x)),
+        M_x=one("M_x", suprema.metric_slope),
+        u_star=one("u_star", suprema.input_on_plan),
         **{**derived, **declared},
-        feedback_gain=suprema.feedback_gain(),
-        metric_input_gain=suprema.metric_input_gain(),
-        drift_on_plan=suprema.drift_on_plan(),
+        feedback_gain=one("feedback_gain", suprema.feedback_gain),
+        metric_input_gain=one("metric_input_gain", suprema.metric_input_gain),
+        drift_on_plan=one("drift_on_plan", suprema.drift_on_plan),
         initial_distance=start.distance(suprema, metric),
         plan_defect=delta_p,
         plan_defect_metric=delta,
-        input_gain_least=suprema.input_gain_least(),
-        contraction_excess=suprema.contraction_excess(),
+        input_gain_least=one("input_gain_least", suprema.input_gain_least),
+        contraction_excess=one("contraction_excess", suprema.contraction_excess),
     )
     # what is declared is an exact decimal already
     return replace(constants.printable(), **declared)

@@ -142,20 +142,19 @@ class HardwareSuprema(Suprema):
 
     def _tensor(self, name: str, objective: MetricTensorNorm, scale: float) -> Constant:
         """The supremum over the tube; what is negligible against `scale` is not refined further."""
-        found = self._over_tube(name, objective, self._up_to(scale))
+        found = self._over_tube(name, objective, self._up_to(name, scale))
         return _reached(objective, found, self._constant(found))
 
     def _tensor_on_plan(self, name: str, objective: MetricTensorNorm, scale: float) -> Constant:
-        found = self._search_plan(name, objective, self._up_to(scale))
+        found = self._search_plan(name, objective, self._up_to(name, scale))
         return _reached(objective, found, self._constant(found))
 
-    def _up_to(self, scale: float) -> Effort:
-        return replace(self._few, absolute=_NEGLIGIBLE * scale)
+    def _up_to(self, name: str, scale: float) -> Effort:
+        return replace(self._few(name), absolute=_NEGLIGIBLE * scale)
 
-    @property
-    def _few(self) -> Effort:
+    def _few(self, name: str) -> Effort:
         """For what enters in the second place only."""
-        return replace(self.effort, budget=min(self.effort.budget, _FEW), cheap=0)
+        return replace(self.effort_for(name), budget=min(self.effort.budget, _FEW), cheap=0)
 
     # -- plan --------------------------------------------------------------------------------------------------
 
@@ -197,7 +196,7 @@ class HardwareSuprema(Suprema):
     def _in_few(self, name: str, objective: SumOfNorms) -> Constant:
         if objective.is_zero:
             return Constant.exactly(0.0)
-        return self._constant(self._over_tube(name, objective, self._few))
+        return self._constant(self._over_tube(name, objective, self._few(name)))
 
     def _by_mean_value(self, drift: Matrix) -> Constant:
         """A bound of |drift(x* + z) - drift(x*)|: rho sup |drift_x|."""

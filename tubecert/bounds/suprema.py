@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, suprem
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
-from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms
+from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms, size_of
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
 from tubecert.expression import (
     ONE,
@@ -43,7 +43,10 @@ from tubecert.trajectory.family import starred
 from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
+_CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
+_WORTH = 30_000  # boxes after which such a constant stays as it is
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
+Spent = Callable[[str, int], None]
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,8 @@ class Suprema:
 
     With `coordinates` S, the constants are those of the fields in z = S x, and the tube is the ellipsoid |S (x - x*)|
     <= rho cut to `sides` (n,), what |x_i - x*_i| is at most; without, they are those in x and the tube is a ball.
-    `time` is the range of t for h (the horizon, or one period of h); the plan brings its own.
+    `time` is the range of t for h (the horizon, or one period of h); the plan brings its own. `gaps`: the relative gaps
+    of constants, by name, that are not enclosed to the gap of the effort. `spent` is told what work each search was.
     """
 
     model: ControlAffineModel
@@ -63,6 +67,15 @@ class Suprema:
     report: Progress | None = None
     coordinates: Coordinates | None = None
     sides: tuple[float, ...] | None = None
+    gaps: Mapping[str, float] = field(default_factory=dict)
+    spent: Spent | None = None
+
+    def effort_for(self, name: str) -> Effort:
+        """How hard to try for a constant; one with a gap of its own is as close as few boxes make it."""
+        gap, own = self.gaps.get(name), self.effort
+        if gap is None:
+            return own
+        return replace(own, gap=gap, cheap=min(own.cheap, _CHEAP), budget=min(own.budget, _WORTH))
 
     def with_radius(self, rho: Fraction, sides: Sequence[Fraction] | None = None) -> Suprema:
         """The same over another tube."""
@@ -131,7 +144,7 @@ class Suprema:
             return self._constant(self._over_tube(name, objective))
         found = self._over_tube(name, whole)
         # recheck proves it by boxes in all states: to be sharper than was asked for would cost it minutes
-        above = max(found.above, found.below * (1 + self.effort.gap))
+        above = max(found.above, found.below * (1 + self.effort_for(name).gap))
         known = set(whole.variables) <= set(found.at)  # or no point was found
         at = {**found.at, **whole.completed(found.at)} if known else {}
         return self._constant(replace(found, above=above, at=at))
@@ -222,7 +235,8 @@ class Suprema:
         found = self._over_tube("feedback_gain", exact_gain(self.model, largest), extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
-            cheap = replace(self.effort, budget=min(self.effort.budget, self.effort.cheap))
+            effort = self.effort_for("feedback_gain")
+            cheap = replace(effort, budget=min(effort.budget, self.effort.cheap))
             above = min(above, self.feedback_gain_closed_form(cheap if found.reached else None))
         return Constant(below=max(0.0, found.below), above=max(0.0, above), at=self._witness(found))
 
@@ -239,7 +253,8 @@ class Suprema:
 
         Only the formulas as printed use it, and its bound converges linearly: it is not worth many boxes.
         """
-        few = replace(self.effort, budget=min(self.effort.budget, _FEW))
+        effort = self.effort_for("input_gain_least")
+        few = replace(effort, budget=min(effort.budget, _FEW))
         found = self._over_tube("input_gain_least", LeastInputGain(self.model.B, self.model.W), few)
         root = sqrt(Interval(max(0.0, -found.above), max(0.0, -found.below)))
         return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
@@ -258,7 +273,8 @@ class Suprema:
         """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
         if self.plan.allowance is not None:
             return self._limited_defect(self.plan.allowance)
-        found = Defect.of(self.plan, self.model, self.rho, self.effort, self.coordinates)
+        effort = self.effort_for("plan_defect")
+        found = Defect.of(self.plan, self.model, self.rho, effort, self.coordinates)
         defect = replace(found, search=self._run)
         if defect.vanishes:
             return Constant.exactly(0.0), Constant.exactly(0.0)
@@ -331,10 +347,10 @@ class Suprema:
             time=time,
             extra={**self.plan.ranges, **dict(self.model.parameters), **(extra or {})},
         )
-        return self._run(name, objective, tube, effort or self.effort)
+        return self._run(name, objective, tube, effort or self.effort_for(name))
 
     def _search_plan(self, name: str, objective: Objective, effort: Effort | None = None) -> Supremum:
-        return self._run(name, objective, self.plan.domain, effort or self.effort)
+        return self._run(name, objective, self.plan.domain, effort or self.effort_for(name))
 
     def _on_plan(self, name: str, objective: SumOfNorms) -> Constant:
         return (
@@ -345,7 +361,10 @@ class Suprema:
         if self.report is not None:
             report = self.report
             effort = replace(effort, progress=lambda step: report(replace(step, name=name)))
-        return supremum(objective, domain, effort)
+        found = supremum(objective, domain, effort)
+        if self.spent is not None:
+            self.spent(name, found.boxes * size_of(objective))
+        return found
 
     def _constant(self, found: Supremum) -> Constant:
         return Constant(below=found.below, above=found.above, at=self._witness(found))

@@ -95,10 +95,14 @@ class Overrides:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What bounded the work: the relative width at which a constant is sharp enough, and boxes per claim."""
+    """What bounded the work: the relative width at which a constant is sharp enough, and boxes per claim.
+
+    `gaps`: the widths of constants that have one of their own, by name.
+    """
 
     gap: Fraction
     budget: int
+    gaps: Mapping[str, Fraction] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

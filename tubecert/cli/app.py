@@ -129,8 +129,15 @@ def certify(
         str | None, number_option("--adaptation-rate", "... with this adaptation rate.")
     ] = None,
     gap: Annotated[
-        str, number_option("--gap", "Relative width at which a constant is sharp enough.")
-    ] = "1/100",
+        str | None,
+        typer.Option(
+            "--gap",
+            metavar="NUMBER|auto",
+            help="Relative width at which a constant is sharp enough; auto: of each by its effect on the gains.  "
+            "[tube.gap, or 1/100]",
+            show_default=False,
+        ),
+    ] = None,
     budget: Budget = None,
     deadline: Deadline = None,
     output: Annotated[

@@ -54,6 +54,12 @@ class Objective(Protocol):
         ...
 
 
+def size_of(objective: Objective) -> int:
+    """About how much work a box of an objective is, against others; it decides nothing that is proven."""
+    function = getattr(objective, "_function", None)
+    return function.size if isinstance(function, MatrixFunction) else 1
+
+
 class SumOfNorms:
     """sum_k |G_k(x)| in the spectral norm (of a column: the Euclidean norm)."""
 

@@ -77,6 +77,13 @@ class MatrixFunction:
                     curvature += derivatives(first[v], w)
         self._curvature = _Table(curvature, self.variables)
 
+    @property
+    def size(self) -> int:
+        """About how much work a box is: numbers that are computed for it."""
+        entries = sum(p * q for p, q in self.shapes)
+        vertices = 1 << min(len(self._curved), MOST_VERTICES)
+        return vertices * entries * (1 + len(self._curved))
+
     @staticmethod
     def _of(points: Array, lo: Array, hi: Array, fixed: list[int]) -> Interval:
         """The points, with the whole range of the fixed variables."""

@@ -30,6 +30,7 @@ Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification
 _GAP: Final = Fraction(1, 1000)
 _USUAL: Final = Options()
+AUTO: Final = "auto"  # the gap of each constant by its effect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,7 @@ class CertificationNumbers:
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
     gap: Fraction | None
+    by_effect: bool | None
     budget: int | None
 
     def options(self, *, conditions: str | None, formulas: Formulas, metric: Path | None = None) -> Options:
@@ -52,6 +54,7 @@ class CertificationNumbers:
             bandwidth=self.bandwidth,
             adaptation_rate=self.adaptation_rate,
             gap=self.gap or _USUAL.gap,
+            by_effect=self.by_effect,
             budget=self.budget or _USUAL.budget,
             conditions=conditions,
             formulas=formulas,
@@ -67,10 +70,12 @@ def certification_numbers(given: Mapping[str, str | None], named: Named) -> Cert
     numbers = Numbers()
     radii = {name: numbers.positive(named(name), given[name]) for name in ("rho_a", "epsilon", "deadline")}
     gains = {name: numbers.gain(named(name), given[name]) for name in ("bandwidth", "adaptation_rate")}
-    gap = numbers.positive(named("gap"), given["gap"], below=1)
+    text = given["gap"]
+    gap = None if text == AUTO else numbers.positive(named("gap"), text, below=1)
     budget = numbers.count(named("budget"), given["budget"])
     numbers.check()
-    return CertificationNumbers(**radii, **gains, gap=gap, budget=budget)
+    by_effect = None if text is None else text == AUTO
+    return CertificationNumbers(**radii, **gains, gap=gap, by_effect=by_effect, budget=budget)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

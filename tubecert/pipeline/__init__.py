@@ -7,6 +7,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | stage after stage, with what planners and searches propose |
 | `counting` | how many claims of how many are done |
+| `gaps` | how closely each constant is enclosed, where its effect decides |
 | `reasons` | why a verdict about gains is what it is |
 | `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |

@@ -27,6 +27,7 @@ from tubecert.kernel import overall
 from tubecert.kinds import HARDWARE, RATES
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import NOTABLE, defect_share, plan, tube
+from tubecert.pipeline.gaps import enclosed as closely
 from tubecert.pipeline.levers import (
     Lever,
     each_term_less,
@@ -41,7 +42,7 @@ from tubecert.pipeline.levers import (
 from tubecert.progress import Phase, Progress, Step
 from tubecert.search.proposers import PROPOSERS, Proposer
 from tubecert.spec import Spec
-from tubecert.stages.bounded import Bounded, Enclosed, bound, enclose
+from tubecert.stages.bounded import Bounded, Enclosed, bound
 from tubecert.stages.judged import Judged, deciding
 from tubecert.stages.memory import Memory
 from tubecert.stages.metric import ProvenMetric, prove_metric
@@ -265,7 +266,7 @@ class _Search:
 
     def _certifies(self, lever: Lever, value: Fraction) -> bool:
         """Whether the specification with this value is certified by what decides, as it would be if it were asked."""
-        sharper = replace(self.options, gap=value) if lever.knob == "gap" else self.options
+        sharper = replace(self.options, gap=value, by_effect=False) if lever.knob == "gap" else self.options
         end = self._end(lever.turned(value), sharper, plan)
         return isinstance(end, Judged) and end.verdict is Verdict.CERTIFIED
 
@@ -294,7 +295,7 @@ class _Search:
             return None
         if found is None or isinstance(found, Stopped):
             return found
-        bounded = bound(enclose(found))
+        bounded = bound(closely(found))
         if isinstance(bounded, Stopped):
             return bounded
         return self._judged(bounded)

@@ -18,6 +18,7 @@ from tubecert.conditions.proposal import Asked
 from tubecert.kinds import RATES
 from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.counting import tell_gains
+from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.pipeline.rounding import rounded
 from tubecert.pipeline.windows import windowed
@@ -26,7 +27,7 @@ from tubecert.search.coordinates import Wish, propose
 from tubecert.search.machines import PARTS
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
-from tubecert.stages.bounded import Bounded, bound, enclose
+from tubecert.stages.bounded import Bounded, bound
 from tubecert.stages.judged import Judged, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
@@ -44,7 +45,7 @@ def answer(question: Question) -> Stage | Stopped:
         prove_metric,
         plan,
         tube,
-        enclose,
+        enclosed,
         bound,
         windowed,
         judge,

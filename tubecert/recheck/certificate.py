@@ -231,8 +231,9 @@ def read_result(node: Node) -> Result:
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
     spec["file_hash"].text()
-    effort = own["effort"].closed("gap", "budget")
+    effort = own["effort"].closed("gap", "budget", optional=("gaps",))
     effort["gap"].decimal()
+    effort.get("gaps", lambda node: [gap.decimal() for _, gap in node.items()])
     effort["budget"].count()
     specification = read_specification(spec["effective"])
     states = specification.plant.states

@@ -108,7 +108,8 @@ def _version(node: Node) -> None:
 
 def _tube(node: Node, plant: Plant) -> Members:
     """Radii in x, radii in coordinates that the certificate states, or half-widths, which have such coordinates."""
-    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths", WINDOWS))
+    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths", "gap", WINDOWS))
+    own.get("gap", lambda item: item.word("auto"))
     own.get("coordinates", lambda item: item.word("auto"))
     if WINDOWS in own and ("coordinates" in own or "half_widths" in own):
         raise own[WINDOWS].refused("is there beside coordinates of the tube")

@@ -253,11 +253,13 @@ def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRec
         "split": recipe_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r)),
     }
     roles = {role: recipe for role, recipe in found.items() if recipe is not None}
-    whole = Proposal(beside=roles, curve=_curve(problem, low) if np.isfinite(low) else ())
+    curve = _curve(problem, low) if asked.curve and np.isfinite(low) else ()
+    whole = Proposal(beside=roles, curve=curve)
     if asked.bandwidth is None and asked.adaptation_rate is None:
         role = next(iter(roles), "")
         decisive = roles.pop(role, None)
-        return replace(whole, decisive=decisive, role=role, around=_around(problem, decisive))
+        around = _around(problem, decisive) if asked.curve else ()
+        return replace(whole, decisive=decisive, role=role, around=around)
     decisive = _asked(problem, asked)
     if decisive is not None:
         return replace(whole, decisive=decisive, role="asked", around=_around(problem, decisive))

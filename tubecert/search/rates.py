@@ -161,9 +161,9 @@ def propose_rates(problem: TubeProblem, asked: Asked) -> RateProposal[RateRecipe
         role="pair",
         hopeless=hopeless,
         beside={} if least is None else {"least_adaptation": least},
-        companion=None if recipe is None else _companion(problem, recipe),
-        curve=curve(s, found[0].low) if found else (),
-        around=() if recipe is None else _around(recipe),
+        companion=_companion(problem, recipe) if recipe is not None and asked.curve else None,
+        curve=curve(s, found[0].low) if found and asked.curve else (),
+        around=_around(recipe) if recipe is not None and asked.curve else (),
         infimum=float(whole[0].low) if whole else None,
         binds=found[0].binds if found else None,
     )

@@ -136,6 +136,8 @@ def propose_sampled(problem: TubeProblem, asked: Asked) -> SampledProposal[Sampl
         recipe = _longest(problem, n, asked.bandwidth)
     if recipe is not None:
         g = recipe.predictor_gain
+        if not asked.curve:
+            return SampledProposal(decisive=recipe, role="pair")
         most = limit(n, float(g))
         return SampledProposal(
             decisive=recipe,

@@ -182,6 +182,8 @@ def _tube(tube: Tube) -> dict[str, Any]:
         data["coordinates"] = "auto"
     if tube.half_widths:
         data["half_widths"] = _given(**dict(tube.half_widths))
+    if tube.gap is not None:
+        data["gap"] = tube.gap
     if tube.windows is not None:
         own = tube.windows
         data["windows"] = str(own) if isinstance(own, int) else [number_text(t) for t in own]

@@ -38,7 +38,7 @@ def read_name(field: Field) -> str | None:
 
 def read_tube(field: Field | None, names: Names) -> Tube | None:
     """The two radii or the half-widths, as far as they are given, and the coordinates they are measured in."""
-    keys = ("epsilon", "rho_a", "coordinates", "half_widths", "windows")
+    keys = ("epsilon", "rho_a", "coordinates", "half_widths", "windows", "gap")
     entries = field.mapping(optional=keys, reserved=("weights",)) if field else {}
     if entries is None:
         return None
@@ -47,7 +47,11 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
     }
     widths = _read_half_widths(entries.get("half_widths"), names)
     chosen = entries["coordinates"].word(("identity", "auto")) if "coordinates" in entries else None
+    refined = entries.get("gap")
+    gap = None if refined is None else refined.word(("auto",))
     if None in radii.values() or widths is None or (chosen is None and "coordinates" in entries):
+        return None
+    if gap is None and refined is not None:
         return None
     if widths and "epsilon" in entries:
         entries["epsilon"].fail(
@@ -66,6 +70,7 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
         rho_a=radii.get("rho_a"),
         coordinates="auto" if chosen == "auto" else "identity" if chosen == "identity" else None,
         half_widths=widths,
+        gap=None if gap is None else "auto",
     )
     return with_windows(found, entries, names)
 

@@ -171,7 +171,8 @@ class Tube:
     """The tube's two radii, or half-widths (name, w) of some states; the radii may come from the command line instead.
 
     `coordinates` None: what was not said, `identity` unless there are half-widths. `windows`: how many of equal length
-    the plan is cut into, or the times between them in s; None for one.
+    the plan is cut into, or the times between them in s; None for one. `gap`: how closely the constants over the tube
+    are enclosed; auto: each by its effect on the gains, None: as the command says.
     """
 
     epsilon: Fraction | None = None
@@ -179,6 +180,7 @@ class Tube:
     coordinates: Literal["identity", "auto"] | None = None
     half_widths: tuple[tuple[str, Fraction], ...] = ()
     windows: int | tuple[Fraction, ...] | None = None
+    gap: Literal["auto"] | None = None
 
     @property
     def auto(self) -> bool:

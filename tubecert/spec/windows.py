@@ -101,7 +101,7 @@ def check_windows(
         _check_lengths(at, ends_of(tube.windows or 1, plan.horizon), plan.horizon, pad_of(machine))
 
 
-_ANY: Final = ("epsilon", "rho_a", "coordinates", "half_widths", KEY)
+_ANY: Final = ("epsilon", "rho_a", "coordinates", "half_widths", "gap", KEY)
 
 
 def _check_lengths(field: Field, ends: tuple[Fraction, ...], horizon: Fraction, pad: Fraction) -> None:

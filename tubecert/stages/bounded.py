@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from math import isfinite
+from typing import TypeVar
 
 from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
 from tubecert.bounds.compute import bound_constants
@@ -29,6 +32,7 @@ from tubecert.expression import number_text
 from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
+from tubecert.records import Json
 from tubecert.spec import Obstacle
 from tubecert.spec.types import Hardware
 from tubecert.stages.machine import machine_of
@@ -38,16 +42,23 @@ from tubecert.stages.tube import TubeFound
 from tubecert.tube import Tube
 from tubecert.verdict import Verdict
 
+T = TypeVar("T")
 _SHARP = 1e-4  # of the width of its limits: how closely u* is enclosed at least
 
 
 @dataclass(frozen=True, kw_only=True)
 class Enclosed:
-    """The constants over the tube; some may have no finite bound, and declared ones may be broken."""
+    """The constants over the tube; some may have no finite bound, and declared ones may be broken.
+
+    `gaps`: the relative gaps, by name, of constants that were not enclosed to the gap of the question; `work`: about
+    how much each of them took, against the others.
+    """
 
     tube: TubeFound
     suprema: Suprema
     problem: TubeProblem
+    gaps: Mapping[str, Fraction] = field(default_factory=dict)
+    work: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def question(self) -> Question:
@@ -58,6 +69,14 @@ class Enclosed:
     def constants(self) -> BoundConstants:
         """Every constant, by name."""
         return self.problem.constants
+
+    @cached_property
+    def ground(self) -> dict[str, Json]:
+        """Everything that the constants follow from, as data."""
+        own: dict[str, Json] = dict(self.tube.ground)
+        return (
+            own | {"gaps": {name: number_text(gap) for name, gap in self.gaps.items()}} if self.gaps else own
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,18 +127,42 @@ class Bounded:
         return replace(self.enclosed.problem, machine=self.machine)
 
 
-def enclose(tube: TubeFound) -> Enclosed:
-    """Every constant over the tube."""
-    question = tube.question
-    fresh = replace(question.suprema(tube.plan), coordinates=tube.coordinates)
+def enclose(tube: TubeFound, gaps: Mapping[str, Fraction] | None = None) -> Enclosed:
+    """Every constant over the tube; with `gaps`, those that are named to gaps of their own."""
+    question, own = tube.question, dict(gaps or {})
+    work: Counter[str] = Counter()
+    now: Counter[str] = Counter()
+    fresh = replace(
+        question.suprema(tube.plan),
+        coordinates=tube.coordinates,
+        gaps={name: float(gap) for name, gap in own.items()},
+        spent=(lambda name, boxes: now.update({name: boxes})) if own else None,
+    )
     suprema = fresh.with_radius(tube.rho, tube.sides)
     declared = declared_in(tube.coordinates, question.declared_uncertainty)
-    constants = question.memory.recall(
-        "constants",
-        tube.ground,
-        lambda: bound_constants(suprema, question.start, (tube.lower, tube.upper), declared),
-    )
-    return Enclosed(tube=tube, suprema=suprema, problem=_problem(tube, suprema, constants))
+    metric = tube.lower, tube.upper
+
+    def apart(names: tuple[str, ...], compute: Callable[[], T]) -> T:
+        """What is known of constants to the same gaps, whatever those of others are."""
+        closely = {name: number_text(own[name]) for name in names if name in own}
+        on = tube.ground | {"constants": list(names), "closely": closely}
+
+        def counted() -> tuple[T, Counter[str]]:
+            now.clear()
+            return compute(), Counter(now)
+
+        found, boxes = question.memory.recall("constant", on, counted)
+        work.update(boxes)
+        return found
+
+    if own:
+        constants = bound_constants(suprema, question.start, metric, declared, apart)
+    else:
+        constants = question.memory.recall(
+            "constants", tube.ground, lambda: bound_constants(suprema, question.start, metric, declared)
+        )
+    problem = _problem(tube, suprema, constants)
+    return Enclosed(tube=tube, suprema=replace(suprema, spent=None), problem=problem, gaps=own, work=work)
 
 
 def declared_in(coordinates: Coordinates | None, declared: Mapping[str, Constant]) -> Mapping[str, Constant]:
@@ -169,7 +212,7 @@ def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
     noise = asked.noise if isinstance(asked.noise, tuple) else ()
     machine = question.memory.recall(
         "machine",
-        enclosed.tube.ground | {"noise": [*map(number_text, noise)], "held": asked.held},
+        enclosed.ground | {"noise": [*map(number_text, noise)], "held": asked.held},
         lambda: machine_of(
             replace(spec, hardware=any_such(asked)), enclosed.problem, enclosed.suprema, geodesics
         ),
@@ -281,7 +324,8 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
         return None
     # what is declared is about x, whatever the coordinates of the tube
     in_x = Fields(enclosed.question.model, None)
-    for name, derived in zip(("h", "h_x", "h_t"), enclosed.suprema.uncertainty(in_x), strict=True):
+    suprema = replace(enclosed.suprema, gaps={})
+    for name, derived in zip(("h", "h_x", "h_t"), suprema.uncertainty(in_x), strict=True):
         if name in declared and derived.above > declared[name].above:
             broken = derived.below > declared[name].above
             claim = UncertaintyBound(

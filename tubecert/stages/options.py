@@ -14,7 +14,11 @@ Formulas: TypeAlias = Literal["corrected", "as-printed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What the command line asks for beside the specification."""
+    """What the command line asks for beside the specification.
+
+    `by_effect`: whether each constant has a gap of its own, such that closer constants would lower the gains that
+    decide by less than `gap`; None: as the specification says.
+    """
 
     rho_a: Fraction | None = None
     epsilon: Fraction | None = None
@@ -24,6 +28,7 @@ class Options:
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
     gap: Fraction = Fraction(1, 100)
+    by_effect: bool | None = None
     budget: int = 2_000_000
 
 

@@ -66,6 +66,12 @@ class Question:
         own = {key: value for key, value in canonical(self.spec).items() if key not in _APART}
         return own | {"gap": str(self.options.gap), "budget": self.options.budget}
 
+    @property
+    def by_effect(self) -> bool:
+        """Whether the gap of each constant is to follow from its effect on the gains."""
+        own = self.options.by_effect
+        return self.spec.tube.gap == "auto" if own is None else own
+
     @cached_property
     def model(self) -> ControlAffineModel:
         """The expressions of the system and its metric."""

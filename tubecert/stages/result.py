@@ -94,7 +94,11 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         spec=_source(spec),
         claim=claim_data(spec, period_of(spec)),
         overrides=_overrides(spec, options),
-        effort=Work(gap=options.gap, budget=options.budget),
+        effort=Work(
+            gap=options.gap,
+            budget=options.budget,
+            gaps={} if reached.enclosed is None else reached.enclosed.gaps,
+        ),
         plan=_plan(reached),
         safe_set=dict(zip(spec.states, spec.safe_set, strict=True)),
         assumptions=assumptions(spec, question.model, None if bounded is None else bounded.geodesics),

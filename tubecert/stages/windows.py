@@ -46,13 +46,13 @@ def _window(
     bounded: Bounded, machine: Machine, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort
 ) -> Window:
     """One window; what it looks back at is as long as the machine of the specification makes it."""
-    question, tube = bounded.question, bounded.enclosed.tube
+    question = bounded.question
     begin, end = part
     since = max(Fraction(0), begin - pad_of(machine.asked))
     noise = machine.asked.noise if isinstance(machine.asked.noise, tuple) else ()
     found = question.memory.recall(
         "window",
-        tube.ground
+        bounded.enclosed.ground
         | {
             "noise": [*map(number_text, noise)],
             "held": machine.asked.held,
@@ -76,6 +76,7 @@ def _bounded(
         plan=during(enclosed.tube.plan, *part),
         time=None if enclosed.suprema.time is None else part,
         effort=effort,
+        gaps={},
     ).with_radius(radius)
     constants = part_constants(suprema, question.start, problem.constants, question.declared_uncertainty)
     own = hardware_constants(suprema, any_such(machine.asked), bounded.geodesics, constants)
