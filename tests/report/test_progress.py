@@ -72,9 +72,17 @@ def test_a_log_goes_on_where_nothing_is_told():
     steps = [(1.0, points(20)), (9.0, points(22)), (10.0, None), (15.0, None), (20.5, None), (30.0, None)]
     assert lines(steps) == [
         "22 of 60 points done; 10 s so far, about 3 min left; certifying points",
-        "22 of 60 points done; 21 s so far, about 3 min left; certifying points",
+        "22 of 60 points done; 21 s so far, about 2 min left; certifying points",
     ]
     assert lines([(12.0, None)]) == []  # nothing is known yet
+
+
+def test_an_estimate_that_was_wrong_is_not_repeated():
+    found = lines([(0.0, points(57)), (5.0, points(58)), (10.0, None), (20.0, None)])
+    assert found == [
+        "58 of 60 points done; 10 s so far, about 5 s left; certifying points",
+        "58 of 60 points done; 20 s so far; certifying points",
+    ]
 
 
 def test_a_line_is_no_longer_than_the_terminal():
@@ -177,15 +185,15 @@ def test_pieces_count_with_what_is_done_in_them():
 
 def test_in_words():
     step = Step(phase=Phase.CERTIFICATION, name="feedback_gain", count=12000, below=0.5, above=0.75)
-    assert described(step) == "proving feedback gain, 12,000 boxes, between 0.5 and 0.75"
+    assert described(step) == "proving |feedback| per Riemannian distance, 12,000 boxes, between 0.5 and 0.75"
     step = replace(step, done=17, of=33, seconds=4.2, left=3.9)
-    assert described(step).startswith("17 of 33 claims done; 5 s so far, about 4 s left; proving feedback")
+    assert described(step).startswith("17 of 33 claims done; 5 s so far, about 4 s left; proving |feedback|")
     assert described(Step(phase=Phase.GAINS, name="distance", done=30, of=33)) == (
         "30 of 33 claims done; gains of certificate B"
     )
     step = Step(phase=Phase.SYNTHESIS, name="rate 2, degree 0", count=3, unit=Unit.STEPS)
     assert described(step) == "looking for a metric: rate 2, degree 0, 3 steps"
-    assert described(Step(phase=Phase.DESIGN, name="f", done=2)) == "2 tubes done; trying tubes: f"
+    assert described(Step(phase=Phase.DESIGN, name="f", done=2)) == "2 tubes done; trying tubes: sup |f|"
 
 
 @pytest.mark.parametrize("phase", Phase)

@@ -91,20 +91,24 @@ def shown(terminal: Terminal, *, wanted: bool, clock: Clock = time.monotonic) ->
 @contextlib.contextmanager
 def _bar(terminal: Terminal) -> Iterator[Progress]:
     """A bar where it is known how much there is, else something that turns; both go away."""
-    from rich.progress import BarColumn, SpinnerColumn, TextColumn
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Rich
     from rich.table import Column
 
     words = Column(ratio=1, no_wrap=True, overflow="ellipsis")
     columns = (
         SpinnerColumn(),
+        TimeElapsedColumn(),
         BarColumn(bar_width=12),
         TextColumn("{task.description}", table_column=words, markup=False),
     )
     with Rich(*columns, console=terminal.console(), transient=True, expand=True) as rich:
         task = rich.add_task("reading", total=None)
         yield lambda step: rich.update(
-            task, description=visible(described(step)), completed=step.done, total=step.of or None
+            task,
+            description=visible(described(replace(step, seconds=0.0))),
+            completed=step.done,
+            total=step.of or None,
         )
 
 
@@ -114,7 +118,7 @@ class Log:
     def __init__(self, terminal: Terminal, clock: Clock = time.monotonic) -> None:
         self.terminal, self.clock = terminal, clock
         self.last = Step(phase=Phase.CERTIFICATION)
-        self.began = self.written = clock()
+        self.began = self.written = self.told = clock()
         self.heard = False
         self.lock = threading.Lock()
         self.times = Timed(self._keep, clock)
@@ -131,7 +135,9 @@ class Log:
             if not self.heard or now - self.written < EVERY:
                 return
             self.written = now
-            words = described(replace(self.last, seconds=now - self.began))
+            left = None if self.last.left is None else self.last.left - (now - self.told)
+            still = None if left is None or left < 0 else left  # an estimate that was wrong is not repeated
+            words = described(replace(self.last, seconds=now - self.began, left=still))
         self.terminal.show(cropped(visible(words), self.terminal.width))
 
     @contextlib.contextmanager
@@ -152,7 +158,7 @@ class Log:
             thread.join()
 
     def _keep(self, step: Step) -> None:
-        self.last, self.heard = step, True
+        self.last, self.heard, self.told = step, True, self.clock()
 
 
 def cropped(text: str, width: int) -> str:

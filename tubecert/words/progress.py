@@ -7,7 +7,7 @@ from typing import Final
 
 from tubecert.digits import near
 from tubecert.letters import NAMES
-from tubecert.progress import Phase, Step
+from tubecert.progress import Phase, Step, Unit
 
 COUNTED: Final = {
     Phase.CERTIFICATION: "claims",
@@ -37,6 +37,8 @@ _AT: Final = {
     Phase.RECHECK: "examining",
 }
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
+_OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.ADVICE, Phase.DESIGN, Phase.CHECK)
+_ONE: Final = {Unit.BOXES: "box", Unit.KNOTS: "knot", Unit.PIECES: "piece", Unit.STEPS: "step"}
 _LETTERS: Final = {name.key: name.letter for name in NAMES}
 
 
@@ -64,19 +66,30 @@ def _done(step: Step) -> str:
 
 
 def _time(step: Step) -> str:
-    if not step.seconds:
-        return ""
-    left = "" if step.left is None else f", about {duration(step.left)} left"
-    return f"{duration(step.seconds)} so far{left}"
+    gone = f"{duration(step.seconds)} so far" if step.seconds else ""
+    left = "" if step.left is None else f"about {duration(step.left)} left"
+    return ", ".join(part for part in (gone, left) if part)
 
 
 def _now(step: Step) -> str:
     """What is worked on, and what its search says."""
-    name = _LETTERS.get(step.name, step.name) if step.phase is Phase.GAINS else step.name.replace("_", " ")
+    name = _name(step)
     joined = " " if step.phase in _JOINED else ": "
     words = f"{_AT[step.phase]}{joined}{name}" if name else _AT[step.phase]
     if step.count:
-        words += f", {step.count:,} {step.unit}"
+        unit = str(step.unit) if step.count != 1 else _ONE[step.unit]
+        words += f", {step.count:,} {unit}"
     if math.isfinite(step.below) and math.isfinite(step.above):
         words += f", between {near(step.below, 4)} and {near(step.above, 4)}"
     return words
+
+
+def _name(step: Step) -> str:
+    """What is worked on as reports call it: a constant by its words."""
+    if step.phase is Phase.GAINS:
+        return _LETTERS.get(step.name, step.name)
+    if step.phase not in _OF_CONSTANTS:
+        return step.name
+    from tubecert.bounds.meanings import EVERY  # with numerics, which are there where constants are bounded
+
+    return EVERY[step.name].words if step.name in EVERY else step.name.replace("_", " ")
