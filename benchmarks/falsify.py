@@ -15,7 +15,8 @@ from pathlib import Path
 
 from tubecert import pipeline
 from tubecert.simulate.campaign import Attack, simulate
-from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
+from tubecert.simulate.setting import Loop, Setting, setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load
 
 CONFIGS = Path(__file__).parent.parent / "configs"

@@ -24,7 +24,8 @@ from tubecert import pipeline
 from tubecert.simulate.campaign import Attack, simulate
 from tubecert.simulate.promise import Levels
 from tubecert.simulate.runs import Runs
-from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
+from tubecert.simulate.setting import Loop, Setting, setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -19,7 +19,8 @@ from tubecert.simulate.grid import fast_part
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.layout import slices
 from tubecert.simulate.monte_carlo import case, disturbance_of
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 

@@ -17,7 +17,7 @@ from tubecert.simulate import campaign as campaigns
 from tubecert.simulate import figures as drawing
 from tubecert.simulate import monte_carlo as sampling
 from tubecert.simulate.campaign import simulate
-from tubecert.simulate.setting import Choice, loop_of
+from tubecert.simulate.tuning import Choice, loop_of
 
 pytestmark = pytest.mark.timeout(240)  # the first run compiles
 LOCATED = re.compile(r"(^|\n)(\S+:\d+:\d+: |--[a-z-]+: )?error TC\d{3}: ")

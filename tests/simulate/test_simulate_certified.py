@@ -24,7 +24,8 @@ from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted, certified_plan, require_tube
 from tubecert.simulate.grid import computer
 from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
-from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import CHOSEN, Choice, loop_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 

@@ -9,7 +9,8 @@ from systems import SMALL
 
 from tubecert import pipeline
 from tubecert.errors import TubecertError
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 
 TEXT = (

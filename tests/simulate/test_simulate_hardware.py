@@ -17,7 +17,8 @@ from hardware_attack import ROWS, WIND, Row, attacked, certified, scaled, shares
 
 from tubecert import pipeline
 from tubecert.errors import TubecertError
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 
 BOX = Row("two_state_orbit", "{sample_time: 1/1000, delay: 1/2000, noise: {x1: 1/2000, x2: 1/1000}}", WIND)

@@ -15,8 +15,9 @@ from tubecert import pipeline
 from tubecert.letters import name_of
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
 from tubecert.simulate.summary import summary
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 

@@ -23,8 +23,9 @@ from tubecert.simulate.campaign import follow
 from tubecert.simulate.certified import adopted
 from tubecert.simulate.compare import Comparison, Use, merged
 from tubecert.simulate.members import drawing_of, member, members_of
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
 from tubecert.simulate.summary import members_data
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 from tubecert.spec.types import Table
 

@@ -17,8 +17,8 @@ from tubecert.simulate.compare import compare
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
-from tubecert.simulate.setting import Choice, loop_of
 from tubecert.simulate.summary import outcome, summary
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.trajectory import constant_plan
 
 T, X, Y = symbol("t"), symbol("x1"), symbol("x2")

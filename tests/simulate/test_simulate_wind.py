@@ -15,7 +15,8 @@ from tubecert.simulate.compare import compare
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.monte_carlo import monte_carlo
 from tubecert.simulate.problem import Disturbance
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 
 RANGES = SMALL.replace("0.3*sin(x)", "m*sin(x)").replace(

@@ -338,7 +338,7 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress |
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
     from tubecert.simulate.members import members_of
-    from tubecert.simulate.setting import Choice, loop_of
+    from tubecert.simulate.tuning import Choice, loop_of
 
     setting, drawing = _setting(system, result, wishes)
     choice = Choice(
