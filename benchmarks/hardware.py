@@ -24,7 +24,8 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.interval import Array
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import plan, tube
-from tubecert.search.hardware import Lanes, Search, Setting, recipe_at
+from tubecert.search.hardware import Setting, recipe_at
+from tubecert.search.lanes import Lanes, Search
 from tubecert.search.scan import serves
 from tubecert.spec import Hardware, load, load_text
 from tubecert.stages.bounded import bound, enclose

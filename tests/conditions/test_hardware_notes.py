@@ -15,7 +15,8 @@ from problems import constants, two_state
 
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
-from tubecert.search.hardware import Search, Setting, recipe_at
+from tubecert.search.hardware import Setting, recipe_at
+from tubecert.search.lanes import Search
 from tubecert.search.scan import serves
 from tubecert.spec import Hardware
 

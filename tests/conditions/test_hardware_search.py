@@ -21,7 +21,8 @@ from tubecert.kinds.table import kind_of, kinds_of
 from tubecert.letters import HARDWARE
 from tubecert.records import from_json, to_json
 from tubecert.search import hardware as searching
-from tubecert.search.hardware import Choice, Search, propose_hardware, setting_at
+from tubecert.search.hardware import propose_hardware, setting_at
+from tubecert.search.lanes import Choice, Search
 from tubecert.spec import Hardware
 from tubecert.verdict import Verdict
 

@@ -23,7 +23,8 @@ from tubecert.conditions.hardware.windows import InWindow, Span, arrival, closed
 from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
-from tubecert.search.hardware import DEADBEAT, Lanes, Search, in_lanes, setting_at
+from tubecert.search.hardware import setting_at
+from tubecert.search.lanes import DEADBEAT, Lanes, Search, in_lanes
 from tubecert.search.scan import serves
 
 _DIGITS, _ROOM = 6, 9

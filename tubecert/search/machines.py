@@ -19,7 +19,8 @@ from tubecert.conditions.machine import Machine
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import Proof, check
-from tubecert.search.hardware import Lanes, Search, Setting, propose_hardware, setting_at
+from tubecert.search.hardware import Setting, propose_hardware, setting_at
+from tubecert.search.lanes import Lanes, Search
 
 PARTS: Final[tuple[HardwarePart, ...]] = ("sample_time", "delay", "noise", "wind")
 """A wind that is adapted to is a part of h, whose constants are those of its bound: it is none of these."""

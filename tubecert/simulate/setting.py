@@ -1,7 +1,4 @@
-"""What is simulated: plan, times, starts, and each loop with its gains and what a certificate promises about it.
-
-LoopGains come from a certificate, or are chosen; only what a certificate covers can be falsified.
-"""
+"""What is simulated: plan, times, starts, what a certificate proves; and a loop with what is promised about it."""
 
 from __future__ import annotations
 
