@@ -73,7 +73,8 @@ class ControlAffineModel:
     Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
     where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
     `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
-    `gained`, B(x, theta) (n, m), in place of B, if that is not empty.
+    `gained`, B(x, theta) (n, m), in place of B, if that is not empty. `time`: the range of t in f(t, x), None if f is
+    free of t.
     """
 
     states: tuple[str, ...]
@@ -89,6 +90,7 @@ class ControlAffineModel:
     drift: tuple[Expression, ...] = ()
     gained: Matrix = ()
     parameters: tuple[tuple[str, Range], ...] = ()
+    time: Range | None = None
 
     @cached_property
     def f_x(self) -> Matrix:
@@ -206,7 +208,16 @@ def build(spec: Spec) -> ControlAffineModel:
         drift=tuple(term.expression for term in spec.drift),
         gained=tuple(tuple(term.expression for term in row) for row in spec.gained),
         parameters=spec.ranges,
+        time=_time_of(spec),
     )
+
+
+def _time_of(spec: Spec) -> Range | None:
+    """The horizon where f depends on t: the reader takes no such f without one."""
+    if TIME not in free_symbols(term.expression for term in spec.f):
+        return None
+    assert spec.trajectory.horizon is not None
+    return Fraction(0), spec.trajectory.horizon
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,12 +287,16 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
     """What is undefined, not differentiable or rank-deficient on the safe set (and for h and the plan: over `time`)."""
     box: dict[str, Range] = dict(zip(spec.states, spec.safe_set, strict=True))
     over_time: dict[str, Range] = box if time is None else {**box, TIME: time}
-    terms = [*(() if spec.drift else spec.f), *(() if spec.gained else (t for row in spec.B for t in row))]
+    terms = [] if spec.gained else [t for row in spec.B for t in row]
     if spec.metric:
         terms += [t for row in spec.metric.dual_metric for t in row]
     if spec.disturbance:
         terms += [t for row in spec.disturbance.E for t in row]
     findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
+    for term in () if spec.drift else spec.f:
+        moving = TIME in free_symbols([term.expression, *(duty.argument for duty, _ in term.owed())])
+        where = "the safe set and the horizon" if moving else "the safe set"
+        findings += _undefined(term, over_time, where, effort)
     everywhere: dict[str, Range] = {**box, **dict(spec.ranges)}
     for term in (*spec.drift, *(t for row in spec.gained for t in row)):
         findings += _undefined(term, everywhere, "the safe set and the ranges of the parameters", effort)

@@ -524,3 +524,35 @@ def test_bad_arguments_are_refused():
         integrate(case, START, Disturbance.from_expressions(None, TWO, 1), tolerance=1e-3)
     with pytest.raises(ValueError, match="lanes"):
         integrate(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)
+
+
+@pytest.mark.slow
+def test_an_f_that_depends_on_time_agrees_with_dop853():
+    """Plan at 0, where f(t, 0) is not 0: predictor, feedback and plant see the same f(t, x)."""
+    model = replace(TWO, f=(TWO.f[0] + sin(3 * T), TWO.f[1] + T * Fraction(1, 2)), time=(0, 2))
+    gains = LoopGains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e2)
+
+    def moved(t):
+        return lambda x: drift(x) + np.array([np.sin(3 * t), 0.5 * t])
+
+    def rate(t, z):
+        x, xt, s, u = z[:2], z[2:4], z[4:5], z[5:6]
+        M, f = np.linalg.inv(W2), moved(t)
+        phi0 = 2 * x @ M @ (f(x) - f(np.zeros(2))) + 2 * RATE * x @ M @ x
+        phi1 = 2 * B2.T @ M @ x
+        k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
+        return np.concatenate(
+            [
+                f(x) + B2 @ (k + u + h2(t, x)),
+                gains.A_m(2) @ xt + B2 @ (s - h2(t, x)),
+                gains.adaptation_rate * projection(s, -B2.T @ xt, gains),
+                -gains.bandwidth * (u + s),
+            ]
+        )
+
+    case = problem("l1", horizon=1.0, model=model, gains=gains)
+    expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
+    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-7)
+    assert not found.failures
+    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-6
+    assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-6

@@ -136,6 +136,8 @@ class Effective:
         The sections `without` are left out, and so are the windows of the tube, which are those of a plan.
         """
         rest = {"kind": "equilibrium", "at": ["0"] * len(self.system.states)}
+        if "horizon" in (own := self.part("trajectory")):  # an f that depends on t needs one
+            rest["horizon"] = own["horizon"]
         kept = {key: _timeless(key, value) for key, value in self.data.items() if key not in without}
         return json.dumps(kept | {"trajectory": rest})
 

@@ -17,7 +17,7 @@ from tubecert.expression import Expression, is_zero
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
-from tubecert.model import ControlAffineModel, build, place
+from tubecert.model import TIME, ControlAffineModel, build, place
 from tubecert.spec import Spec
 
 _POINTS = 200
@@ -61,9 +61,9 @@ def _points(spec: Spec) -> Array:
 
 
 def _values(matrix: Sequence[Sequence[Expression]], model: ControlAffineModel, points: Array) -> Array:
-    """A matrix of expressions at points, shape (K, rows, columns)."""
-    tape = Tape([e for row in matrix for e in row], model.states)
-    values = tape.run_floats(list(points.T), (len(points),))
+    """A matrix of expressions at points, at the start where f depends on t; shape (K, rows, columns)."""
+    tape = Tape([e for row in matrix for e in row], (*model.states, TIME))
+    values = tape.run_floats([*points.T, np.zeros(len(points))], (len(points),))
     return values.T.reshape(len(points), len(matrix), -1)
 
 

@@ -157,8 +157,8 @@ def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
 def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Finding]:
     """How far the plan is from x*' = f(x*) + B(x*) u*, against what the least tube can bear."""
     x, u = list(curve.x.T), list(curve.u.T)
-    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
-    rate = drift.run_floats([*x, *u], curve.t.shape)
+    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
+    rate = drift.run_floats([*x, *u, curve.t], curve.t.shape)
     if spec.trajectory.kind == "expressions":
         from tubecert.expression import derivatives
 

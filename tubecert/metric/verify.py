@@ -26,7 +26,7 @@ from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO, Expression, is_zero
 from tubecert.expression.matrix import Matrix, adjugate, determinant, identity, multiply, transpose
-from tubecert.model import ControlAffineModel, divide
+from tubecert.model import TIME, ControlAffineModel, divide
 from tubecert.verdict import Verdict
 
 Box = Sequence[tuple[Fraction, Fraction]]
@@ -55,18 +55,19 @@ class MetricProof:
 
     def is_about(self, model: ControlAffineModel, safe_set: Box) -> bool:
         """Whether this is what `verify_metric` found for that metric there; equal expressions are the same nodes."""
-        own, other = ((m.states, m.inputs, m.f, m.B, m.W, m.rate) for m in (self.model, model))
+        own, other = ((m.states, m.inputs, m.f, m.time, m.B, m.W, m.rate) for m in (self.model, model))
         return own == other and self.safe_set == safe_set
 
 
 def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> MetricProof:
     """Decide C1, C3 and C2, in this order, on the whole safe set."""
-    domain = BoxDomain(dict(zip(model.states, safe_set, strict=True)))
+    domain = _everywhere(model, safe_set)
     eye = identity(len(model.states))
 
     def place(at: dict[str, float]) -> Witness:
         middle = [float((lo + hi) / 2) for lo, hi in safe_set]
-        return Witness(x=tuple(at.get(name, m) for name, m in zip(model.states, middle, strict=True)))
+        x = tuple(at.get(name, m) for name, m in zip(model.states, middle, strict=True))
+        return Witness(t=at.get(TIME), x=x)
 
     positive = decide(Definite(model.W), domain, 0.0, effort)
     if positive.verdict is not Verdict.CERTIFIED:
@@ -117,11 +118,17 @@ def supported_rate(model: ControlAffineModel, safe_set: Box, effort: Effort) -> 
     """
     if len(model.inputs) == len(model.states):
         return Constant(below=np.inf, above=np.inf)
-    domain = BoxDomain(dict(zip(model.states, safe_set, strict=True)))
+    domain = _everywhere(model, safe_set)
     found = supremum(_rates(model, domain, effort), domain, effort)
     middle = zip(model.states, safe_set, strict=True)
     at = Witness(x=tuple(found.at.get(name, float((lo + hi) / 2)) for name, (lo, hi) in middle))
     return Constant(below=-found.above / 2, above=-found.below / 2, at=at)
+
+
+def _everywhere(model: ControlAffineModel, safe_set: Box) -> BoxDomain:
+    """The safe set, at all times where f depends on them."""
+    states = dict(zip(model.states, safe_set, strict=True))
+    return BoxDomain(states if model.time is None else {**states, TIME: model.time})
 
 
 def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:

@@ -61,6 +61,14 @@ def not_covered(spec: Spec, conditions: str | None) -> list[Finding]:
     return [Finding(code="TC112", message=message, location=spec.location(where), help=help)]
 
 
+def moving_drift(spec: Spec) -> list[Finding]:
+    """What no metric is found for: an f that depends on t."""
+    if build(spec).time is None:
+        return []
+    message, help = "f depends on t, and metrics are not found for that", "give one: metric, or --metric FILE"
+    return [Finding(code="TC112", message=message, location=spec.location("system.f"), help=help)]
+
+
 def missing_radii(spec: Spec) -> list[Finding]:
     """The radii of the tube, if neither they nor half-widths are given."""
     found = []

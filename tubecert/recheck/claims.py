@@ -51,7 +51,6 @@ from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.terms import all_zero
-from tubecert.recheck.times import time_range
 
 
 @dataclass(frozen=True)
@@ -270,7 +269,7 @@ def _rate_margin(case: Case) -> Fraction:
 
 def _smooth(case: Case) -> Outcome:
     s, trajectory = case.system, case.result.specification.trajectory
-    time = time_range(s.uncertainty, s.horizon)
+    time = s.times
     ranges = {**s.safe_set, **s.ranges, **({} if time is None else {TIME: time})}
     found = metric.smooth((*s.duties, *s.uncertainty.duties), ranges, case.budget)
     if not isinstance(trajectory, Expressed):

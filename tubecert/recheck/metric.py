@@ -14,6 +14,7 @@ from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.system import System, along
 from tubecert.recheck.terms import (
@@ -156,8 +157,8 @@ def adjugate(a: Rows) -> Matrix:
 
 
 def on_set(s: System) -> Boxed:
-    """The safe set."""
-    return Boxed(s.safe_set)
+    """The safe set, at all times where f depends on them."""
+    return Boxed(s.safe_set if s.time is None else {**s.safe_set, TIME: s.time})
 
 
 def _never_zero(e: Term, domain: Domain, budget: int) -> Outcome:

@@ -19,8 +19,7 @@ from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Matrix, Rows, matrix_replaced, number, variable
-from tubecert.recheck.times import time_range
+from tubecert.recheck.terms import Matrix, Rows, Term, matrix_replaced, number, variable
 from tubecert.recheck.tube import Tube
 
 
@@ -61,7 +60,7 @@ class Place:
     def tube(self, extra: dict[str, tuple[Fraction, Fraction]] | None = None) -> Tube:
         """The tube, with the times that matter for h."""
         s = self.system
-        time = time_range(s.uncertainty, s.horizon)
+        time = s.times
         if time is not None and self.when is not None:
             time = self.when
         free = {**self.curve.ranges, **s.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
@@ -70,17 +69,25 @@ class Place:
     def on_plan(self, rows: Rows) -> Matrix:
         """A matrix along the plan."""
         s = self.system
-        return matrix_replaced(
-            rows, dict(zip((*s.states, *s.inputs), (*self.curve.x, *self.curve.u), strict=True))
-        )
+        values = dict(zip((*s.states, *s.inputs), (*self.curve.x, *self.curve.u), strict=True))
+        return matrix_replaced(rows, values | self._clock)
+
+    @property
+    def _clock(self) -> dict[str, Term]:
+        """The time in f by the s of the plan: they are the same for a plan of one part that begins at 0."""
+        if not self.system.varies:
+            return {}
+        (part,) = self.curve.parts
+        if self.when is not None or not (part.start == 0 and not part.values):
+            raise ValueError("f depends on t along a part of a plan")
+        return {TIME: variable(CLOCK)}
 
     def around_plan(self, rows: Rows) -> Matrix:
         """A matrix in s and in x - x*, for a plan of one part: the tube stays there, whatever the plan does."""
         offsets = [variable(name) + x for name, x in zip(self._offsets, self.curve.x, strict=True)]
         s = self.system
-        return matrix_replaced(
-            rows, dict(zip((*s.states, *s.inputs), (*offsets, *self.curve.u), strict=True))
-        )
+        values = dict(zip((*s.states, *s.inputs), (*offsets, *self.curve.u), strict=True))
+        return matrix_replaced(rows, values | self._clock)
 
     def ball(self) -> Tube:
         """The tube in s and in x - x*."""

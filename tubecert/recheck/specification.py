@@ -92,6 +92,8 @@ def read_specification(node: Node) -> Specification:
     )
     read_idle(own, plant)
     written = isinstance(found.trajectory, (Resting, Expressed))
+    if plant.varies:
+        _moving(own, found, written=written)
     if plant.gained is not None and found.windows:
         raise own["tube"].refused("has windows beside an uncertain B")
     if plant.gained is not None and (hardware is None or not written):
@@ -99,6 +101,13 @@ def read_specification(node: Node) -> Specification:
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
     return found
+
+
+def _moving(own: Members, found: Specification, *, written: bool) -> None:
+    """What an f that depends on t goes with: theorems 0, A, B and C along a known plan with an end."""
+    alone = found.hardware is None and found.disturbance is None and not found.plant.ranges
+    if not (alone and written and found.trajectory.horizon is not None and isinstance(found.metric, Metric)):
+        raise own["system"].refused("has an f that depends on t, beside what no theorem covers with it")
 
 
 def _version(node: Node) -> None:

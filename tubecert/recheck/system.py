@@ -7,6 +7,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
+from tubecert.recheck.cover import Range as CoverRange
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
 from tubecert.recheck.document import wrong
 from tubecert.recheck.family import everyone
@@ -30,6 +31,7 @@ from tubecert.recheck.terms import (
     turned,
     variable,
 )
+from tubecert.recheck.times import time_range
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,18 @@ class System:
     ranges: dict[str, Range] = field(default_factory=dict)  # of parameters of the plant's drift,
     unknown: Matrix | None = None  # which is this, (n, 1), in place of f
     gained: Matrix | None = None  # the plant's B, if they stand in it
+    varies: bool = False  # whether t occurs in f, or in what f owes; then there is a horizon
+
+    @property
+    def time(self) -> Range | None:
+        """The times of f; None where it is free of t."""
+        assert not self.varies or self.horizon is not None
+        return (Fraction(0), self.horizon) if self.varies and self.horizon is not None else None
+
+    @property
+    def times(self) -> CoverRange | None:
+        """The times that matter for f and h; raises `ValueError` if there are no such bounds."""
+        return self.time or time_range(self.uncertainty, self.horizon)
 
     @property
     def h(self) -> Matrix | None:
@@ -139,6 +153,7 @@ def system_of(spec: Specification) -> System:
         ranges=spec.plant.ranges,
         unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
         gained=spec.plant.gained,
+        varies=spec.plant.varies,
     )
 
 

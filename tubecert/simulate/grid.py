@@ -9,6 +9,7 @@ import numpy as np
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
+from tubecert.model import TIME
 from tubecert.simulate.computer import Computer
 from tubecert.simulate.fast import Fast, exact_flows
 from tubecert.simulate.feedback import Reference
@@ -143,8 +144,8 @@ def course(problem: LoopProblem, start: Array, length: Array) -> Reference:
         span = np.repeat(np.clip(piece, 0, len(plan.spans.lo) - 1), 3).astype(float)
     flat = t.ravel()
     x, u = (part.mid.reshape(S, 3, -1) for part in plan.enclose(flat, flat, span))
-    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
-    values = [*np.moveaxis(x, -1, 0), *np.moveaxis(u, -1, 0)]
+    drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
+    values = [*np.moveaxis(x, -1, 0), *np.moveaxis(u, -1, 0), t]
     speed = np.moveaxis(drift.run_floats(values, (S, 3)), 0, -1)
     return Reference(*(np.concatenate([part, np.repeat(part[-1:, 2:], 3, axis=1)]) for part in (x, speed, u)))
 

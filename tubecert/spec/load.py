@@ -29,7 +29,9 @@ from tubecert.spec.settings import (
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import (
+    WRITTEN,
     check_gains,
+    check_moving,
     is_uncertain,
     known_of,
     read_dynamics,
@@ -206,6 +208,20 @@ def _read_named(
         windows = tube is not None and tube.windows is not None
         check_gains(B, plan.kind, has_hardware="hardware" in entries, has_windows=windows)
     disturbance = read_disturbance(entries.get("disturbance"), names)
+    if f is not None and dynamics is not None and plan is not None:
+        written = plan.kind in WRITTEN
+        check_moving(
+            f,
+            dynamics[0],
+            (
+                ("hardware" in entries, "which certificate H is not stated for"),
+                ("disturbance" in entries, "which is not covered beside a disturbance"),
+                (bool(names.ranges), "which is not covered beside parameters known by ranges"),
+                (not written, f"which is not covered along a trajectory of kind {plan.kind}"),
+                (written and plan.horizon is None, "so a trajectory with a horizon is needed"),
+                (synthesis is not None, "and metrics are not found for that: give one"),
+            ),
+        )
     if plan is not None and tube is not None and not reader.findings:
         check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:

@@ -64,7 +64,7 @@ class Names:
     def of_state(self) -> Scope:
         """For the dual metric and E: states and parameters."""
         refused = {
-            TIME: "t is allowed in h and in a trajectory only; f, B and the metric depend on the state alone",
+            TIME: "t is allowed in f, h and a trajectory only; B and the metric depend on the state alone",
             **self._inputs_refused(),
         }
         refused |= {
@@ -73,9 +73,15 @@ class Names:
         }
         return self._scope(self.states, refused | self._ranges_refused(), tables=False)
 
+    def of_drift(self) -> Scope:
+        """For f: the same as for B, and time."""
+        return self._of_plant((*self.states, TIME, *dict(self.ranges)))
+
     def of_plant(self) -> Scope:
-        """For f and B: the same, and parameters of which a range is known."""
-        names = (*self.states, *dict(self.ranges))
+        """For B: the same as for E, and parameters of which a range is known."""
+        return self._of_plant((*self.states, *dict(self.ranges)))
+
+    def _of_plant(self, names: tuple[str, ...]) -> Scope:
         known = {*names, *dict(self.tables)}
         refused = {name: why for name, why in self.of_state().refused.items() if name not in known}
         return self._scope(names, refused)

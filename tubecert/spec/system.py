@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Final
@@ -11,13 +11,13 @@ from tubecert.expression import constant, free_symbols, root_above, substitute, 
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
 from tubecert.spec.document import MappingNode
-from tubecert.spec.names import Names
+from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.synthesis import read_synthesis
 from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
-_WRITTEN: Final = ("equilibrium", "expressions")  # kinds of plans
+WRITTEN: Final = ("equilibrium", "expressions")  # kinds of plans
 
 
 def read_dynamics(
@@ -25,7 +25,7 @@ def read_dynamics(
 ) -> tuple[tuple[Term, ...], TermMatrix] | None:
     """The drift f, of n entries, and the input matrix B, n x m; both may contain parameters known by a range."""
     n, m = len(names.states), len(names.inputs)
-    drift = f.terms(n, names.of_plant(), "expressions, one per state") if f else None
+    drift = f.terms(n, names.of_drift(), "expressions, one per state") if f else None
     inputs = B.term_matrix(n, m, names.of_plant()) if B else None
     if B is not None and inputs is not None and not _independent(B, inputs):
         inputs = None
@@ -51,6 +51,17 @@ def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
     return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
 
 
+def check_moving(f: Field, drift: Sequence[Term], beside: Sequence[tuple[bool, str]]) -> None:
+    """What is covered where f depends on t: what the theorems are proven for; `beside` is what they are not."""
+    own = [term.expression for term in drift]
+    own += [owed.argument for term in drift for owed in term.obligations]
+    if TIME not in free_symbols(own):
+        return
+    for found, message in beside:
+        if found:
+            f.fail(codes.RANGE, f"f depends on t, {message}", "docs/language.md says what f(t, x) goes with")
+
+
 def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: bool) -> None:
     """What is covered where parameters known by ranges stand in B."""
     if not has_hardware:
@@ -65,11 +76,11 @@ def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: boo
             "a parameter known by a range stands in B, beside tube.windows",
             "leave the windows out, or give the parameter one value",
         )
-    elif kind not in _WRITTEN:
+    elif kind not in WRITTEN:
         field.fail(
             codes.RANGE,
             f"a parameter known by a range stands in B, beside a trajectory of kind {kind}",
-            f"for an uncertain gain u* has to be written down: kind {' or '.join(_WRITTEN)}",
+            f"for an uncertain gain u* has to be written down: kind {' or '.join(WRITTEN)}",
         )
 
 

@@ -58,6 +58,8 @@ def _on(question: Question) -> Json:
     """Everything that a claim on the safe set follows from."""
     whole = canonical(question.spec)
     parts = {key: whole.get(key) for key in ("system", "safe_set", "metric", "owed")}
+    if question.model.time is not None:
+        parts["horizon"] = str(question.model.time[1])
     return parts | {"gap": str(question.options.gap), "budget": question.options.budget}
 
 

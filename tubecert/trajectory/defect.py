@@ -12,12 +12,13 @@ import numpy as np
 
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, identity
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.trajectory.plan import Plan
 
 Search = Callable[[str, Objective, Domain, Effort], Supremum]
@@ -64,15 +65,21 @@ class Defect:
         """Whether the plan satisfies the dynamics exactly."""
         return all(row[0] is ZERO for row in self.p)
 
+    @property
+    def _domain(self) -> Domain:
+        """Where the plan's variables live; of a plan that stays, all times where f depends on them."""
+        moving = self.plan.is_constant and self.model.time is not None
+        return BoxDomain({TIME: self.model.time}) if moving and self.model.time else self.plan.domain
+
     def in_state(self) -> Supremum:
         """delta_p."""
         small = replace(self.effort, absolute=self._negligible)
-        return self.search("plan_defect", SumOfNorms([self.p], self.plan.fixed), self.plan.domain, small)
+        return self.search("plan_defect", SumOfNorms([self.p], self.plan.fixed), self._domain, small)
 
     def in_metric(self) -> Supremum:
         """Delta; negligible is what is negligible for |p|, in the units of the metric."""
         W = self.plan.on(self.model, Fields(self.model, self.coordinates).W)
-        fixed, domain = self.plan.fixed, self.plan.domain
+        fixed, domain = self.plan.fixed, self._domain
         name, eye = "plan_defect_metric", identity(len(self.p))
         stretch = self.search(name, Pencil(eye, W, fixed=fixed), domain, self.effort)
         absolute = self._negligible * float(np.sqrt(max(stretch.below, 0.0)))

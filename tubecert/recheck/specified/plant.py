@@ -35,6 +35,7 @@ class Plant:
     unknown: Column | None
     gained: Matrix | None
     tables: dict[str, Table] = field(default_factory=dict)
+    varies: bool = False  # whether t occurs in f
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,9 @@ def read_plant(node: Node, box: Node) -> Plant:
     tables = own.get("tables", _tables) or {}
     _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping(), *tables])
     reader = Reader.of((*states, *ranges), tables)
-    drift, B = reader.column(own["f"], n), reader.matrix(own["B"], n, m)
+    moving = Reader.of((*states, TIME, *ranges), tables)
+    drift, B = moving.column(own["f"], n), reader.matrix(own["B"], n, m)
+    varies = TIME in names([*drift, *(duty.argument for duty in moving.duties)])
     gained = not names(e for row in B for e in row).isdisjoint(ranges)
     sides = box.closed(*states)
     return Plant(
@@ -80,11 +83,12 @@ def read_plant(node: Node, box: Node) -> Plant:
         f=_in_the_middle(own["f"], drift, ranges),
         B=[list(_in_the_middle(own["B"], tuple(row), ranges)) for row in B],
         safe_set={name: ends(sides[name]) for name in states},
-        duties=tuple(reader.duties),
+        duties=(*moving.duties, *reader.duties),
         ranges=ranges,
         unknown=drift if ranges else None,
         gained=B if gained else None,
         tables=tables,
+        varies=varies,
     )
 
 
