@@ -208,9 +208,12 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.coordinates is not None:
         lines[0] += " (lengths in the coordinates of the tube)"
         lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
-    if (asked := result.overrides.rho_a) is not None and tube.rho_r is not None and tube.rho_a < asked:
+    own = result.spec.effective.part("tube").get("rho_a")
+    asked = Fraction(str(own)) if result.overrides.rho_a is None and own else result.overrides.rho_a
+    if asked is not None and tube.rho_r is not None and tube.rho_a < asked:
+        name = "tube.rho_a" if result.overrides.rho_a is None else "--rho-a"
         lines.append(
-            f"--rho-a {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
+            f"{name} {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
         )
     lines += [*excursion(result), *clearances(result)]
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))

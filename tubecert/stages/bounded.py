@@ -32,7 +32,6 @@ from tubecert.expression import number_text
 from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
-from tubecert.records import Json
 from tubecert.spec import Obstacle
 from tubecert.spec.types import Hardware
 from tubecert.stages.machine import machine_of
@@ -71,12 +70,10 @@ class Enclosed:
         return self.problem.constants
 
     @cached_property
-    def ground(self) -> dict[str, Json]:
-        """Everything that the constants follow from, as data."""
-        own: dict[str, Json] = dict(self.tube.ground)
-        return (
-            own | {"gaps": {name: number_text(gap) for name, gap in self.gaps.items()}} if self.gaps else own
-        )
+    def closely(self) -> dict[str, dict[str, str]]:
+        """What the constants follow from beside the ground of the tube, as data: gaps of their own."""
+        own = {name: number_text(gap) for name, gap in self.gaps.items()}
+        return {"gaps": own} if own else {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +209,7 @@ def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
     noise = asked.noise if isinstance(asked.noise, tuple) else ()
     machine = question.memory.recall(
         "machine",
-        enclosed.ground | {"noise": [*map(number_text, noise)], "held": asked.held},
+        enclosed.tube.ground | enclosed.closely | {"noise": [*map(number_text, noise)], "held": asked.held},
         lambda: machine_of(
             replace(spec, hardware=any_such(asked)), enclosed.problem, enclosed.suprema, geodesics
         ),

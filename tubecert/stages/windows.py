@@ -52,7 +52,8 @@ def _window(
     noise = machine.asked.noise if isinstance(machine.asked.noise, tuple) else ()
     found = question.memory.recall(
         "window",
-        bounded.enclosed.ground
+        bounded.enclosed.tube.ground
+        | bounded.enclosed.closely
         | {
             "noise": [*map(number_text, noise)],
             "held": machine.asked.held,
