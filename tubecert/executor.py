@@ -18,7 +18,7 @@ from typing import Protocol, TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 _PATIENCE = 30  # s until a scheduler answers and has a worker
-Ready = Callable[[], None] | None
+Ready = Callable[[int, R], None] | None
 
 
 class WorkerError(RuntimeError):
@@ -28,8 +28,8 @@ class WorkerError(RuntimeError):
 class Executor(Protocol):
     """Something that applies a function to items."""
 
-    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
-        """The results, in the order of the items; `ready` is called here, once for each piece that is done."""
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
+        """The results, in the order of the items; `ready` is called here with each as it comes, and its place."""
         ...
 
 
@@ -37,13 +37,13 @@ class Executor(Protocol):
 class Serial:
     """One after the other, in this process."""
 
-    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
         """The results, in the order of the items."""
         found = []
-        for item in items:
+        for place, item in enumerate(items):
             found.append(function(item))
             if ready is not None:
-                ready()
+                ready(place, found[-1])
         return found
 
 
@@ -53,7 +53,7 @@ class Processes:
 
     workers: int
 
-    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
         """The results, in the order of the items."""
         before = set(multiprocessing.active_children())
         context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
@@ -61,9 +61,9 @@ class Processes:
         try:
             tasks = [pool.submit(function, item) for item in items]
             if ready is not None:
+                places = {task: place for place, task in enumerate(tasks)}
                 for task in as_completed(tasks):
-                    task.result()
-                    ready()
+                    ready(places[task], task.result())
             return [task.result() for task in tasks]
         except BrokenProcessPool:
             message = (
@@ -87,7 +87,7 @@ class Cluster:
 
     address: str
 
-    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready = None) -> list[R]:
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
         """The results, in the order of the items. Raises `WorkerError` where the cluster cannot do it."""
         from distributed import Client, as_completed
         from distributed.scheduler import KilledWorker
@@ -96,10 +96,11 @@ class Cluster:
             with Client(self.address, timeout=_PATIENCE, set_as_default=False) as client:
                 client.wait_for_workers(1, timeout=_PATIENCE)
                 tasks = client.map(function, items, pure=False)
+                places = {task.key: place for place, task in enumerate(tasks)}
                 for task in as_completed(tasks, loop=client.loop):
-                    task.result()
+                    result = task.result()
                     if ready is not None:
-                        ready()
+                        ready(places[task.key], result)
                 found: list[R] = client.gather(tasks)
                 return found
         except KilledWorker as error:

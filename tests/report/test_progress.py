@@ -176,7 +176,7 @@ def test_pieces_count_with_what_is_done_in_them():
     found = []
     pieces = Pieces(found.append, Phase.CHECK, 3)
     pieces(Step(phase=Phase.CERTIFICATION, name="f", done=7, of=9))
-    pieces.ready()
+    pieces.ready(0, None)
     assert [(step.phase, step.name, step.done, step.of) for step in found] == [
         (Phase.CHECK, "f", 0, 3),
         (Phase.CHECK, "", 1, 3),

@@ -11,11 +11,15 @@ import time
 from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
+from simulated import setting
 from test_sweep import ONE, bytes_in
 
-from tubecert.executor import Cluster, WorkerError
+from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.libraries import versions
+from tubecert.simulate import monte_carlo
+from tubecert.simulate.setting import Choice, loop_of
 
 pytestmark = [
     pytest.mark.slow,
@@ -135,9 +139,35 @@ def test_where_there_is_no_cluster_that_is_said(monkeypatch):
         Cluster("tcp://127.0.0.1:9").map(abs, [1])
 
 
+def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch):
+    monkeypatch.setattr(monte_carlo, "BATCH", 2)
+    where = setting("flat", duration="1")
+    loop = loop_of(where, "l1", Choice())
+    here, there = (
+        monte_carlo.monte_carlo(where, loop, 7, 5, executor=each) for each in (Serial(), Cluster(cluster[0]))
+    )
+    assert [each.start.tolist() for each in here.cases] == [each.start.tolist() for each in there.cases]
+    np.testing.assert_array_equal(here.runs.x, there.runs.x)
+    np.testing.assert_array_equal(here.runs.worst.distance.value, there.runs.worst.distance.value)
+
+
+def test_files_are_checked_on_a_cluster(cluster, tmp_path):
+    (tmp_path / "one.yaml").write_text(ONE, encoding="utf-8")
+    (tmp_path / "wrong.yaml").write_text(ONE.replace("kind: equilibrium", "kind: rest"), encoding="utf-8")
+    words = [sys.executable, "-m", "tubecert", "check", "one.yaml", "wrong.yaml", "--no-cache"]
+    own = [
+        subprocess.run(
+            [*words, *more], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+        )
+        for more in ([], ["--scheduler", cluster[0]])
+    ]
+    assert [each.returncode for each in own] == [2, 2], own
+    assert own[1].stdout.replace(f"{tmp_path}/", "") == own[0].stdout
+
+
 def test_results_are_in_the_order_of_the_items_and_exceptions_are_raised(cluster):
-    ready: list[None] = []
-    assert Cluster(cluster[0]).map(abs, [-1, 2, -3], lambda: ready.append(None)) == [1, 2, 3]
-    assert len(ready) == 3
+    ready: dict[int, int] = {}
+    assert Cluster(cluster[0]).map(abs, [-1, 2, -3], ready.__setitem__) == [1, 2, 3]
+    assert ready == {0: 1, 1: 2, 2: 3}
     with pytest.raises(TypeError):
         Cluster(cluster[0]).map(abs, ["x"])

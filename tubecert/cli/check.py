@@ -22,6 +22,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.checking import Checked, CheckOptions
+    from tubecert.executor import Executor
 
 _SUFFIXES = {".yaml", ".yml"}
 _OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
@@ -40,6 +41,7 @@ class Given:
     strict: bool
     skip_others: bool
     jobs: str
+    scheduler: str | None
     no_cache: bool
     gap: str
     budget: str | None
@@ -52,7 +54,10 @@ def run(given: Given, output: Output) -> ExitCode:
     paths = given.paths
     if given.family is None:
         files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, given.skip_others)
-        results = _checked(files, options, jobs, output) if files else []
+        executor = _executor(given.scheduler, jobs, len(files))
+        # on a cluster files are known by their places in the file system, not by where the command runs
+        files = files if given.scheduler is None else [str(Path(file).resolve()) for file in files]
+        results = _checked(files, options, executor, output) if files else []
         results = [*results, *_skipped(others)] or _nothing(paths)
     else:
         results = _of_family(paths, given.family)
@@ -150,15 +155,25 @@ def _nothing(paths: Sequence[str]) -> list[Checked]:
     return [Checked(path=paths[0], findings=(finding,), code=ExitCode.INVALID)]
 
 
-def _checked(files: Sequence[str], options: CheckOptions, jobs: int, output: Output) -> list[Checked]:
+def _executor(scheduler: str | None, jobs: int, files: int) -> Executor:
+    """The cluster, where there is one, or as many processes as are wanted."""
+    from tubecert.cli.clusters import cluster_at
+    from tubecert.executor import chosen
+
+    return chosen(jobs, files) if scheduler is None else cluster_at(scheduler)
+
+
+def _checked(
+    files: Sequence[str], options: CheckOptions, executor: Executor, output: Output
+) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
     from functools import partial
 
     from tubecert.checking import check
-    from tubecert.executor import Serial, chosen
+    from tubecert.executor import Serial
     from tubecert.report import progress
 
-    executor, terminal = chosen(jobs, len(files)), Terminal.stderr(color=output.color)
+    terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
         told = None if report is None else progress.Pieces(report, Phase.CHECK, len(files))
         inner = told if isinstance(executor, Serial) else None  # other processes do not tell

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Debug, Output, with_output
 
@@ -107,6 +108,7 @@ def check(
         bool, typer.Option("--skip-others", help="Leave YAML files that are no specifications alone.")
     ] = False,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Files checked at a time.")] = "1",
+    scheduler: Scheduler = None,
     no_cache: Annotated[
         bool, typer.Option("--no-cache", help="Do not use what earlier checks have found.")
     ] = False,
@@ -134,6 +136,7 @@ def check(
             strict=strict,
             skip_others=skip_others,
             jobs=jobs,
+            scheduler=scheduler,
             no_cache=no_cache,
             gap=gap,
             budget=budget,

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
+from tubecert.cli.clusters import cluster_at
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
+from tubecert.executor import Serial
 from tubecert.libraries import versions
 from tubecert.library.simulating import (
     SimulationNumbers,
@@ -54,6 +56,7 @@ class Given:
     plan: Path | None
     numbers: Mapping[str, str | None]
     folder: str | None
+    scheduler: str | None
 
 
 def run(given: Given, output: Output) -> ExitCode:
@@ -72,6 +75,7 @@ def run(given: Given, output: Output) -> ExitCode:
         system = with_metric(system, str(given.metric))
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = given.folder or f"{Path(given.spec).stem}.simulation"
+    executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import outcome, summary
 
@@ -80,7 +84,7 @@ def run(given: Given, output: Output) -> ExitCode:
     wanted = not (output.no_progress or output.quiet)
     with prepared(folder), progress.shown(terminal, wanted=wanted) as report:
         system, certified = _certificate(given, system, numbers, folder, report)
-        campaign = campaign_of(system, certified.result, wishes, report)
+        campaign = campaign_of(system, certified.result, wishes, report, executor)
         if report is not None:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Output, Settings, SpecFile, number_option, with_output
 from tubecert.letters import ADAPTIVE, words_of
@@ -68,6 +69,7 @@ def simulate(
         str | None,
         number_option("--runs", "Random runs against each loop that adapts; 0: no attacks.  [100]"),
     ] = None,
+    scheduler: Scheduler = None,
     seed: Annotated[
         str | None, number_option("--seed", "Seed of the random runs and of the adversary.  [0]")
     ] = None,
@@ -123,6 +125,10 @@ def simulate(
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context
         )
+    if scheduler is not None and controller is not None:
+        raise typer.BadParameter(
+            "compiled code drives on this machine: --controller or --scheduler", ctx=context
+        )
     if members is not None and plan is not None:
         raise typer.BadParameter("a plan of your own, or random ones: --plan or --members", ctx=context)
     if controller is not None and certificate is None:
@@ -157,6 +163,7 @@ def simulate(
                     "members": members,
                 },
                 folder=output,
+                scheduler=scheduler,
             )
             code = run(given, how)
     raise typer.Exit(code)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate, pipeline
+from tubecert.cli.clusters import cluster_at
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode, SpecError
-from tubecert.executor import Cluster, WorkerError, chosen
+from tubecert.executor import chosen
 from tubecert.files import replace
 from tubecert.findings import Finding
-from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
 from tubecert.printable import printable_json, visible
 from tubecert.records import exact_json
@@ -67,7 +66,7 @@ def run(given: Given, output: Output) -> ExitCode:
         raise SpecError([Finding(code="TC122", message=message, help=help)])
     source = read_source(given.spec)
     folder = Path(given.folder or f"{Path(given.spec).stem}.sweep")
-    cluster = None if given.scheduler is None else _cluster(given.scheduler)
+    cluster = None if given.scheduler is None else cluster_at(given.scheduler)
     folder = folder if cluster is None else folder.resolve()
     task = Task(path=source.file, text=source.text, fixed=fixed, options=options, folder=folder)
     sweep = Sweep.of(task, axes)
@@ -119,26 +118,6 @@ def _options(given: Given, numbers: Numbers) -> pipeline.Options:
         gap=gap or default.gap,
         budget=budget or default.budget,
     )
-
-
-def _cluster(address: str) -> Cluster:
-    """The cluster at an address; raises `SpecError` if there is none, or if its workers could find other results."""
-    if importlib.util.find_spec("distributed") is None:
-        message = "--scheduler needs distributed"
-        help = "install tubecert with its extra: pip install 'tubecert[cluster]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-    cluster, own = Cluster(address), versions()
-    try:
-        others = cluster.versions(versions)
-    except WorkerError as error:
-        help = "start one: dask scheduler, then dask worker ADDRESS on each machine"
-        raise SpecError([Finding(code="TC122", message=visible(str(error)), help=help)]) from None
-    other = {name for each in others for name in {*own, *each} if own.get(name) != each.get(name)}
-    if other:
-        message = f"workers of {visible(address)} have other versions of {', '.join(sorted(other))}"
-        help = "what comes out must not depend on who computes it: install the same everywhere"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-    return cluster
 
 
 def _require_paths(sweep: Sweep) -> None:

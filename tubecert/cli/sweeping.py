@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Budget, Output, Settings, SpecFile, number_option, with_output
 from tubecert.letters import ALL, words_of
@@ -59,13 +60,7 @@ def sweep(
     gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
     budget: Budget = None,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Points certified at a time.")] = "1",
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Certify on a running Dask cluster (extra: tubecert[cluster]), not in --jobs.",
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     parquet: Annotated[
         bool,
         typer.Option(

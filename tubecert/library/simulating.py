@@ -15,6 +15,7 @@ from tubecert.certificate.result import Result
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
+from tubecert.executor import Executor, Serial
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, Severity
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from tubecert.simulate.setting import Setting
     from tubecert.simulate.summary import Summary
 
+_HERE: Final = Serial()
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 RUNS: Final = 100
 MEMBERS: Final = 20  # random plans of a family
@@ -332,8 +334,14 @@ def _first(asked: int | None, default: int | None, otherwise: int) -> int:
     return asked if asked is not None else otherwise if default is None else default
 
 
-def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress | None) -> Campaign:
-    """Every loop that is wished for, integrated and attacked."""
+def campaign_of(
+    system: Spec,
+    result: Result,
+    wishes: Wishes,
+    report: Progress | None,
+    executor: Executor = _HERE,
+) -> Campaign:
+    """Every loop that is wished for, integrated and attacked; random runs are those of the `executor`."""
     from tubecert.simulate.campaign import follow
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
@@ -354,7 +362,15 @@ def campaign_of(system: Spec, result: Result, wishes: Wishes, report: Progress |
     asked = MEMBERS if wishes.members is None else wishes.members
     each = wishes.runs if drawing is None else -(-wishes.runs // asked)
     with told(report):
-        own = campaign(setting, loops, count=each, seed=wishes.seed, replay=wishes.replay, report=report)
+        own = campaign(
+            setting,
+            loops,
+            count=each,
+            seed=wishes.seed,
+            replay=wishes.replay,
+            report=report,
+            executor=executor,
+        )
         further = asked - 1  # the first plan has an adversary of its own
         if drawing is None or not each or not further or own.interrupted:
             return own

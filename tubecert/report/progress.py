@@ -63,8 +63,9 @@ class Pieces:
         """A step of a piece."""
         self.shown(replace(step, phase=self.phase, done=self.done, of=self.of))
 
-    def ready(self) -> None:
+    def ready(self, place: int, result: object) -> None:
         """A piece is done."""
+        del place, result
         self.done += 1
         self(Step(phase=self.phase))
 

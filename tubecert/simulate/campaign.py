@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.clearance import Clearance, of_curve, of_tube
 from tubecert.simulate.compare import Comparison, check_class, compare, merged
@@ -32,6 +33,7 @@ from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import usual
 from tubecert.trajectory import Plan
 
+_HERE: Final = Serial()
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 
@@ -159,13 +161,14 @@ def simulate(
     seed: int,
     replay: int | None = None,
     report: Progress | None = None,
+    executor: Executor = _HERE,
 ) -> Campaign:
     """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
 
     A loop whose own run is no result is not attacked: neither would the others be.
 
-    The loops are drawn under the specification's h, or as random run `replay`. Raises `TubecertError` if the
-    specification's h leaves its class while the state is in the tube.
+    Random runs are done by the `executor`. The loops are drawn under the specification's h, or as random run `replay`.
+    Raises `TubecertError` if the specification's h leaves its class while the state is in the tube.
     """
     whole = _Whole(
         report, len(loops) + sum(loop.tested for loop in loops) * (count + ATTACKS if count else 0)
@@ -186,7 +189,7 @@ def simulate(
     interrupted = False
     for loop, own in zip(loops, drawn, strict=True):
         if loop.tested and count and not interrupted and not own.comparison.unreliable:
-            attacks.append(_attack(setting, loop, count, seed, whole))
+            attacks.append(_attack(setting, loop, count, seed, whole, executor))
             sample = attacks[-1].sample
             interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
     first = drawn[0].runs
@@ -270,8 +273,8 @@ def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
     )
 
 
-def _attack(setting: Setting, loop: Loop, count: int, seed: int, whole: _Whole) -> Attack:
-    sample = monte_carlo(setting, loop, count, seed, whole)
+def _attack(setting: Setting, loop: Loop, count: int, seed: int, whole: _Whole, executor: Executor) -> Attack:
+    sample = monte_carlo(setting, loop, count, seed, whole, executor)
     whole.before += count
     found, worst, measured = None, None, None
     if sample is not None and not sample.interrupted:

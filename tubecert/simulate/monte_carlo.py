@@ -1,18 +1,23 @@
 """Many runs of one loop: random members of the class, random starts, and a search for the worst member.
 
 Run i draws everything from its own generator, keyed by (seed, i): it can be repeated alone, and results depend neither
-on the number of cores nor on how runs are grouped. What is finished when the user interrupts is kept.
+on the number of cores nor on how runs are grouped, nor on who does them. What is finished when the user interrupts is
+kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import takewhile
 from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopProblem
@@ -25,6 +30,7 @@ TIMES: Final = 201  # output times of a run
 _POPULATION: Final = 64
 _ELITE: Final = 12
 _ROUNDS: Final = 4
+_HERE: Final = Serial()
 ATTACKS: Final = _ROUNDS * _POPULATION  # runs of an adversary's search
 
 
@@ -84,22 +90,34 @@ def disturbance_of(setting: Setting, kind: Class, cases: Sequence[Case]) -> Dist
 
 
 def monte_carlo(
-    setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None = None
+    setting: Setting,
+    loop: Loop,
+    count: int,
+    seed: int,
+    report: Progress | None = None,
+    executor: Executor = _HERE,
 ) -> Sample | None:
-    """`count` runs; fewer, or None, if the user interrupts."""
-    problem, kind = with_times(loop.problem, TIMES), setting.class_of(loop)
-    parts: list[Runs] = []
-    cases: list[Case] = []
-    name = f"{loop.controller}, random runs"
-    try:
-        for batch in _batches(setting, kind, count, seed):
-            if report is not None:
-                report(Step(phase=Phase.SIMULATION, name=name, done=len(cases), of=count))
-            parts.append(_slim(_run(setting, kind, problem, batch)))
-            cases += batch
-    except KeyboardInterrupt:
-        del cases[sum(part.lanes for part in parts) :]
-    return Sample(runs=joined(parts), cases=tuple(cases), asked=count) if parts else None
+    """`count` runs; fewer, or None, if the user interrupts: those before the first one that is missing."""
+    batches = [range(first, min(first + BATCH, count)) for first in range(0, count, BATCH)]
+    found: dict[int, Runs] = {}
+
+    def ready(place: int, runs: Runs) -> None:
+        found[place] = runs
+        tell()
+
+    def tell() -> None:
+        if report is not None:
+            done = sum(part.lanes for part in found.values())
+            name = f"{loop.controller}, random runs"
+            report(Step(phase=Phase.SIMULATION, name=name, done=done, of=count))
+
+    with suppress(KeyboardInterrupt):
+        tell()
+        executor.map(partial(along, setting, loop, seed), batches, ready)
+    parts = [found[place] for place in takewhile(found.__contains__, range(len(batches)))]
+    kind = setting.class_of(loop)
+    cases = tuple(case(setting, kind, seed, number) for number in range(sum(part.lanes for part in parts)))
+    return Sample(runs=joined(parts), cases=cases, asked=count) if parts else None
 
 
 def along(setting: Setting, loop: Loop, seed: int, numbers: Sequence[int]) -> Runs:
@@ -107,11 +125,6 @@ def along(setting: Setting, loop: Loop, seed: int, numbers: Sequence[int]) -> Ru
     kind = setting.class_of(loop)
     cases = [case(setting, kind, seed, number) for number in numbers]
     return _slim(_run(setting, kind, with_times(loop.problem, TIMES), cases))
-
-
-def _batches(setting: Setting, kind: Class, count: int, seed: int) -> Iterator[list[Case]]:
-    for first in range(0, count, BATCH):
-        yield [case(setting, kind, seed, number) for number in range(first, min(first + BATCH, count))]
 
 
 def _run(setting: Setting, kind: Class, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
