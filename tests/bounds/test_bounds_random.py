@@ -115,7 +115,7 @@ def test_constants_of_random_systems_are_above_sampled_ones(seed, moving_input):
         h=None,
     )
     plan = constant_plan(CENTRE, [Fraction(0)] * 2, None)
-    s = Suprema(model, plan, RHO, None, Effort(budget=60_000))
+    s = Suprema(model, plan, RHO, None, Effort(budget=60_000, cheap=300))
     lower, upper = s.metric_bounds()
     found = {
         "f": s.norms("f", [tuple((e,) for e in model.f)]),

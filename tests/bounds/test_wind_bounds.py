@@ -25,7 +25,7 @@ W = np.array([[float(e) for e in row] for row in W_TWO])
 M = np.linalg.inv(W)
 
 
-def suprema(E, bound="0.1", rate=None, coordinates=None, model=None):
+def suprema(E, bound="0.1", rate=None, coordinates=None, model=None, gap=1e-4):
     """Around the origin, with a wind."""
     model = model or two_state()
     model = replace(
@@ -36,7 +36,7 @@ def suprema(E, bound="0.1", rate=None, coordinates=None, model=None):
     )
     n = len(model.states)
     plan = constant_plan([Fraction(0)] * n, [Fraction(0)], Fraction(1))
-    return Suprema(model, plan, RHO, (Fraction(0), Fraction(1)), Effort(gap=1e-4), coordinates=coordinates)
+    return Suprema(model, plan, RHO, (Fraction(0), Fraction(1)), Effort(gap=gap), coordinates=coordinates)
 
 
 def beta(of: Suprema) -> Constant:
@@ -194,12 +194,12 @@ def test_what_vanishes_is_seen_to_vanish():
 # -- unknown parameters
 
 
-def unknown(drift, ranges, h=None, coordinates=None, rho=RHO):
+def unknown(drift, ranges, h=None, coordinates=None, rho=RHO, gap=1e-4):
     """The two-state system, of which the plant has another drift."""
     base = two_state()
     names = (*TWO, *dict(ranges))
     model = replace(base, drift=matrix_of([drift], names)[0], parameters=ranges, h=h or base.h)
-    return replace(suprema([["0"], ["0"]], coordinates=coordinates, model=model), rho=rho)
+    return replace(suprema([["0"], ["0"]], coordinates=coordinates, model=model, gap=gap), rho=rho)
 
 
 MASS = (("m", (Fraction(9, 10), Fraction(11, 10))),)
@@ -208,7 +208,7 @@ MASS = (("m", (Fraction(9, 10), Fraction(11, 10))),)
 @pytest.mark.slow
 def test_what_inputs_reach_of_a_parameter_joins_h_and_the_rest_pushes():
     """f_2 gains (m - 1) 3 x1: in closed form at the corners of m."""
-    s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*m*x1 + 4*x2"), MASS)
+    s = unknown(("-x1 + 2*x2", "-0.25*x2**3 - 3*m*x1 + 4*x2"), MASS, gap=1e-3)
     D = np.array([0.0, 0.3 * RHO])  # at x1 = RHO, m at an end
     left = D - B * (B @ D) / (B @ B)
     rest = residual_constants(s)
@@ -258,7 +258,7 @@ def test_wider_ranges_never_need_less():
 @pytest.mark.slow
 def test_in_coordinates_the_residual_is_what_is_sampled():
     S = Coordinates(((Fraction(2), Fraction(1)), (Fraction(0), Fraction(3))))
-    s = unknown(("-m*x1 + 2*x2", "-0.25*x2**3 - 3*x1*m + 4*x2"), MASS, coordinates=S)
+    s = unknown(("-m*x1 + 2*x2", "-0.25*x2**3 - 3*x1*m + 4*x2"), MASS, coordinates=S, gap=2e-3)
     rest = residual_constants(s)
     Sf = np.array([[2.0, 1.0], [0.0, 3.0]])
     SB = Sf @ B

@@ -95,6 +95,12 @@ def bounded():
 
 
 @pytest.fixture(scope="module")
+def honest(bounded):
+    """The certificate if nobody lies."""
+    return result_of_answer(judge_gains(bounded)).to_json()
+
+
+@pytest.fixture(scope="module")
 def problem(bounded):
     return bounded.problem
 
@@ -118,8 +124,7 @@ def lying(key, lie, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("key", "name"), CASES)
-def test_a_search_that_lies_certifies_nothing(key, name, bounded, monkeypatch):
-    honest = result_of_answer(judge_gains(bounded)).to_json()
+def test_a_search_that_lies_certifies_nothing(key, name, bounded, honest, monkeypatch):
     lying(key, LIES[key][name], monkeypatch)
     result = result_of_answer(judge_gains(bounded)).to_json()
     assert honest["verdict"] == honest[key]["verdict"] == "certified"
