@@ -25,7 +25,7 @@ W = np.array([[float(e) for e in row] for row in W_TWO])
 M = np.linalg.inv(W)
 
 
-def suprema(E, bound="0.1", rate=None, coordinates=None, model=None, gap=1e-4):
+def suprema(E, bound="0.1", rate=None, coordinates=None, model=None, *, gap=1e-4):
     """Around the origin, with a wind."""
     model = model or two_state()
     model = replace(
@@ -194,7 +194,7 @@ def test_what_vanishes_is_seen_to_vanish():
 # -- unknown parameters
 
 
-def unknown(drift, ranges, h=None, coordinates=None, rho=RHO, gap=1e-4):
+def unknown(drift, ranges, h=None, coordinates=None, rho=RHO, *, gap=1e-4):
     """The two-state system, of which the plant has another drift."""
     base = two_state()
     names = (*TWO, *dict(ranges))

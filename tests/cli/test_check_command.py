@@ -533,7 +533,9 @@ def test_without_the_cache_no_plan_is_taken_from_it_either(monkeypatch):
         "trajectory: {kind: ilqr, start: [0, 0, 0], target: [0.1, 0, 0], horizon: 1, knots: 5, goal: false}",
     )
     assert text != SPEC
-    text = text.replace("rho_a: 0.01", "rho_a: 10")  # a tube that does not fit: nothing is bounded around the plan
+    text = text.replace(
+        "rho_a: 0.01", "rho_a: 10"
+    )  # a tube that does not fit: nothing is bounded around the plan
     Path("spec.yaml").write_text(text.replace("duration: 10 ", "duration: 1 "), encoding="utf-8")
     planned = []
     true = ilqr.plan

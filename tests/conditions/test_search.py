@@ -25,13 +25,16 @@ from test_conditions import scaled
 
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions import sampled as theorem_c
+from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
+from tubecert.conditions.proposal import Asked
 from tubecert.conditions.rates import RateRecipe, rate_margins
 from tubecert.conditions.verdict import Verdict
 from tubecert.records import to_json
 from tubecert.search.distance import least_rate
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
+from tubecert.search.proposers import LEAST, PROPOSERS
 from tubecert.search.sampled import serves
 from tubecert.search.windows import windows
 
@@ -40,6 +43,11 @@ THREE = scalar_predictor("1", 3)
 
 def gains(pair) -> tuple[float, float]:
     return float(pair.recipe.bandwidth), float(pair.recipe.adaptation_rate)
+
+
+def unmet() -> TubeProblem:
+    """No gains keep this tube."""
+    return two_state(values={"plan_defect_metric": 1000.0})
 
 
 # --- rows of the reference
@@ -522,6 +530,13 @@ def random_problem(rng: np.random.Generator) -> TubeProblem:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("recipe", [RateRecipe, DistanceRecipe])
+@pytest.mark.parametrize("problem", [two_state(), three_state(), alive(A_m=None), unmet()])
+def test_the_least_rate_alone_is_that_of_the_whole_proposal(recipe, problem):
+    proposer = PROPOSERS[recipe]
+    assert proposer.least(problem) == proposer.propose(problem, Asked()).at(LEAST)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_random_problems_end_in_a_verdict_that_says_why(seed):
     rng = np.random.default_rng(seed)

@@ -119,7 +119,7 @@ def lying(key, lie, monkeypatch):
             curve=tuple(map(lie, told.curve)),
         )
 
-    monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose, slopes=honest.slopes))
+    monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, replace(honest, propose=propose))
 
 
 @pytest.mark.slow
@@ -183,9 +183,8 @@ def test_an_ultimate_radius_needs_a_companion_at_the_same_gains_that_is_proven(p
     ],
     ids=["no numbers", "absurd", "turned round"],
 )
-def test_elasticities_that_lie_change_no_claim(slopes, bounded, monkeypatch):
+def test_elasticities_that_lie_change_no_claim(slopes, bounded, honest, monkeypatch):
     recipe = kind_of(RATES.key).theorem.recipe
-    honest = result_of_answer(judge_gains(bounded)).to_json()
     monkeypatch.setitem(PROPOSERS, recipe, replace(PROPOSERS[recipe], slopes=slopes))
     result = result_of_answer(judge_gains(bounded)).to_json()
     for key in ("conditions_26", "distance", "sampled", "proof", "verdict", "constants"):
@@ -203,7 +202,7 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
             told = honest.propose(problem, asked)
             return replace(told, beside={}, curve=tuple(map(lie, told.curve)), around=())
 
-        monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, Proposer(propose=propose, slopes=honest.slopes))
+        monkeypatch.setitem(PROPOSERS, kind.theorem.recipe, replace(honest, propose=propose))
     result = certify(load(str(CONFIG)), Options(conditions="all")).to_json()
     assert result["verdict"] == "certified"
     found = recheck(certificate.dump(certificate.seal(result, {})), "made")

@@ -247,9 +247,8 @@ def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRec
         return Proposal()
     n = problem.floats(problem.projection_radius)
     low = smallest_bandwidth(n, reach(n))
-    best = minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low) if np.isfinite(low) else np.inf
     found = {
-        "least_adaptation": recipe_from(problem, best),
+        "least_adaptation": recipe_from(problem, _best(problem, n, low)),
         "split": recipe_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r)),
     }
     roles = {role: recipe for role, recipe in found.items() if recipe is not None}
@@ -267,6 +266,19 @@ def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRec
         return whole
     g = asked.bandwidth if problem.A_m is None else problem.predictor_gain
     return replace(whole, hopeless=recipe_at(problem, asked.bandwidth, _ENDLESS, g))
+
+
+def least_distance(problem: TubeProblem) -> DistanceRecipe | None:
+    """The pair of least Gamma alone, as `propose_distance` has it beside the others."""
+    if obstacles(problem, theorem_b.THEOREM):
+        return None
+    n = problem.floats(problem.projection_radius)
+    return recipe_from(problem, _best(problem, n, smallest_bandwidth(n, reach(n))))
+
+
+def _best(problem: TubeProblem, n: Numbers[Array], low: float) -> float:
+    """The bandwidth of least Gamma above the smallest that serves; infinite if none does."""
+    return minimum_log(lambda w: least_rate(problem, n, w)[0], low, 1e4 * low) if np.isfinite(low) else np.inf
 
 
 def _around(problem: TubeProblem, recipe: DistanceRecipe | None) -> tuple[DistanceRecipe, ...]:

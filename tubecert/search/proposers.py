@@ -18,11 +18,11 @@ from tubecert.conditions.rates import RateRecipe
 from tubecert.conditions.sampled import SampledRecipe
 from tubecert.kernel import obstacles
 from tubecert.search.along import propose_in_windows
-from tubecert.search.distance import propose_distance
+from tubecert.search.distance import least_distance, propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.hardware import propose_hardware
 from tubecert.search.machines import PARTS, easier, filled, halved
-from tubecert.search.rates import propose_rates
+from tubecert.search.rates import least_rates, propose_rates
 from tubecert.search.sampled import propose_sampled
 from tubecert.search.scan import serves
 
@@ -33,11 +33,13 @@ LEAST, MACHINE, LARGEST = "least_adaptation", "machine", "largest"
 class Proposer:
     """`propose` gains; `slopes`: how the least adaptation rate reacts to each constant, if there is one.
 
+    `least`: the recipe of least adaptation rate alone, at a fraction of the time of a whole proposal.
     `machine`: what is proposed is about a machine, of which another one may be better or easier to have.
     """
 
     propose: Callable[[TubeProblem, Asked], Proposal[Any]]
     slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
+    least: Callable[[TubeProblem], Any] | None = None
     machine: bool = False
 
     def explain(
@@ -58,7 +60,7 @@ class Proposer:
         return Explained(slopes=slopes, halved=halving(problem, slopes, self._least))
 
     def _least(self, problem: TubeProblem) -> Fraction | None:
-        recipe = self.propose(problem, Asked()).at(LEAST)
+        recipe = None if self.least is None else self.least(problem)
         return None if recipe is None else Fraction(recipe.adaptation_rate)
 
 
@@ -88,8 +90,8 @@ def _propose_on_machine(problem: TubeProblem, asked: Asked) -> Proposal[Hardware
 
 PROPOSERS: Final[Mapping[type, Proposer]] = {
     NoGains: Proposer(propose=lambda problem, asked: Proposal(decisive=NoGains(), role="feedback")),
-    RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26),
-    DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance),
+    RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26, least=least_rates),
+    DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance, least=least_distance),
     SampledRecipe: Proposer(propose=propose_sampled),
     HardwareRecipe: Proposer(propose=_propose_on_machine, machine=True),
 }

@@ -169,6 +169,14 @@ def propose_rates(problem: TubeProblem, asked: Asked) -> RateProposal[RateRecipe
     )
 
 
+def least_rates(problem: TubeProblem) -> RateRecipe | None:
+    """The pair of least Gamma alone, as `propose_rates` has it beside the others."""
+    if theorem_a.THEOREM.unbounded(problem):
+        return None
+    s = RateSearch.of(problem)
+    return least_recipe(s, bandwidths(s, SHARE_LEFT))
+
+
 def _companion(problem: TubeProblem, recipe: RateRecipe) -> DistanceRecipe | None:
     """A recipe of certificate B at the same gains: it tells the ultimate radius."""
     if theorem_b.THEOREM.unbounded(problem):
