@@ -257,5 +257,5 @@ def test_a_rho_a_that_is_cut_down_is_told():
     result["overrides"]["rho_a"] = 5
     assert words in " ".join(shown(result).split())
     result["overrides"]["rho_a"] = None
-    result["spec"]["effective"]["tube"]["rho_a"] = "4"
+    result["spec"]["effective"]["tube"] = {"rho_a": "4"}
     assert words.replace("--rho-a 5", "tube.rho_a 4") in " ".join(shown(result).split())

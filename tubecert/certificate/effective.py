@@ -77,6 +77,13 @@ class TrajectoryView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TubeView:
+    """What is asked of the tube, as far as reports say it again."""
+
+    rho_a: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DiscView:
     """A disc."""
 
@@ -98,13 +105,15 @@ class _View:
     name: str
     system: SystemView
     trajectory: TrajectoryView
+    tube: TubeView = field(default_factory=TubeView)
     uncertainty: UncertaintyView = field(default_factory=UncertaintyView)
     disturbance: DisturbanceView = field(default_factory=DisturbanceView)
     obstacles: tuple[ObstacleView, ...] = ()
 
 
 for _kind in (
-    _View, SystemView, TableView, UncertaintyView, DisturbanceView, TrajectoryView, ObstacleView, DiscView,
+    _View, SystemView, TableView, UncertaintyView, DisturbanceView, TrajectoryView, TubeView,
+    ObstacleView, DiscView,
 ):  # fmt: skip
     OPEN.add(_kind)
 
@@ -117,6 +126,7 @@ class Effective:
     name: str
     system: SystemView
     trajectory: TrajectoryView
+    tube: TubeView
     uncertainty: UncertaintyView
     disturbance: DisturbanceView
     obstacles: tuple[ObstacleView, ...]
@@ -150,6 +160,7 @@ class Effective:
             name=view.name,
             system=view.system,
             trajectory=view.trajectory,
+            tube=view.tube,
             uncertainty=view.uncertainty,
             disturbance=view.disturbance,
             obstacles=view.obstacles,

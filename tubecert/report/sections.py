@@ -208,8 +208,8 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.coordinates is not None:
         lines[0] += " (lengths in the coordinates of the tube)"
         lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
-    own = result.spec.effective.part("tube").get("rho_a")
-    asked = Fraction(str(own)) if result.overrides.rho_a is None and own else result.overrides.rho_a
+    own = result.spec.effective.tube.rho_a
+    asked = own if result.overrides.rho_a is None else result.overrides.rho_a
     if asked is not None and tube.rho_r is not None and tube.rho_a < asked:
         name = "tube.rho_a" if result.overrides.rho_a is None else "--rho-a"
         lines.append(
