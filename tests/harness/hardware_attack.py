@@ -63,6 +63,12 @@ ROWS = {
     ),
     "orbit as shipped": Row("hardware_orbit", ""),
     "three as shipped": Row("hardware_three", "", duration="6"),
+    "windows as shipped": Row("two_state_windows", "", duration="5"),
+    # a tube in coordinates of its own, two inputs
+    "pvtol as shipped": Row("hardware_pvtol", "", duration="2"),
+    "pvtol, uncertain mass": Row("hardware_pvtol_mass", "", duration="2"),
+    # B and W depend on the state
+    "turning": Row("state_dependent_input", "{sample_time: 1/500, noise: 1/10000}"),
     "curved": Row("three_state", "{sample_time: 1/200, delay: 0, noise: 1/10000}", duration="6"),
 }
 
