@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import tubecert as tc
-from tubecert.kinds.hardware import WindowData
+from tubecert.kinds.windows import WindowData
 from tubecert.report.figures_time import state_figures
 
 PLANT = """

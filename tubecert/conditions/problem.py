@@ -7,7 +7,7 @@ excluded).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
@@ -118,13 +118,32 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A window of theorems BW and CW, from `begin` to `end` in s, and every constant that is its own there.
+
+    They hold for t in [begin, end] and |x - x*| <= radius. `widths`: |x_i - x_i*| <= widths[i] d, by state;
+    `inputs`: the range of u*, by input.
+    """
+
+    begin: Fraction
+    end: Fraction
+    radius: Fraction
+    constants: BoundConstants
+    wind: WindConstants | None
+    residual: ResidualConstants | None
+    widths: Mapping[str, float]
+    inputs: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TubeProblem:
     """Constants that hold over O(rho), and everything else that the conditions need.
 
     `A_m` is None for `auto` (each certificate takes its best -g I). P = I throughout, Q = -(A_m + A_m').
     `smooth` is the boundary layer nu of a smooth projection, None for the hard one. `states` is n. `rho_r`
     may be any number with rho_r + rho_a <= rho. `filter_factor` is |sC|/omega: 2; the published gains need
-    the wrong value 1. Raises `TubecertError` TC501 if A_m + A_m' is not negative definite, `ValueError` for
+    the wrong value 1. `parts`: windows, where B and C are asked for levels in each.
+    Raises `TubecertError` TC501 if A_m + A_m' is not negative definite, `ValueError` for
     inconsistent radii.
     """
 
@@ -147,6 +166,7 @@ class TubeProblem:
     wind: Wind | None = None
     residual: ResidualConstants | None = None
     gain: GainConstants | None = None
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         if min(self.rate, self.rho_a, self.epsilon) <= 0:

@@ -2,7 +2,8 @@
 
 THEOREM C. If Y > phi + DB[du dbar + min((1+r_H) Dh, max(H1, S_T))], then dbar > max(d0, d1, sup D) with
 (d0, H0, S, e) := (d1, H1, S_T, 0) implies |x - x*| < rho over the horizon. The estimate is
-clipped to R_H >= Dh. Implements: theory section 4b.
+clipped to R_H >= Dh. Over a problem with parts a recipe has a level in each of them, and theorem CW takes the place of
+C. Implements: theory sections 4b and 4e.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.sampled_windows import InWindow, Loop, along
+from tubecert.conditions.stretches import LevelProof, cover, margin, numbers_of, widest_shares
 from tubecert.conditions.theorem import Theorem
 from tubecert.conditions.wind import is_felt, provisos, pushed, taken, turning
 from tubecert.enclosure.interval import Interval
@@ -41,13 +44,14 @@ from tubecert.enclosure.interval import Interval
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledRecipe:
-    """The proof of theorem C at printed gains: `speed` is Y."""
+    """The proof of theorem C at printed gains: `speed` is Y, with `windows` (theorem CW) the largest of them."""
 
     sample_time: Fraction
     bandwidth: Fraction
     predictor_gain: Fraction
     projection_radius: Fraction
     speed: Fraction
+    windows: tuple[LevelProof, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,6 +151,9 @@ def _bound(n: Numbers[T], omega: T, s: SampledState[T]) -> DistanceBound[T]:
 @quiet
 def margin_sampled_along(problem: TubeProblem, recipes: Sequence[SampledRecipe]) -> Interval:
     """Margins of many recipes at once, shape `(len(recipes),)`; recipes share the projection radius."""
+    if problem.parts or any(recipe.windows for recipe in recipes):
+        found = [_margin_in_windows(problem, recipe) for recipe in recipes]
+        return Interval(np.array([m.lo for m in found]), np.array([m.hi for m in found]))
     R_H = recipes[0].projection_radius
     serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H, clips=True)
     Ts, omega = vector([r.sample_time for r in recipes]), vector([r.bandwidth for r in recipes])
@@ -165,9 +172,48 @@ def _margin(
     return (1 - sampled_supremum(n, Ts, omega, age, Y) / reach(n)).sanitised()
 
 
+# -- theorem CW
+
+
+def course_of(problem: TubeProblem, recipe: SampledRecipe) -> tuple[InWindow[Interval], ...]:
+    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts."""
+    if not cover(problem, recipe):
+        raise ValueError("the windows of a recipe are those of its problem")
+    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
+    age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
+    return along(
+        [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts],
+        [Interval.of(part.end - part.begin) for part in problem.parts],
+        [Interval.of(own.speed) for own in recipe.windows],
+        Loop(Ts=Ts, omega=omega, m=age.m, w=age.w),
+    )
+
+
+def suprema_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> tuple[float, ...]:
+    """sup D in every window, by a recipe that is proven."""
+    return tuple(float(own.course.supremum.hi) for own in course_of(problem, recipe))
+
+
+@quiet
+def _margin_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
+    nothing = Interval(np.asarray(-np.inf), np.asarray(np.inf))
+    if not problem.radius_serves(recipe.projection_radius, clips=True) or not cover(problem, recipe):
+        return nothing
+    if any(part.end - part.begin <= 2 * recipe.sample_time for part in problem.parts):
+        return nothing
+    found = course_of(problem, recipe)
+    numbers = [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts]
+    return margin(numbers, recipe, [own.course for own in found])
+
+
 @quiet
 def sampled_ceiling(problem: TubeProblem, recipe: SampledRecipe) -> float:
-    """An upper bound of the margin that any Y can prove at the recipe's gains; <= 0 refutes these gains."""
+    """An upper bound of the margin that any Y can prove at the recipe's gains; <= 0 refutes these gains.
+
+    In windows nothing is refuted.
+    """
+    if problem.parts:
+        return float(np.inf)
     n = problem.enclosed(recipe.projection_radius)
     Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
     age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
@@ -175,8 +221,10 @@ def sampled_ceiling(problem: TubeProblem, recipe: SampledRecipe) -> float:
     return float(_margin(n, Ts, omega, age, Y).hi)
 
 
-def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float:
-    """|x - x*| is at most this in the long run, proven."""
+def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float | None:
+    """|x - x*| is at most this in the long run, proven; windows have an end."""
+    if recipe.windows:
+        return None
     n = problem.proven(recipe.projection_radius)
     Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
     s = sampled_state(n, Ts, ages(Ts, omega, Interval.of(recipe.predictor_gain)), Interval.of(recipe.speed))
@@ -185,6 +233,8 @@ def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float:
 
 def input_shares(problem: TubeProblem, recipe: SampledRecipe) -> InputShares | None:
     """|k| <= du max(d0, d1, sup D), |u_a| <= R_H."""
+    if recipe.windows:
+        return widest_shares(problem, suprema_in_windows(problem, recipe), recipe.projection_radius)
     n = problem.proven(recipe.projection_radius)
     Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
     age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
@@ -206,9 +256,11 @@ THEOREM = Theorem(
     margins=lambda problem, recipes: {"sampled": margin_sampled_along(problem, recipes)},
     ceilings=lambda problem, recipe: {"sampled": sampled_ceiling(problem, recipe)},
     formula=_at_once,
-    obstacles=obstacles,
+    # what fills the tube in the long run need not fill a window
+    obstacles=lambda problem: () if problem.parts else obstacles(problem),
     provisos=provisos,
     ultimate=ultimate_radius,
     inputs=input_shares,
     own_predictor=True,
+    parts=("windows",),
 )

@@ -68,7 +68,7 @@ class Theorem(Generic[R]):
     formula: Callable[[TubeProblem, Numbers[Array]], object]
     obstacles: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
-    ultimate: Callable[[TubeProblem, R], float] | None = None
+    ultimate: Callable[[TubeProblem, R], float | None] | None = None
     inputs: Callable[[TubeProblem, R], InputShares | None] | None = None
     own_predictor: bool = False
     sizes: tuple[str, ...] = ("speed", "prediction_error", "uncertainty")

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from tubecert.conditions import distance
 from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
@@ -22,6 +23,7 @@ from tubecert.kinds.data import (
     proven_data,
 )
 from tubecert.kinds.kind import Kind, Section
+from tubecert.kinds.windows import WindowData, bound_of, told, untold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +59,10 @@ class DistanceAround:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceData(SectionData):
-    """Certificate B: the pair of least bandwidth, of least adaptation rate, the one asked for, the curve."""
+    """Certificate B: the pair of least bandwidth, of least adaptation rate, the one asked for, the curve.
+
+    `windows`: what is proven in each, where the specification has them.
+    """
 
     name = DISTANCE
     split: DistancePair | None
@@ -65,6 +70,7 @@ class DistanceData(SectionData):
     asked: DistancePair | None
     curve: tuple[GainPoint, ...]
     margins_around: DistanceAround | None = None
+    windows: tuple[WindowData, ...] = ()
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """The pair asked for; or that of least rate, then that of least bandwidth."""
@@ -85,6 +91,11 @@ class DistanceSection(Section[DistanceRecipe]):
     """The pair of least bandwidth, the pair of least rate, the pair asked for (which then decides), the curve."""
 
     name = DISTANCE
+    windows: tuple[WindowData, ...] = ()
+
+    def input_bound(self, own: LimitedInput) -> InputBound | None:
+        """What an input with limits does in the loop, by the proof; in windows, in any of them."""
+        return bound_of(own, self.proof, self.windows)
 
     @property
     def split(self) -> Checked[DistanceRecipe] | None:
@@ -118,6 +129,7 @@ class DistanceSection(Section[DistanceRecipe]):
             ),
             shortfalls=missing_data(self.shortfalls),
             margins_around=None if not judgement.around_at else _around_data(judgement),
+            windows=self.windows,
         )
 
 
@@ -154,4 +166,10 @@ class Distance(Kind[DistanceRecipe]):
 
     def section(self, problem: TubeProblem, proposal: Proposal[DistanceRecipe]) -> DistanceSection:
         """The section about a proposal."""
-        return DistanceSection(judgement=judge(problem, self.theorem, proposal))
+        judgement = judge(problem, self.theorem, proposal)
+        proof = judgement.proof
+        windows = untold(problem)
+        if proof is not None and problem.parts:
+            suprema, recipe = distance.suprema_in_windows(problem, proof.recipe), proof.recipe
+            windows = told(problem, recipe.windows, suprema, recipe.projection_radius)
+        return DistanceSection(judgement=judgement, windows=windows)

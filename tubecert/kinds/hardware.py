@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 
-from tubecert.bounds.constants import Meaning
 from tubecert.conditions import hardware
 from tubecert.conditions.hardware import LEVEL, STAYS, Budget, HardwareRecipe, Told
 from tubecert.conditions.hardware.windows import over
@@ -20,6 +19,7 @@ from tubecert.kernel import Checked, judge
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import Pair, Role, SectionData, margin_data, missing_data
 from tubecert.kinds.kind import Kind, Section
+from tubecert.kinds.windows import WindowData, sharper, widest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,25 +28,6 @@ class HardwarePoint:
 
     sample_time: Fraction
     level: Fraction
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WindowData:
-    """A window of time from `begin` to `end`, in s: its level, and what follows there (theorem HW).
-
-    `tube` is the radius of the tube that its `constants` hold in, by name the safe side of each that is sharper than
-    over the whole tube; d(x*, x) <= `supremum` < `level`, `radius` bounds |x - x*|.
-    """
-
-    begin: Fraction
-    end: Fraction
-    tube: Fraction
-    level: Fraction | None
-    radius: float | None
-    supremum: float | None
-    half_widths: Mapping[str, float]
-    inputs: Mapping[str, tuple[float, float]]
-    constants: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +138,7 @@ class HardwareSection(Section[HardwareRecipe]):
             supremum=None if known is None else printable_above(known.supremum),
             half_widths={} if own is None else self._half_widths(own.level),
             inputs={} if recipe is None or known is None else self._range_of(recipe, known, window.inputs),
-            constants=own_constants(self.problem, window),
+            constants=sharper(self.problem, over(self.problem, window)),
         )
 
     def _half_widths(self, dhat: Fraction) -> Mapping[str, float]:
@@ -185,12 +166,7 @@ class HardwareSection(Section[HardwareRecipe]):
         """What every input does, in any window."""
         windows = zip(self.machine.windows, self.told_in_windows, strict=False)
         found = [self._range_of(recipe, own, window.inputs) for window, own in windows]
-        if not found:
-            return self._range_of(recipe, known, self.machine.inputs)
-        return {
-            name: (min(each[name][0] for each in found), max(each[name][1] for each in found))
-            for name in found[0]
-        }
+        return widest(found) if found else self._range_of(recipe, known, self.machine.inputs)
 
     def _range_of(
         self, recipe: HardwareRecipe, known: Told, ranges: Mapping[str, tuple[float, float]]
@@ -214,27 +190,6 @@ def _margin(found: Checked[HardwareRecipe] | None, condition: str) -> Constant |
 def _budget(known: Told) -> Budget:
     """The shares as they are printed."""
     return Budget(**{item.name: printable_above(getattr(known.budget, item.name)) for item in fields(Budget)})
-
-
-def own_constants(problem: TubeProblem, window: Window) -> Mapping[str, float]:
-    """The constants of a window that are sharper than those of the whole tube, by name, each on its safe side."""
-    whole, part = problem, over(problem, window)
-    found: dict[str, float] = {}
-    for name, value, meaning in _of(part):
-        old = next(each for known, each, _ in _of(whole) if known == name)
-        if meaning.side == "below" and value.below > old.below:
-            found[name] = value.below
-        elif meaning.side == "above" and value.above < old.above:
-            found[name] = value.above
-    return found
-
-
-def _of(problem: TubeProblem) -> list[tuple[str, Constant, Meaning]]:
-    """Every constant that theorem H may use, by its name in a certificate."""
-    machine = problem.machine
-    own = [] if machine is None else machine.constants.items()
-    bent = [] if machine is None or machine.covariant is None else machine.covariant.items()
-    return [*problem.constants.items(), *problem.beside(), *own, *bent]
 
 
 class Hardware(Kind[HardwareRecipe]):

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions import sampled
+from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal, SampledProposal
 from tubecert.conditions.sampled import SampledRecipe
@@ -15,6 +16,7 @@ from tubecert.kernel import Checked, judge
 from tubecert.kinds import SAMPLED
 from tubecert.kinds.data import Pair, Role, SectionData, margin_data, missing_data
 from tubecert.kinds.kind import Kind, Section
+from tubecert.kinds.windows import WindowData, bound_of, told, untold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +31,8 @@ class SamplePoint:
 class SampledData(SectionData):
     """Certificate C: the longest sample time, or the one asked for; the curve.
 
-    `sample_time_limit` is approached as the bandwidth grows, and never attained.
+    `sample_time_limit` is approached as the bandwidth grows, and never attained. `windows`: what is proven in each,
+    where the specification has them.
     """
 
     name = SAMPLED
@@ -40,6 +43,7 @@ class SampledData(SectionData):
     margin: Constant | None
     sample_time_limit: float | None
     curve: tuple[SamplePoint, ...]
+    windows: tuple[WindowData, ...] = ()
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """The one set of gains."""
@@ -64,6 +68,11 @@ class SampledSection(Section[SampledRecipe]):
     name = SAMPLED
 
     sample_time_limit: float | None
+    windows: tuple[WindowData, ...] = ()
+
+    def input_bound(self, own: LimitedInput) -> InputBound | None:
+        """What an input with limits does in the loop, by the proof; in windows, in any of them."""
+        return bound_of(own, self.proof, self.windows)
 
     @property
     def pair(self) -> Checked[SampledRecipe] | None:
@@ -90,6 +99,7 @@ class SampledSection(Section[SampledRecipe]):
             sample_time_limit=self.sample_time_limit,
             curve=tuple(SamplePoint(bandwidth=r.bandwidth, sample_time=r.sample_time) for r in self.curve),
             shortfalls=missing_data(self.shortfalls),
+            windows=self.windows,
         )
 
 
@@ -103,4 +113,10 @@ class Sampled(Kind[SampledRecipe]):
     def section(self, problem: TubeProblem, proposal: Proposal[SampledRecipe]) -> SampledSection:
         """The section about a proposal."""
         limit = proposal.limit if isinstance(proposal, SampledProposal) else None
-        return SampledSection(judgement=judge(problem, self.theorem, proposal), sample_time_limit=limit)
+        judgement = judge(problem, self.theorem, proposal)
+        proof = judgement.proof
+        windows = untold(problem)
+        if proof is not None and problem.parts:
+            suprema, recipe = sampled.suprema_in_windows(problem, proof.recipe), proof.recipe
+            windows = told(problem, recipe.windows, suprema, recipe.projection_radius)
+        return SampledSection(judgement=judgement, sample_time_limit=limit, windows=windows)

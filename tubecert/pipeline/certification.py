@@ -47,7 +47,7 @@ def answer(question: Question) -> Stage | Stopped:
         tube,
         enclosed,
         bound,
-        windowed,
+        _windowed,
         judge,
     )
     stage: Stage | Stopped = question
@@ -105,6 +105,10 @@ def judge(bounded: Bounded) -> Judged:
         tell_gains(bounded.question, recipe)
         proposals[recipe] = each.propose(problem, asked)
     return judge_all(bounded, rounded(bounded, proposals, asked))
+
+
+def _windowed(bounded: Bounded) -> Bounded:
+    return windowed(bounded, _asked(bounded.question))
 
 
 def explain(judged: Judged) -> Explanation:

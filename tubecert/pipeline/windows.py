@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from tubecert.search.along import narrowed
+from tubecert.conditions.problem import Formulas
+from tubecert.conditions.proposal import Asked
+from tubecert.kinds import DISTANCE, SAMPLED
+from tubecert.search.along import narrowed as narrowed_of_machine
+from tubecert.search.stretches import narrowed as narrowed_of_gains
 from tubecert.spec.windows import windows_of
 from tubecert.stages.bounded import Bounded
-from tubecert.stages.windows import with_windows
+from tubecert.stages.judged import deciding
+from tubecert.stages.windows import with_parts, with_windows
 
 _ROUGH = 0.2  # gap of constants that only radii are chosen by
 _ROUNDS = 4
 _PAYS = 0.9  # of the widest radius
 
 
-def windowed(bounded: Bounded) -> Bounded:
-    """With the windows of the specification, if it has any: each in a tube about as narrow as what is proven in it."""
-    count = len(windows_of(bounded.question.spec)) - 1
-    if bounded.machine is None or count < 1:
-        return bounded
+def _of_machine(bounded: Bounded, count: int) -> Bounded:
+    """The windows of certificate H, each in a tube about as narrow as what is proven in it."""
     tried: list[Sequence[Fraction]] = [[bounded.enclosed.tube.rho] * count]
     for _ in range(_ROUNDS):
         found = _narrowed(with_windows(bounded, tried[-1], gap=_ROUGH))
@@ -41,4 +43,38 @@ def _first_that_serves(bounded: Bounded, tried: Sequence[Sequence[Fraction]]) ->
 
 
 def _narrowed(bounded: Bounded) -> list[Fraction] | None:
-    return None if bounded.machine is None else narrowed(bounded.problem, bounded.machine)
+    return None if bounded.machine is None else narrowed_of_machine(bounded.problem, bounded.machine)
+
+
+def _of_gains(bounded: Bounded, asked: Asked, count: int) -> Bounded:
+    """The windows of certificates B and C.
+
+    Their gains are about the tube that was asked for, so constants are close from the start: in the narrower tubes the
+    same gains serve.
+    """
+    widest = with_parts(bounded, [bounded.enclosed.tube.rho] * count)
+    radii = narrowed_of_gains(widest.problem, asked)
+    if radii is None:
+        return widest
+    narrow = with_parts(bounded, radii)
+    return widest if narrowed_of_gains(narrow.problem, asked) is None else narrow
+
+
+def windowed(bounded: Bounded, asked: Asked) -> Bounded:
+    """With the windows of the specification, if it has any: those of H, and those of B and C.
+
+    Beside a machine B and C have them only where they decide.
+    """
+    count = len(windows_of(bounded.question.spec)) - 1
+    if count < 1:
+        return bounded
+    if bounded.machine is not None:
+        bounded = _of_machine(bounded, count)
+    return _of_gains(bounded, asked, count) if _has_parts(bounded) else bounded
+
+
+def _has_parts(bounded: Bounded) -> bool:
+    if bounded.problem.formulas is Formulas.AS_PRINTED or bounded.problem.gain is not None:
+        return False
+    decides = {DISTANCE.key, SAMPLED.key} & set(deciding(bounded.question))
+    return bounded.machine is None or bool(decides)

@@ -213,10 +213,10 @@ def _error(setting: Setting, gains: Gains, Y: Ball) -> Ball:
     gain = n.B_pinv_x * Y + n.B_pinv * (exact(gains.bandwidth) + p.shifted)
     if setting.still:
         return gain * prediction_error(n, R, s1, p.q) / root(rate)
-    return gain * _blown_prediction(setting, gains, R, s1) + setting.taken
+    return gain * blown_prediction(setting, gains, R, s1) + setting.taken
 
 
-def _blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
+def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
     """The bound of |xt| with a disturbance that enters it as zb (7.8).
 
     V = |xt|^2 + |s~|^2/Gamma has V' <= -q |xt|^2 + 2 zb |xt| + 2 (Dh + R) s1/Gamma, negative beyond the root r of

@@ -37,13 +37,19 @@ class _Sampled:
     d1: Ball
 
 
+def mean_age(gains: SampledGains) -> Ball:
+    """m of (4.6)."""
+    Ts, g = exact(gains.sample_time), exact(gains.predictor_gain)
+    return smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
+
+
 def _sampled(setting: Setting, gains: SampledGains, Y: Ball) -> _Sampled:
     """H1, S_T, d1 of (4.6)-(4.9) at one Y."""
     n, lam = setting.n, setting.rate
-    Ts, omega, g = exact(gains.sample_time), exact(gains.bandwidth), exact(gains.predictor_gain)
+    Ts, omega = exact(gains.sample_time), exact(gains.bandwidth)
     s1 = n.h_t + n.h_x * Y
     b = smaller(n.B_pinv * n.B_x, n.B_pinv_x * n.B) * n.h
-    m = smaller(1 / g - Ts / (g * Ts).expm1(), Ts / 2)
+    m = mean_age(gains)
     H1 = smaller(n.h, n.h_initial + s1 * Ts)
     S_T = s1 * Ts / (-(-omega * Ts).expm1()) + m * (s1 + b * Y)
     S_T = S_T + setting.taken + n.B_pinv_x * setting.beside * m * Y

@@ -12,13 +12,13 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.certificate.result import InputData, Result
-from tubecert.kinds import HARDWARE
 from tubecert.report import planned
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_tube import is_near, view
 from tubecert.report.machine import proven
 from tubecert.report.outline import widths
 from tubecert.report.page import Figure
+from tubecert.report.windows import deciding
 
 _HEIGHT = 190
 
@@ -106,9 +106,8 @@ def input_figures(result: Result) -> list[Figure]:
 def _state_band(
     result: Result, name: str, width: float, curve: Sequence[Point]
 ) -> tuple[list[Point], list[Point]]:
-    """The half-width around x*, window by window where the machine has windows."""
-    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
-    windows = () if machine is None else machine.windows
+    """The half-width around x*, window by window where what decides has windows."""
+    windows = deciding(result)
     if not windows or not all(name in window.half_widths for window in windows):
         return _around(curve, width, width)
     parts = [
@@ -139,7 +138,12 @@ def _around(curve: Sequence[Point], below: float, above: float) -> tuple[list[Po
 def _input_band(
     result: Result, name: str, own: InputData | None, curve: Sequence[Point]
 ) -> tuple[list[Point], list[Point]] | None:
-    """Around u* by what feedback and adaptation add at most; else the range that H proves whatever the time."""
+    """The range in each window; around u* by what feedback and adaptation add at most; else that of H at any time."""
+    if windows := [each for each in deciding(result) if name in each.inputs]:
+        ends = [(each, float(t)) for each in windows for t in (each.begin, each.end)]
+        return [(t, each.inputs[name][0]) for each, t in ends], [
+            (t, each.inputs[name][1]) for each, t in ends
+        ]
     found = [] if own is None else [own.bounds[key] for key in result.decided_by if key in own.bounds]
     if own is not None and found:
         below = own.plan.least.below - min(each.least for each in found)

@@ -13,7 +13,8 @@ from tubecert.certificate.result import Result
 from tubecert.conditions.hardware import Budget
 from tubecert.digits import down, exact, percent, up
 from tubecert.kinds import HARDWARE
-from tubecert.kinds.hardware import HardwareData, WindowData
+from tubecert.kinds.hardware import HardwareData
+from tubecert.report import windows
 from tubecert.verdict import Verdict
 from tubecert.words.machine import CAUSES
 
@@ -68,19 +69,14 @@ def _noise(result: Result, length: Fraction) -> str:
     return ", ".join(f"{name} {given[name]} {units.get(name, '')}".rstrip() for name in names)
 
 
-def half_widths(result: Result, own: HardwareData | WindowData) -> str:
+def half_widths(result: Result, own: HardwareData) -> str:
     """What H proves of every state."""
-    units = result.spec.effective.system.units
-    return ", ".join(f"{name} {up(w)} {units.get(name, '')}".rstrip() for name, w in own.half_widths.items())
+    return windows.half_widths(result, own.half_widths)
 
 
-def inputs(result: Result, own: HardwareData | WindowData) -> str:
+def inputs(result: Result, own: HardwareData) -> str:
     """What every input does in the loop, feedforward, feedback and adaptation together."""
-    units = result.spec.effective.system.units
-    return ", ".join(
-        f"{name} in [{down(low)}, {up(high)}] {units.get(name, '')}".rstrip()
-        for name, (low, high) in own.inputs.items()
-    )
+    return windows.inputs(result, own.inputs)
 
 
 def shares(budget: Budget) -> list[Share]:
@@ -100,7 +96,7 @@ def lines(result: Result) -> Iterator[str]:
     if own.level_margin is not None and own.level_margin.below is not None:
         used = 1 - own.level_margin.below
         yield f"proven tube: {half_widths(result, own)} ({percent(used)} of what the metric was bounded for)"
-    if (told := along(own)) is not None:
+    if (told := windows.along(own.windows)) is not None:
         yield told
     yield f"inputs: {inputs(result, own)}"
     yield f"filter: {bandwidth(own)}; the estimate is clipped to {clip(result, own)}"
@@ -110,25 +106,6 @@ def lines(result: Result) -> Iterator[str]:
         yield "what fills the tube: " + ", ".join(
             f"{each.cause} {percent(each.share)}" for each in shares(own.budget)
         )
-
-
-def along(own: HardwareData) -> str | None:
-    """How the tube is along the plan: its radius where it is widest and where it is narrowest; None for one window."""
-    known = [(w, w.radius) for w in own.windows if w.radius is not None]
-    if not known:
-        return None
-    (widest, most), (narrowest, least) = (pick(known, key=lambda item: item[1]) for pick in (max, min))
-    if len(known) == 1:
-        return f"one window: radius {up(most)}"
-    return (
-        f"{len(known)} windows: radius {up(most)} {between(widest)}, where the tube is widest; "
-        f"{up(least)} {between(narrowest)}"
-    )
-
-
-def between(window: WindowData) -> str:
-    """The time of a window: `from 0.5 to 1 s`."""
-    return f"from {down(window.begin)} to {up(window.end)} s"
 
 
 def start_share(result: Result, own: HardwareData) -> float | None:

@@ -39,6 +39,7 @@ from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
+from tubecert.report.windows import of_gains_blocks
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
@@ -235,6 +236,7 @@ def _tube(result: Result) -> Iterator[Block]:
         yield from _drawn(result)
     if figures := tuple(state_figures(result)):
         yield Figures(figures=figures)
+    yield from of_gains_blocks(result)
 
 
 def _drawn(result: Result) -> Iterator[Block]:

@@ -20,6 +20,7 @@ from tubecert.enclosure.constant import Witness
 from tubecert.kinds import ALONE, HARDWARE, SAMPLED
 from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
+from tubecert.report import windows
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
 from tubecert.report.machine import lines as machine_lines
@@ -215,7 +216,7 @@ def _tube(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(
             f"{name} {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
         )
-    lines += [*excursion(result), *clearances(result)]
+    lines += [*windows.lines(result), *excursion(result), *clearances(result)]
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
 

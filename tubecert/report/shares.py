@@ -60,6 +60,8 @@ def _of_kind(result: Result, key: str) -> list[Share]:
     section, recipe = result.sections[key], result.proof.of.get(key)
     if section.verdict is not Verdict.CERTIFIED or recipe is None:
         return []
+    if isinstance(recipe, (DistanceRecipe, SampledRecipe)) and recipe.windows:
+        return []  # what fills one window does not fill another
     if isinstance(section, HardwareData):
         return [] if section.budget is None else shares(section.budget)
     pair = section.decisive(asked=result.asked)

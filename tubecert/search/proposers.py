@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Final
 
@@ -25,6 +25,7 @@ from tubecert.search.machines import PARTS, easier, filled, halved
 from tubecert.search.rates import least_rates, propose_rates
 from tubecert.search.sampled import propose_sampled
 from tubecert.search.scan import serves
+from tubecert.search.stretches import propose_distance_in_parts, propose_sampled_in_parts
 
 LEAST, MACHINE, LARGEST = "least_adaptation", "machine", "largest"
 
@@ -56,6 +57,7 @@ class Proposer:
             return Explained(halved_parts=halved(problem, found, parts))
         if self.slopes is None:
             return Explained()
+        problem = replace(problem, parts=())  # what the rate depends on is told for the whole plan
         slopes = self.slopes(problem, at(LEAST))
         return Explained(slopes=slopes, halved=halving(problem, slopes, self._least))
 
@@ -88,10 +90,20 @@ def _propose_on_machine(problem: TubeProblem, asked: Asked) -> Proposal[Hardware
     return Proposal() if blocked else propose_in_windows(problem, machine)
 
 
+def _propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRecipe]:
+    """For the whole plan, or with levels in windows of it."""
+    return propose_distance_in_parts(problem, asked) if problem.parts else propose_distance(problem, asked)
+
+
+def _propose_sampled(problem: TubeProblem, asked: Asked) -> Proposal[SampledRecipe]:
+    """For the whole plan, or with levels in windows of it."""
+    return propose_sampled_in_parts(problem, asked) if problem.parts else propose_sampled(problem, asked)
+
+
 PROPOSERS: Final[Mapping[type, Proposer]] = {
     NoGains: Proposer(propose=lambda problem, asked: Proposal(decisive=NoGains(), role="feedback")),
     RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26, least=least_rates),
-    DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance, least=least_distance),
-    SampledRecipe: Proposer(propose=propose_sampled),
+    DistanceRecipe: Proposer(propose=_propose_distance, slopes=elasticities_distance, least=least_distance),
+    SampledRecipe: Proposer(propose=_propose_sampled),
     HardwareRecipe: Proposer(propose=_propose_on_machine, machine=True),
 }

@@ -6,7 +6,7 @@ Nothing is believed that the hash does not cover; nothing is proven here either 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Final
@@ -24,7 +24,10 @@ from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import SectionData
+from tubecert.kinds.distance import DistanceData
 from tubecert.kinds.hardware import HardwareData
+from tubecert.kinds.sampled import SampledData
+from tubecert.kinds.windows import WindowData
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
@@ -60,11 +63,21 @@ class Own:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Narrow:
+    """A window of B or C until `end` in s: d(x*, x) < level, |x - x*| < radius, and |x_i - x_i*| by state."""
+
+    end: float
+    level: float
+    radius: float
+    half_widths: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """What one kind of certificate states: whether it is certified, by which recipe, and the radius in the long run.
 
     `recipe` are the numbers that it proves its claim with, by their names in `proof`; `ranges` what is proven of
-    inputs that have limits.
+    inputs that have limits. `windows`: what certificates B and C prove in each, where they have any.
     """
 
     certified: bool
@@ -72,6 +85,7 @@ class Section:
     ultimate: float | None
     ranges: tuple[InputRange, ...] = ()
     own: Own | None = None
+    windows: tuple[Narrow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,7 +241,17 @@ def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Secti
         own=_own(result, found, recipe)
         if isinstance(found, HardwareData) and isinstance(recipe, HardwareRecipe)
         else None,
+        windows=tuple(_narrow(result, found.windows))
+        if isinstance(found, (DistanceData, SampledData))
+        else (),
     )
+
+
+def _narrow(result: Result, windows: Sequence[WindowData]) -> Iterator[Narrow]:
+    for each in windows:
+        if each.level is not None and each.radius is not None:
+            widths = tuple(each.half_widths[name] for name in result.spec.effective.system.states)
+            yield Narrow(end=float(each.end), level=float(each.level), radius=each.radius, half_widths=widths)
 
 
 def _own(result: Result, found: HardwareData, recipe: HardwareRecipe) -> Own | None:

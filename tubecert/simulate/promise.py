@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -52,7 +52,7 @@ class Decay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """The levels of theorem HW: d(x*, x) is below the one of each window, at its ends too."""
+    """The levels of theorems HW, BW and CW: d(x*, x) is below the one of each window, at its ends too."""
 
     ends: tuple[float, ...]
     levels: tuple[float, ...]
@@ -125,15 +125,36 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
     error = kind.prediction_error(certified, recipe)
     if error is not None:
         bounds["xtilde"] = error
-    return Promise(
+    whole = Promise(
         title=str(kind.name),
         rho=certified.rho,
         reach=certified.reach,
         half_widths=certified.half_widths,
         bounds=bounds,
         ultimate=section.ultimate,
-        decay=kind.decay(certified, recipe),
+        decay=None if section.windows else kind.decay(certified, recipe),
         ranges=section.ranges,
+    )
+    return _in_windows(certified, section, whole) if section.windows else whole
+
+
+def _in_windows(certified: Certified, section: Section, whole: Promise) -> Promise:
+    """Theorems BW and CW: the widest of the windows, their levels, and |x'| <= Y."""
+    own = section.windows
+    most = max(each.level for each in own)
+    k = certified["feedback_gain"] * most
+    narrower = {
+        "distance": most,
+        "deviation": max(each.radius for each in own),
+        "k": k,
+        "u": certified["u_star"] + k + section.recipe["projection_radius"],
+        "speed": section.recipe["speed"],
+    }
+    return replace(
+        whole,
+        half_widths=tuple(map(max, zip(*(each.half_widths for each in own), strict=True))),
+        bounds={**whole.bounds, **narrower},
+        decay=Levels(ends=tuple(each.end for each in own), levels=tuple(each.level for each in own)),
     )
 
 

@@ -21,7 +21,7 @@ from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.machine import Machine
-from tubecert.conditions.problem import Drift, Formulas, TubeProblem, Wind
+from tubecert.conditions.problem import Drift, Formulas, Part, TubeProblem, Wind
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.constant import Constant, printable_above
@@ -100,6 +100,7 @@ class Bounded:
     """What every kind needs is bounded, and what was declared holds.
 
     `half_widths`: |x_i - x_i*| is below, per state. `geodesics`: whether minimising geodesics are proven unique.
+    `parts`: windows, where certificates B and C are asked for levels in each; those of H are the machine's.
     """
 
     enclosed: Enclosed
@@ -108,6 +109,7 @@ class Bounded:
     clearances: tuple[Cleared, ...] = ()
     machine: Machine | None = None
     inputs: tuple[LimitedInput, ...] = ()
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         if _endless(self.enclosed) is not None:
@@ -121,7 +123,7 @@ class Bounded:
     @property
     def problem(self) -> TubeProblem:
         """What the theorems are asked about, with the machine if there is one."""
-        return replace(self.enclosed.problem, machine=self.machine)
+        return replace(self.enclosed.problem, machine=self.machine, parts=self.parts)
 
 
 def enclose(tube: TubeFound, gaps: Mapping[str, Fraction] | None = None) -> Enclosed:

@@ -1,4 +1,4 @@
-"""Windows of time, each with a tube around its part of the plan and the constants of theorem HW over it.
+"""Windows of time, each with a tube around its part of the plan and the constants of theorems HW, BW and CW over it.
 
 In: what is bounded over the whole tube; radii that a search proposes. Out: the same with windows. Trusted: yes.
 """
@@ -10,14 +10,16 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
-from tubecert.bounds.constants import BoundConstants
+from tubecert.bounds.constants import BoundConstants, ResidualConstants, WindConstants
 from tubecert.bounds.covariant import CovariantConstants, covariant_constants
 from tubecert.bounds.hardware import hardware_constants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.bounds.windows import less, part_constants
 from tubecert.conditions.machine import Machine, Window
+from tubecert.conditions.problem import Part
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import printable_above
 from tubecert.expression import number_text
 from tubecert.spec.windows import pad_of, windows_of
 from tubecert.stages.bounded import Bounded, any_such
@@ -33,13 +35,88 @@ def with_windows(bounded: Bounded, radii: Sequence[Fraction], gap: float | None 
     machine, ends = bounded.machine, windows_of(bounded.question.spec)
     if machine is None or not ends:
         return bounded
-    parts = list(pairwise(ends))
+    parts, effort = _tubes(bounded, radii), _effort(bounded, gap)
+    found = [_window(bounded, machine, part, rho, effort) for part, rho in parts]
+    return replace(bounded, machine=replace(machine, windows=tuple(found)))
+
+
+def with_parts(bounded: Bounded, radii: Sequence[Fraction], gap: float | None = None) -> Bounded:
+    """Theorems BW and CW are asked for, in the same way."""
+    if not windows_of(bounded.question.spec):
+        return bounded
+    effort = _effort(bounded, gap)
+    found = [_part(bounded, part, rho, effort) for part, rho in _tubes(bounded, radii)]
+    return replace(bounded, parts=tuple(found))
+
+
+def _tubes(bounded: Bounded, radii: Sequence[Fraction]) -> list[tuple[tuple[Fraction, Fraction], Fraction]]:
+    """Begin and end of every window, with its radius."""
+    parts = list(pairwise(windows_of(bounded.question.spec)))
     if len(radii) != len(parts) or not all(0 < rho <= bounded.enclosed.tube.rho for rho in radii):
         raise ValueError("a radius for every window, within the tube")
+    return list(zip(parts, radii, strict=True))
+
+
+def _effort(bounded: Bounded, gap: float | None) -> Effort:
     effort = bounded.enclosed.suprema.effort
-    effort = effort if gap is None else replace(effort, gap=max(effort.gap, gap))
-    found = [_window(bounded, machine, part, rho, effort) for part, rho in zip(parts, radii, strict=True)]
-    return replace(bounded, machine=replace(machine, windows=tuple(found)))
+    return effort if gap is None else replace(effort, gap=max(effort.gap, gap))
+
+
+def _suprema(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort) -> Suprema:
+    """Over a part of the plan."""
+    enclosed = bounded.enclosed
+    return replace(
+        enclosed.suprema,
+        plan=during(enclosed.tube.plan, *part),
+        time=None if enclosed.suprema.time is None else part,
+        effort=effort,
+        gaps={},
+    ).with_radius(radius)
+
+
+def _part(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort) -> Part:
+    ground = {
+        "part": [number_text(t) for t in part],
+        "radius": number_text(radius),
+        "closeness": str(effort.gap),
+    }
+    return bounded.question.memory.recall(
+        "part",
+        bounded.enclosed.tube.ground | ground,
+        lambda: _known(bounded, part, radius, _suprema(bounded, part, radius, effort)),
+    )
+
+
+def _known(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, suprema: Suprema) -> Part:
+    """Every constant of theorems B and C over a part of the plan."""
+    question, problem = bounded.question, bounded.enclosed.problem
+    constants = part_constants(suprema, question.start, problem.constants, question.declared_uncertainty)
+    wind, residual = _beside(bounded, suprema, constants)
+    return Part(
+        begin=part[0],
+        end=part[1],
+        radius=radius,
+        constants=constants,
+        wind=wind,
+        residual=residual,
+        widths={
+            name: printable_above(width.above)
+            for name, width in zip(question.spec.states, suprema.half_widths(), strict=True)
+        },
+        inputs=ranges_of(question.spec, constants, suprema),
+    )
+
+
+def _beside(
+    bounded: Bounded, suprema: Suprema, constants: BoundConstants
+) -> tuple[WindConstants | None, ResidualConstants | None]:
+    """What a wind and unknown parameters do over a part, where they do anything over the whole."""
+    problem = bounded.enclosed.problem
+    wind, residual = wind_constants(suprema, constants.metric_input_gain), residual_constants(suprema)
+    return (
+        None if wind is None or problem.wind is None else less(problem.wind.constants, wind),
+        None if residual is None or problem.residual is None else less(problem.residual, residual),
+    )
 
 
 def _window(
@@ -70,18 +147,11 @@ def _bounded(
     bounded: Bounded, machine: Machine, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort
 ) -> Window:
     """Every constant over a part of the plan."""
-    enclosed, problem = bounded.enclosed, bounded.enclosed.problem
-    question, since = bounded.question, part[0]
-    suprema = replace(
-        enclosed.suprema,
-        plan=during(enclosed.tube.plan, *part),
-        time=None if enclosed.suprema.time is None else part,
-        effort=effort,
-        gaps={},
-    ).with_radius(radius)
+    question, problem, since = bounded.question, bounded.enclosed.problem, part[0]
+    suprema = _suprema(bounded, part, radius, effort)
     constants = part_constants(suprema, question.start, problem.constants, question.declared_uncertainty)
     own = hardware_constants(suprema, any_such(machine.asked), bounded.geodesics, constants)
-    wind, residual = wind_constants(suprema, constants.metric_input_gain), residual_constants(suprema)
+    wind, residual = _beside(bounded, suprema, constants)
     return Window(
         begin=since,
         end=part[1],
@@ -90,8 +160,8 @@ def _bounded(
         constants=constants,
         machine=less(machine.constants, own),
         covariant=_covariant(machine, suprema, constants),
-        wind=None if wind is None or problem.wind is None else less(problem.wind.constants, wind),
-        residual=None if residual is None or problem.residual is None else less(problem.residual, residual),
+        wind=wind,
+        residual=residual,
         inputs=ranges_of(question.spec, constants, suprema),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
@@ -16,8 +16,12 @@ from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold, told
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
+from tubecert.recheck.kinds.parts import Level, Parts, ranges, read_levels
+from tubecert.recheck.kinds.windows import WindowSection, read_windows
+from tubecert.recheck.legs import of_samples
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.sampling import SampledGains, sampled_margin
+from tubecert.recheck.specified.numbers import Range
 
 GAINS = ("sample_time", "bandwidth", "predictor_gain", "projection_radius")
 
@@ -30,14 +34,16 @@ class SampledSection(Section):
     margin: Enclosure | None
     ultimate_radius: Fraction | None
     curve: tuple[tuple[Fraction, Fraction], ...]
+    windows: tuple[WindowSection, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class SampledRecipe:
-    """Y of theorem C at its gains."""
+    """Y of theorem C at its gains; with `windows` the largest of them."""
 
     gains: SampledGains
     speed: Fraction
+    windows: tuple[Level, ...] = ()
 
 
 class Sampled(Kind[SampledSection, SampledRecipe]):
@@ -54,8 +60,8 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
 
     def read_recipe(self, node: Node) -> SampledRecipe:
         """Gains and Y."""
-        own = node.closed(*GAINS, "speed")
-        return SampledRecipe(_gains(own), own["speed"].decimal())
+        own = node.closed(*GAINS, "speed", optional=("windows",))
+        return SampledRecipe(_gains(own), own["speed"].decimal(), own.get("windows", read_levels) or ())
 
     def asked(self, section: SampledSection, given: Asked) -> Statements:
         """The bandwidth is the one asked for."""
@@ -69,9 +75,15 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
         margins = {self.key: section.margin.below}
         return {"margins": margins, "predictor_gain": section.pair.predictor_gain}
 
-    def shares(self, section: SampledSection, recipe: SampledRecipe, ground: Ground) -> Shares:
+    def ranges(self, section: SampledSection) -> Mapping[str, Range] | None:
+        """Those of the windows, if there are any."""
+        return ranges(section.windows)
+
+    def shares(self, section: SampledSection, recipe: SampledRecipe, ground: Ground) -> Shares | None:
         """The feedback acts within max(d0, d1, sup D) of theorem C."""
-        del section
+        if section.windows:
+            most = _parts(section, recipe, ground).feedback()
+            return None if most is None else Shares(most, recipe.gains.projection_radius)
         setting = ground.setting
         margin, _ = sampled_margin(setting, recipe.gains, exact(recipe.speed))
         feedback = setting.n.feedback_gain * (1 - margin) * setting.reach
@@ -82,6 +94,9 @@ class Sampled(Kind[SampledSection, SampledRecipe]):
     ) -> Iterator[Claim]:
         """The gains with their margin and radius, the curve."""
         setting, pair, curve = ground.setting, section.pair, section.curve
+        if section.windows or (recipe is not None and recipe.windows):
+            yield from _in_windows(section, recipe, ground)
+            return
         if section.verdict == "certified" and pair is not None:
             words = f"omega = {float(pair.bandwidth):.6g}, Ts = {float(pair.sample_time):.6g}"
             yield ground.claim(
@@ -105,7 +120,7 @@ def _gains(own: Members) -> SampledGains:
 
 def _section(node: Node) -> SampledSection:
     keys = ("verdict", "margin", "ultimate_radius", "sample_time_limit", "curve", "shortfalls")
-    own = node.closed(*GAINS, *keys)
+    own = node.closed(*GAINS, *keys, optional=("windows",))
     own.known("sample_time_limit", Node.number)
     verdict = own["verdict"].word(*VERDICTS)
     present = [own[key].value is not None for key in (*GAINS, "margin")]
@@ -117,6 +132,9 @@ def _section(node: Node) -> SampledSection:
         curve.append((point["bandwidth"].decimal(), point["sample_time"].decimal()))
     if curve and not all(present):
         raise node.refused("has a curve and no gains")
+    windows = own.get("windows", read_windows) or ()
+    if windows and (curve or own["ultimate_radius"].value is not None):
+        raise node.refused("has a curve or a radius in the long run beside windows")
     return SampledSection(
         verdict=verdict,
         pair=_gains(own) if all(present) else None,
@@ -124,10 +142,42 @@ def _section(node: Node) -> SampledSection:
         ultimate_radius=own.known("ultimate_radius", Node.number),
         curve=tuple(curve),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
+        windows=windows,
     )
 
 
 # -- claims
+
+
+def _parts(section: SampledSection, recipe: SampledRecipe, ground: Ground) -> Parts:
+    return Parts(
+        windows=section.windows,
+        ground=ground,
+        letter="C",
+        levels=recipe.windows,
+        speed=recipe.speed,
+        radius=recipe.gains.projection_radius,
+        theorem=lambda stays: of_samples(stays, recipe.gains),
+    )
+
+
+def _in_windows(section: SampledSection, recipe: SampledRecipe | None, ground: Ground) -> Iterator[Claim]:
+    """Theorem CW in place of theorem C."""
+    if section.verdict != "certified":
+        silent = not any(window.proves for window in section.windows)
+        yield ground.claim(
+            "C: what is told of it",
+            (section,),
+            lambda: (
+                _told(section, ground) if silent else stated(False, "windows tell of what is not certified")
+            ),
+        )
+        return
+    if recipe is None or recipe.gains != section.pair or not section.windows:
+        told_wrongly = stated(False, "its windows have no recipe, or one for other gains")
+        yield ground.claim("C: it has a recipe", (section, recipe), lambda: told_wrongly)
+        return
+    yield from _parts(section, recipe, ground).claims(section.margin, (recipe, section.pair))
 
 
 def _holds(

@@ -103,17 +103,16 @@ def _stretch(node: Node) -> Stretch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
-    """The windows of a certificate, on the ground of its claims, with the `promise` and the `clip` of its machine."""
+class Windows:
+    """The windows of a section, on the ground of its claims; `letter` is that of the certificate."""
 
     windows: tuple[WindowSection, ...]
     ground: Ground
-    promise: Promise
-    clip: tuple[Range, ...]
+    letter: str = "H"
 
     def pad(self) -> Fraction:
-        """How far a window looks back."""
-        return pad_of(self.ground.asked)
+        """How far constants of a window hold before it."""
+        return Fraction(0)
 
     def place(self, window: WindowSection) -> Place:
         """The tube of a window, from its pad on."""
@@ -128,23 +127,6 @@ class Course:
             return window.constants[name]
         whole = self.ground.constants[name]
         return whole.below if name == "lower" else whole.above
-
-    def passed(self, recipe: Digital) -> tuple[Passed, ...] | None:
-        """Theorem HW by a recipe."""
-        if not recipe.windows or len(recipe.windows) != len(self.windows):
-            return None
-        pairs = zip(self.windows, recipe.windows, strict=True)
-        return along([self._stage(window, own, recipe) for window, own in pairs], self.promise)
-
-    def _stage(self, window: WindowSection, own: Stretch, recipe: Digital) -> Window:
-        ground = self.ground
-        assert ground.machine is not None
-        return Window(
-            setting=self.setting(window),
-            machine=self._machine(window, ground.machine),
-            at=own.of(recipe),
-            length=window.end - window.begin,
-        )
 
     def _ball(self, window: WindowSection, name: str) -> Ball:
         found = self.known(window, name)
@@ -166,6 +148,35 @@ class Course:
             push, size, explained = (self._ball(window, name) for name in disturbed.CONSTANTS)
             wind = replace(wind, push=push, size=size, explained=explained)
         return replace(whole, n=replace(whole.n, **own), rho=window.tube, wind=wind, rest=rest)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course(Windows):
+    """The windows of certificate H, with the `promise` and the `clip` of its machine."""
+
+    promise: Promise
+    clip: tuple[Range, ...]
+
+    def pad(self) -> Fraction:
+        """How far a window looks back."""
+        return pad_of(self.ground.asked)
+
+    def passed(self, recipe: Digital) -> tuple[Passed, ...] | None:
+        """Theorem HW by a recipe."""
+        if not recipe.windows or len(recipe.windows) != len(self.windows):
+            return None
+        pairs = zip(self.windows, recipe.windows, strict=True)
+        return along([self._stage(window, own, recipe) for window, own in pairs], self.promise)
+
+    def _stage(self, window: WindowSection, own: Stretch, recipe: Digital) -> Window:
+        ground = self.ground
+        assert ground.machine is not None
+        return Window(
+            setting=self.setting(window),
+            machine=self._machine(window, ground.machine),
+            at=own.of(recipe),
+            length=window.end - window.begin,
+        )
 
     def _machine(self, window: WindowSection, whole: MachineNumbers) -> MachineNumbers:
         own = {
@@ -191,13 +202,16 @@ def pad_of(asked: Hardware) -> Fraction:
 # -- claims
 
 
-def claims_of_constants(course: Course) -> Iterator[Claim]:
+def claims_of_constants(course: Windows) -> Iterator[Claim]:
     """The windows are those of the specification, and what each states of a constant."""
     ground, windows = course.ground, course.windows
-    yield ground.claim("H: windows follow one another", (windows,), lambda: _follow(course))
+    yield ground.claim(
+        f"{course.letter}: windows follow one another", (windows, course.pad()), lambda: _follow(course)
+    )
     if not _follow(course).holds:
         return
-    noise = ground.asked.noise if isinstance(ground.asked.noise, tuple) else None
+    machine = ground.specification.hardware
+    noise = machine.noise if machine is not None and isinstance(machine.noise, tuple) else None
     for j, window in enumerate(windows, start=1):
         place = course.place(window)
 
@@ -207,7 +221,7 @@ def claims_of_constants(course: Course) -> Iterator[Claim]:
         rest = tuple(known(name) for name in ("B", "upper", "B_pinv", "f_x", "metric_input_gain"))
         for name, limit in window.constants.items():
             yield ground.over_tube(
-                f"H: window {j}: {name} {'>=' if name == 'lower' else '<='} {float(limit):.6g}",
+                f"{course.letter}: window {j}: {name} {'>=' if name == 'lower' else '<='} {float(limit):.6g}",
                 (window.begin, window.end, window.tube, course.pad(), name, limit, rest),
                 lambda place=place, name=name, limit=limit, known=known: bounded(  # type: ignore[misc]
                     place, name, limit, noise, known
@@ -215,7 +229,7 @@ def claims_of_constants(course: Course) -> Iterator[Claim]:
             )
 
 
-def _follow(course: Course) -> Outcome:
+def _follow(course: Windows) -> Outcome:
     ground, windows = course.ground, course.windows
     times = ground.specification.windows
     steps = list(pairwise(times))
@@ -247,7 +261,7 @@ def claims_of_levels(
         lambda: _hold(course, recipe, margins),
     )
     for j, window in enumerate(windows, start=1):
-        yield from _states(course, j, window)
+        yield from claims_of_states(course, j, window)
         yield from _inputs(course, j, recipe)
 
 
@@ -283,11 +297,12 @@ def _hold(course: Course, recipe: Digital, margins: Callable[..., Outcome]) -> O
     return all_of(outcomes)
 
 
-def _states(course: Course, j: int, window: WindowSection) -> Iterator[Claim]:
+def claims_of_states(course: Windows, j: int, window: WindowSection) -> Iterator[Claim]:
+    """The half-widths of a window, by its level."""
     ground = course.ground
     states = ground.place.system.states
     yield ground.claim(
-        f"H: window {j}: every state has a half-width",
+        f"{course.letter}: window {j}: every state has a half-width",
         (window,),
         lambda: stated(window.half_widths.keys() == set(states), "they are of others"),
     )
@@ -296,7 +311,7 @@ def _states(course: Course, j: int, window: WindowSection) -> Iterator[Claim]:
         width = window.half_widths.get(name)
         if width is not None and window.level is not None:
             yield ground.over_tube(
-                f"H: window {j}: half-width of {name} <= {float(width):.6g}",
+                f"{course.letter}: window {j}: half-width of {name} <= {float(width):.6g}",
                 (window, lower),
                 lambda i=i, width=width, level=window.level: _within(  # type: ignore[misc]
                     course.place(window), i, width, level, lower

@@ -17,11 +17,11 @@ _MOST = 200
 def read_windows(
     node: Node, trajectory: Trajectory, machine: Hardware | None, wind: Disturbance | None
 ) -> Numbers:
-    """The times 0 = T_0 < ... < T_J, the horizon, in s; of a machine and a disturbance that are given."""
-    if machine is None:
-        raise node.refused("is there without a machine")
-    searched = machine.delay is None and not machine.one_sample
-    if searched or None in (machine.sample_time, machine.noise) or (wind is not None and wind.bound is None):
+    """The times 0 = T_0 < ... < T_J, the horizon, in s; of a machine and a disturbance that are given, if any."""
+    searched = machine is not None and (
+        (machine.delay is None and not machine.one_sample) or None in (machine.sample_time, machine.noise)
+    )
+    if searched or (wind is not None and wind.bound is None):
         raise node.refused("is there beside a number that is searched for")
     horizon = trajectory.horizon
     if horizon is None or isinstance(trajectory, AnyPlan):
