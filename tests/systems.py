@@ -151,6 +151,16 @@ IN_WINDOWS = (
     + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
 )
 
+# without a machine: windows of certificates B and C, in a wind, with limits
+GAINS_IN_WINDOWS = (
+    IN_WINDOWS.split("hardware:", maxsplit=1)[0]
+    .replace("at: [0.35, -0.3]", "at: [0.31, -0.3]")
+    .replace("0.1*sin(t) + 0.05*x", "0.6*sin(3*t) + 0.3*x*(1 + y)")
+    .replace("adaptation: {A_m: -10}\n", "")
+    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\nlimits: {u: [-3, 3]}\n'
+    + "conditions: {decides: B}\n"
+)
+
 # the smallest machine: a line that is known well, at 200 Hz
 SCALAR = """
 tubecert: 1

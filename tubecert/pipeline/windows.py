@@ -8,8 +8,8 @@ from fractions import Fraction
 from tubecert.conditions.problem import Formulas
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import DISTANCE, SAMPLED
-from tubecert.search.along import narrowed as narrowed_of_machine
-from tubecert.search.stretches import narrowed as narrowed_of_gains
+from tubecert.search.along import narrowed
+from tubecert.search.stretches import gains_found, radii_for, serve_still
 from tubecert.spec.windows import windows_of
 from tubecert.stages.bounded import Bounded
 from tubecert.stages.judged import deciding
@@ -43,7 +43,7 @@ def _first_that_serves(bounded: Bounded, tried: Sequence[Sequence[Fraction]]) ->
 
 
 def _narrowed(bounded: Bounded) -> list[Fraction] | None:
-    return None if bounded.machine is None else narrowed_of_machine(bounded.problem, bounded.machine)
+    return None if bounded.machine is None else narrowed(bounded.problem, bounded.machine)
 
 
 def _of_gains(bounded: Bounded, asked: Asked, count: int) -> Bounded:
@@ -53,11 +53,11 @@ def _of_gains(bounded: Bounded, asked: Asked, count: int) -> Bounded:
     same gains serve.
     """
     widest = with_parts(bounded, [bounded.enclosed.tube.rho] * count)
-    radii = narrowed_of_gains(widest.problem, asked)
-    if radii is None:
+    gains = gains_found(widest.problem, asked)
+    if not gains:
         return widest
-    narrow = with_parts(bounded, radii)
-    return widest if narrowed_of_gains(narrow.problem, asked) is None else narrow
+    narrow = with_parts(bounded, radii_for(widest.problem, gains))
+    return narrow if serve_still(narrow.problem, gains) else widest
 
 
 def windowed(bounded: Bounded, asked: Asked) -> Bounded:

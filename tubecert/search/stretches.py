@@ -274,14 +274,27 @@ def propose_sampled_in_parts(problem: TubeProblem, asked: Asked) -> Proposal[Sam
     return Proposal()
 
 
-def narrowed(problem: TubeProblem, asked: Asked) -> list[Fraction] | None:
-    """Radii that the constants might be bounded for anew: what the least levels need; None where nothing serves."""
-    found = [
-        PartSearch(problem, recipe.projection_radius).radii(recipe)
-        for recipe in (
-            propose_distance_in_parts(problem, asked).decisive,
-            propose_sampled_in_parts(problem, asked).decisive,
-        )
-        if recipe is not None
-    ]
-    return [max(each) for each in zip(*found, strict=True)] if found else None
+def gains_found(problem: TubeProblem, asked: Asked) -> list[DistanceRecipe | SampledRecipe]:
+    """What would be proposed."""
+    found = (propose_distance_in_parts(problem, asked), propose_sampled_in_parts(problem, asked))
+    return [each.decisive for each in found if each.decisive is not None]
+
+
+def radii_for(problem: TubeProblem, recipes: Sequence[DistanceRecipe | SampledRecipe]) -> list[Fraction]:
+    """Radii that the constants might be bounded for anew: what the least levels need."""
+    found = [PartSearch(problem, recipe.projection_radius).radii(recipe) for recipe in recipes]
+    return [max(each) for each in zip(*found, strict=True)]
+
+
+def serve_still(problem: TubeProblem, recipes: Sequence[DistanceRecipe | SampledRecipe]) -> bool:
+    """Whether the gains that were found for other constants have levels here."""
+    return all(_levels_at(problem, recipe) is not None for recipe in recipes)
+
+
+def _levels_at(
+    problem: TubeProblem, recipe: DistanceRecipe | SampledRecipe
+) -> DistanceRecipe | SampledRecipe | None:
+    search = PartSearch(problem, recipe.projection_radius)
+    if isinstance(recipe, SampledRecipe):
+        return search.sampled_recipe(recipe.sample_time, recipe.bandwidth)
+    return search.distance_recipe(recipe.bandwidth, recipe.adaptation_rate)
