@@ -24,7 +24,7 @@ formula or rounding in the producer must not pass both.
 | `turning`, `relative`, `noise`, `clipping` | its parts |
 | `named` | any constant by its name, for a part of the plan |
 | `filtering`, `predictor`, `conditions`, `sampling`, `digital` | the theorems A, B, C and H at printed numbers |
-| `along` | theorem HW: H in windows of the plan |
+| `along`, `legs` | theorem HW: H in windows of the plan; theorems BW and CW: B and C |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |

@@ -135,19 +135,15 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
         decay=None if section.windows else kind.decay(certified, recipe),
         ranges=section.ranges,
     )
-    return _in_windows(certified, section, whole) if section.windows else whole
+    return _in_windows(section, whole) if section.windows else whole
 
 
-def _in_windows(certified: Certified, section: Section, whole: Promise) -> Promise:
+def _in_windows(section: Section, whole: Promise) -> Promise:
     """Theorems BW and CW: the widest of the windows, their levels, and |x'| <= Y."""
     own = section.windows
-    most = max(each.level for each in own)
-    k = certified["feedback_gain"] * most
     narrower = {
-        "distance": most,
+        "distance": max(each.level for each in own),
         "deviation": max(each.radius for each in own),
-        "k": k,
-        "u": certified["u_star"] + k + section.recipe["projection_radius"],
         "speed": section.recipe["speed"],
     }
     return replace(
