@@ -79,7 +79,7 @@ def check_windows(
             f"{at.path} beside a number that is to be largest",
             "give the number, or leave the windows out: each candidate would need windows of its own",
         )
-    elif machine.arithmetic is not None:
+    elif machine is not None and machine.arithmetic is not None:
         at.fail(
             codes.RANGE,
             f"{at.path} beside hardware.arithmetic: rounding is covered in one window only",
