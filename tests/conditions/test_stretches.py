@@ -48,7 +48,7 @@ def distances(xi, dt):
 @pytest.mark.parametrize("rates", [(40.0, 0.5, 20.0), (0.5, 40.0, 0.5)])
 def test_no_loop_of_b_that_is_played_is_beyond_its_windows(rates, turning):
     """Estimator and filter with an h whose rate is that of the window, against xi and D."""
-    omega, g, Gamma, ends, dt = 30.0, 20.0, 4000.0, np.array([0.2, 0.5, 0.8]), 4e-5
+    omega, g, Gamma, ends, dt = 30.0, 20.0, 4000.0, np.array([0.2, 0.5, 0.8]), 4f-5
     most, R = 1.0, 1.0
     t = np.arange(int(ends[-1] / dt)) * dt
     window = np.searchsorted(ends, t, side="right")
@@ -139,7 +139,7 @@ def played(seed: int, monkeypatch, per_sample: int = 200):
 
 @pytest.mark.slow
 def test_no_loop_of_c_that_is_played_is_beyond_its_windows(monkeypatch):
-    """The bound of xi is met at every time; without what a steeper saw-tooth adds it is none (theory 4e)."""
+    """The bound of xi is met at every time; without what a steeper saw-tooth adds it is none (theory 4f)."""
     shares = [played(seed, monkeypatch) for seed in range(15)]
     assert 0.999 < max(shares) <= 1 + 2e-3  # of the step
     monkeypatch.setattr(sampled_windows, "decay_mean", np.ones_like)

@@ -5,7 +5,7 @@ Deta(omega, g, Y)/sqrt(Gamma), then dbar = sqrt(a) rho > sup D implies |x - x*| 
 proof is a recipe, a tuple of decimals for which these inequalities are verified; a recipe that fails
 refutes nothing but itself. What refutes gains is `distance_ceiling`: every Y that serves is at least the
 least fixed point, whatever the constants are within their enclosures. Over a problem with parts a recipe has
-a level in each of them, and theorem BW takes the place of B. Implements: theory sections 4 and 4e.
+a level in each of them, and theorem BW takes the place of B. Implements: theory sections 4 and 4f.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Theorem BW: certificate B window by window. Trusted. Implements: theory section 4e, (4.15), (4.16), (4.18)."""
+"""Theorem BW: certificate B window by window. Trusted. Implements: theory section 4f, (4.15), (4.16), (4.18)."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 THEOREM C. If Y > phi + DB[du dbar + min((1+r_H) Dh, max(H1, S_T))], then dbar > max(d0, d1, sup D) with
 (d0, H0, S, e) := (d1, H1, S_T, 0) implies |x - x*| < rho over the horizon. The estimate is
 clipped to R_H >= Dh. Over a problem with parts a recipe has a level in each of them, and theorem CW takes the place of
-C. Implements: theory sections 4b and 4e.
+C. Implements: theory sections 4b and 4f.
 """
 
 from __future__ import annotations

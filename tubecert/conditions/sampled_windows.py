@@ -1,4 +1,4 @@
-"""Theorem CW: certificate C window by window. Trusted. Implements: theory section 4e, (4.17), (4.18)."""
+"""Theorem CW: certificate C window by window. Trusted. Implements: theory section 4f, (4.17), (4.18)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Theorems BW and CW: certificates B and C window by window, each with a level and constants of its own. Trusted.
 
 In continuous time a window is only entered by what filter and estimator hold. A window is a few stretches of time with
-one forcing each; D(t) and the memory mu of the filter go from stretch to stretch. Implements: theory section 4e.
+one forcing each; D(t) and the memory mu of the filter go from stretch to stretch. Implements: theory section 4f.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Windows of time as data: what certificates B, C and H prove in each. Implements: theory 4e, 8.9."""
+"""Windows of time as data: what certificates B, C and H prove in each. Implements: theory 4f, 8.9."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Theorems BW and CW at printed numbers, on balls: B and C in windows of the plan, each with a level of its own.
 
-Implements: theory 4e, (4.14)-(4.18). A window is one or two legs. In a leg |xi| is at most S + (mu - S) e^(-omega v) +
+Implements: theory 4f, (4.14)-(4.18). A window is one or two legs. In a leg |xi| is at most S + (mu - S) e^(-omega v) +
 e after the time v. The distance and mu go on from leg to leg.
 """
 

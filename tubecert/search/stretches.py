@@ -1,7 +1,7 @@
 """Search of theorems BW and CW: the least Gamma, or the largest Ts, for which every window has a level, and the levels.
 
 In floats, many gains at once: each is a lane. From the widest levels and speeds on, each is lowered to what is needed;
-that is monotone, and stops anywhere. What is printed is verified by the kernel. Implements: theory section 4e.
+that is monotone, and stops anywhere. What is printed is verified by the kernel. Implements: theory section 4f.
 """
 
 from __future__ import annotations

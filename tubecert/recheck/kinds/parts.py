@@ -1,6 +1,6 @@
 """The windows of certificates B and C: parts of the plan, each with constants and a level of its own.
 
-Implements: theory 4e. A constant that a window states is examined over its tube; every other one is of the whole tube.
+Implements: theory 4f. A constant that a window states is examined over its tube; every other one is of the whole tube.
 """
 
 from __future__ import annotations
