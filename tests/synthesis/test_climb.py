@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.claims.failures import NoneCertified, NothingFound
+from tubecert.claims.advice import ConstantInputs
+from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
 from tubecert.cli.app import app
+from tubecert.expression import scan
 from tubecert.model import build
 from tubecert.pipeline import Deadline, Options, Synthesised, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
@@ -23,6 +25,7 @@ from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 
 ROBOTS = Path(__file__).parents[1] / "specs" / "robots"
+CONFIGS = Path(__file__).parents[2] / "configs"
 BARE = Synthesis(rate=None, objective="adaptation")
 BY_B = Options(conditions="distance")
 
@@ -196,6 +199,33 @@ def test_a_rate_without_a_metric_ends_the_climb():
     climb.run(Fraction(1))
     assert Fraction(2) < climb.best.rate <= 3
     assert climb.limits().faster.cause == "no_metric"
+
+
+def test_the_degree_that_suffices_is_told():
+    """A metric of a higher degree at a faster rate is not looked for once a lower one certifies."""
+    asked = []
+
+    class Bending(Valley):
+        def __call__(self, rate, floor, full):
+            asked.append(climb.degree)
+            row = super().__call__(rate, floor, full)
+            return row and replace(row, degree=1)
+
+    climb = Climb(Bending(0, 100), "adaptation")
+    climb.run(Fraction(1))
+    assert asked[0] is None
+    assert set(asked[1:]) == {1}
+
+
+def test_a_metric_that_no_file_can_hold_ends_the_search_at_once(monkeypatch):
+    """The fields of a moving B are what is long: no rate makes them shorter, other inputs do."""
+    spec = load(str(CONFIGS / "state_dependent_input.yaml"))
+    monkeypatch.setattr(scan, "MAX_LENGTH", 12)
+    found = pipeline.synthesise(replace(spec, metric=None), BARE, BY_B)
+    assert found.verdict is Verdict.UNDECIDED
+    assert found.reason.claim.failure == NotWritable(code="TC102")
+    assert found.reason.relax == (ConstantInputs(),)
+    assert len({attempt.rate for attempt in found.attempts}) == 1
 
 
 # -- where it starts

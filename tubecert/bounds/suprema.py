@@ -46,6 +46,7 @@ _FEW = 20_000  # boxes
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
 _WORTH = 30_000  # boxes after which such a constant stays as it is
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
+_COARSE, _ROUGH = 0.1, 1e-2  # from that gap on the metric, too, need not be known sharply
 Spent = Callable[[str, int], None]
 
 
@@ -121,8 +122,8 @@ class Suprema:
 
     @property
     def _fine(self) -> Effort:
-        """For what enters every condition."""
-        return replace(self.effort, gap=min(self.effort.gap, 1e-4))
+        """For what enters every condition; not where metrics are only compared."""
+        return replace(self.effort, gap=min(self.effort.gap, _ROUGH if self.effort.gap >= _COARSE else 1e-4))
 
     def metric_slope(self) -> Constant:
         """DMx = sup sum_i |dM/dx_i|, dM/dx_i = -M W_i M: eigenvalues of the pencils (W_i, W^2)."""

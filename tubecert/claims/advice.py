@@ -270,6 +270,13 @@ class LowerDegree(Relax):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantInputs(Relax):
+    """Inputs in which B is constant, such as the accelerations of joints."""
+
+    tag: ClassVar[str] = "constant_inputs"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HigherDegree(Relax):
     """A degree of W above `degree`, or none asked for."""
 

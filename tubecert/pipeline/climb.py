@@ -39,7 +39,8 @@ Compare = Callable[[Fraction, Floor, bool], Row | None]
 class Climb:
     """What was tried: the best row of each rate, None where there is no metric.
 
-    `compare` certifies a metric of a rate and a floor; at a degree that is raised as long as it pays only if `full`.
+    `compare` certifies a metric of a rate and a floor; at a degree that is raised as long as it pays only if `full`,
+    and not beyond `degree` otherwise.
     """
 
     compare: Compare
@@ -51,6 +52,12 @@ class Climb:
         """The best row that counts."""
         rows = [row for row in self.tried.values() if row is not None and row.counts]
         return min(rows, key=self._score, default=None)
+
+    @property
+    def degree(self) -> int | None:
+        """The degree that sufficed so far, None if nothing did: higher ones are dear, and are left to the best rate."""
+        degrees = [row.degree for row in self.tried.values() if row is not None and row.counts]
+        return max(degrees, default=None)
 
     def run(self, start: Fraction) -> None:
         """The whole search."""

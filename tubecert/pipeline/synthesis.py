@@ -20,6 +20,7 @@ from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import (
     AskForRateBelow,
     AskForRateUpTo,
+    ConstantInputs,
     EnlargeSafeSet,
     GiveInput,
     HigherDegree,
@@ -78,6 +79,14 @@ _BOXES = 100_000  # and what each claim may cost there
 
 Ask = Callable[[Spec, Options, Progress, Memory], Question]
 Told = Callable[["Synthesised"], None]
+
+
+class _TooLongError(Exception):
+    """A metric is too long for a file, and so will others be."""
+
+    def __init__(self, metric: VerifiedMetric, code: str) -> None:
+        super().__init__(code)
+        self.metric, self.code = metric, code
 
 
 class SynthesisRun:
@@ -145,6 +154,8 @@ class SynthesisRun:
             best = self._best()
         except FamilyError as error:  # what C3 forbids
             return self._failed(error.failure, OtherVariables())
+        except _TooLongError as error:
+            return self._failed(NotWritable(code=error.code), self._shorter(error.metric))
         except (OutOfTime, KeyboardInterrupt) as end:
             best = self._so_far(end)
         if best is None:
@@ -228,7 +239,11 @@ class SynthesisRun:
 
     def _compare(self, rate: Fraction, floor: Floor, full: bool) -> Row | None:
         """A row for a metric of this rate; None if there is none."""
-        metric = self.ladder.metric(rate, floor, 0.0 if full else inf if self.limit is None else self.limit)
+        enough = 0.0 if full else inf if self.limit is None else self.limit
+        any_degree = (
+            full and self.ladder.flat
+        )  # where B moves, so does W: higher degrees are dear, and hardly pay
+        metric = self.ladder.metric(rate, floor, enough, None if any_degree else self.climb.degree)
         if metric is None or (floor == "identity" and not self._allowed(metric)):
             return None
         key = rate, floor, metric.family.degree
@@ -248,7 +263,9 @@ class SynthesisRun:
             return row
         try:
             spec = self._with(metric)
-        except SpecError:  # too long to be written, see `_written`
+        except SpecError as error:  # too long to be written, as the metrics of other rates are, too
+            if self.climb.best is None:
+                raise _TooLongError(metric, error.findings[0].code) from None
             return row
         self._say(f"rate {near(metric.rate, 4)}: certifying")
         options = replace(
@@ -280,7 +297,7 @@ class SynthesisRun:
         try:
             spec = self._with(metric)
         except SpecError as error:
-            return self._failed(NotWritable(code=error.findings[0].code), LowerDegree())
+            return self._failed(NotWritable(code=error.findings[0].code), self._shorter(metric))
         model = build(spec)
         same = metric.proof.is_about(model, spec.safe_set)
         proof = metric.proof if same else verify_metric(model, spec.safe_set, self.effort)
@@ -298,6 +315,10 @@ class SynthesisRun:
             limits=self.climb.limits(),
             cut=self.cut,
         )
+
+    def _shorter(self, metric: VerifiedMetric) -> Relax:
+        """What makes a metric shorter: where B moves, its fields are what is long."""
+        return LowerDegree() if metric.family.flat else ConstantInputs()
 
     def _table(self) -> tuple[Row, ...]:
         return tuple(sorted(self.rows.values(), key=lambda row: (row.rate, row.floor, row.degree)))

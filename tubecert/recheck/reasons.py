@@ -257,6 +257,7 @@ _RELAX: Mapping[str, Form] = {
     "give_input": _NONE,
     "other_variables": _NONE,
     "lower_degree": _NONE,
+    "constant_inputs": _NONE,
     "higher_degree": ({"degree": Node.count}, {}),
     "raise_condition_number": ({"to": Node.number}, {}),
 }

@@ -89,19 +89,28 @@ class Ladder:
         self.proven: list[VerifiedMetric] = []
         self.rounds = 0  # of all proposals so far
         self._families: dict[int, MetricFamily] = {}
-        self._found: dict[tuple[Fraction, Floor, float], VerifiedMetric | None] = {}
+        self._found: dict[tuple[Fraction, Floor, float, int | None], VerifiedMetric | None] = {}
+        self._wider: dict[int, float] = {}  # by degree: so much more back-off was needed
         self._least_degree = 0  # below it nothing worked at a rate that was asked for before
         self._hardest: float = 0.0
 
-    def metric(self, rate: Fraction, floor: Floor = "identity", enough: float = 0.0) -> VerifiedMetric | None:
+    def metric(
+        self, rate: Fraction, floor: Floor = "identity", enough: float = 0.0, most: int | None = None
+    ) -> VerifiedMetric | None:
         """A proven metric at a rate, of nearly the least condition number (or input gain); None if none was found.
 
-        The degree is raised as long as that pays, or until the condition number is `enough`.
+        The degree is raised as long as that pays, or until the condition number is `enough`, or up to the degree
+        `most`.
         """
-        key = rate, floor, enough
+        key = rate, floor, enough, most
         if key not in self._found:
-            self._found[key] = self._searched(rate, floor, enough)
+            self._found[key] = self._searched(rate, floor, enough, most)
         return self._found[key]
+
+    @property
+    def flat(self) -> bool:
+        """Whether W moves with no more than the degree that is asked for: B is constant."""
+        return self._family(0).flat
 
     def largest_rate(
         self, limit: float | None, least: Fraction | None = None, sharp: float = _SHARP
@@ -183,9 +192,13 @@ class Ladder:
             return None
         return found
 
-    def _searched(self, rate: Fraction, floor: Floor, enough: float) -> VerifiedMetric | None:
+    def _searched(
+        self, rate: Fraction, floor: Floor, enough: float, most: int | None
+    ) -> VerifiedMetric | None:
         best: VerifiedMetric | None = None
         for degree in self._degrees(rate):
+            if most is not None and self._family(degree).degree > most:
+                break
             found = self._at_degree(rate, floor, degree)
             if best is None and found is not None and rate >= self._hardest:
                 self._least_degree, self._hardest = degree, float(rate)
@@ -254,7 +267,7 @@ class Ladder:
     ) -> VerifiedMetric | None:
         """One route at one degree: a smaller back-off if it finds nothing, a larger one if the proof fails."""
         retreated = False
-        room = _ROOM if self._family(degree).degree else 1.0
+        room = (_ROOM if self._family(degree).degree else 1.0) * self._wider.get(degree, 1.0)
         back_offs = [room * part for part in (_BACK_OFF if self.request.thorough else _BACK_OFF[:1])]
         while back_offs and self.rounds != self.request.rounds:
             back_off = back_offs.pop(0)
@@ -265,6 +278,10 @@ class Ladder:
             outcome = shortest_proven(problem, proposal, rate, self.request.effort)
             self._note(_attempt(problem, rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, VerifiedMetric):
+                if retreated and self.request.coordinates == "auto":
+                    self._wider[degree] = (
+                        _RETREAT  # at other rates, too: a proof that fails costs as much as one that holds
+                    )
                 self.proven.append(outcome)
                 return outcome
             if proposal.coefficients is not None and not retreated and self.request.thorough:

@@ -13,6 +13,7 @@ from tubecert.bounds.meanings import EVERY
 from tubecert.claims.advice import (
     AskForRateBelow,
     AskForRateUpTo,
+    ConstantInputs,
     CorrectPlan,
     DeclareMetricBound,
     DeclareUncertaintyBound,
@@ -214,6 +215,10 @@ _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
     GiveInput: lambda item: "give it an input",
     OtherVariables: lambda item: "choose other variables, or leave them to tubecert",
     LowerDegree: lambda item: "ask for a lower degree",
+    ConstantInputs: lambda item: (
+        "choose inputs in which B is constant, such as the accelerations of joints "
+        "(tubecert init --template arm2 shows how)"
+    ),
     HigherDegree: lambda item: f"a degree above {item.degree}, or auto",
     RaiseConditionNumber: lambda item: f"raise condition_number to {near(item.to, 4)}",
 }
