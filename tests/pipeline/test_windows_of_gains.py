@@ -20,7 +20,8 @@ from tubecert.pipeline.windows import _has_parts
 from tubecert.simulate.compare import compare
 from tubecert.simulate.monte_carlo import monte_carlo
 from tubecert.simulate.promise import Levels
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulate.setting import setting_of
+from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load_text
 
 F = Fraction
