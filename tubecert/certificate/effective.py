@@ -193,8 +193,11 @@ class Asked:
 
 _ASKED, _MAY_ASK = (
     ("objective", "degree", "variables", "route", "solver"),
-    ("rate", "condition_number", "coordinates"),
+    ("rate", "condition_number", "coordinates", "outputs"),
 )
+
+
+_LISTS = ("variables", "outputs")
 
 
 def _read_asked(data: Json, path: str) -> Asked:
@@ -203,7 +206,7 @@ def _read_asked(data: Json, path: str) -> Asked:
     for key in (*_ASKED, *data):
         if key not in data or key not in (*_ASKED, *_MAY_ASK):
             raise FormError(f"{path}.{key}", "is missing" if key in _ASKED else "is not known")
-        words = data[key] if key == "variables" and isinstance(data[key], list) else [data[key]]
+        words = data[key] if key in _LISTS and isinstance(data[key], list) else [data[key]]
         if not all(isinstance(word, str) for word in words):
             raise FormError(f"{path}.{key}", "is not a text")
     return Asked(data=data)

@@ -22,7 +22,7 @@ from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
 from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
-from tubecert.pipeline.width import Measure, measure_of
+from tubecert.pipeline.width import Measure, measure_in, measure_of
 from tubecert.printable import printable_json, visible
 from tubecert.records import to_json
 from tubecert.report import design as told
@@ -141,8 +141,7 @@ def _minimised(spec: Spec, words: str | None) -> Measure:
         raise SpecError(
             [Finding(code="TC122", message=f"--minimise: {visible(wrong[0])} is no state", help=help)]
         )
-    asked = {name: float(width) for name, width in spec.tube.half_widths}
-    return Measure(units={name: asked.get(name, 1.0) for name in names})
+    return measure_in(spec, names) or measure_of(spec)
 
 
 def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:

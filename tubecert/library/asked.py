@@ -192,6 +192,7 @@ def wanted_of(system: Spec, wishes: Wishes, named: Named) -> Synthesis:
         coordinates=wishes.coordinates or own.coordinates,
         route=wishes.route or own.route,
         solver=own.solver if solver is None else _solver(solver, named),
+        outputs=own.outputs if objective == "tube" else (),
     )
     if wanted.objective == "rate" and wishes.rate is not None:
         text = f"the objective rate searches for the rate; {named('rate')} cannot be given"

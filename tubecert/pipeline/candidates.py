@@ -22,9 +22,9 @@ from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
-from tubecert.pipeline.width import measure_of, need_of
+from tubecert.pipeline.width import Measure, measure_of, need_of
 from tubecert.search.proposers import LEAST, PROPOSERS, Explained
-from tubecert.stages.bounded import Enclosed, enclose, unmet, with_machine
+from tubecert.stages.bounded import Enclosed, enclose, half_widths, unmet, with_machine
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
@@ -56,8 +56,8 @@ def ending(question: Question, metric: VerifiedMetric) -> Ending:
     return _judged(question, enclosed)
 
 
-def judged_row(row: Row, question: Question) -> Row:
-    """The row with what its metric comes to."""
+def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> Row:
+    """The row with what its metric comes to, by the width of the tube in `outputs` where those count."""
     end = ending(question, row.metric)
     row = replace(row, verdict=end.verdict, claim=end.claim)
     if end.enclosed is None:
@@ -66,17 +66,18 @@ def judged_row(row: Row, question: Question) -> Row:
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
-    machine = _machine(question, end)
+    machine, measure = _machine(question, end), outputs or measure_of(question.spec)
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
         served=distance.verdict is Verdict.CERTIFIED,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
+        width=None if outputs is None else outputs.of(half_widths(end.enclosed), None),
         ultimate_radius=distance.judgement.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
-        demand=_demand(decisive, problem) if machine is None else need_of(machine, measure_of(question.spec)),
+        demand=_demand(decisive, problem) if machine is None else need_of(machine, measure),
         by_machine=machine is not None,
     )
 

@@ -57,6 +57,7 @@ from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.pipeline.width import measure_in
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
@@ -274,7 +275,8 @@ class SynthesisRun:
             budget=min(self.options.budget, _BOXES),
             metric=None,
         )
-        return judged_row(row, self.ask(spec, options, self._watch, self.memory))
+        outputs = measure_in(self.spec, self.wanted.outputs)
+        return judged_row(row, self.ask(spec, options, self._watch, self.memory), outputs)
 
     @property
     def _by_machine(self) -> bool:

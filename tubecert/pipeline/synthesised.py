@@ -32,7 +32,8 @@ class Row:
     `verdict` is that of the kinds that decide, `claim` what failed; `served`: certificate B holds, whatever decides.
     `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form. `bandwidth` and
     `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate or sampling frequency;
-    or, `by_machine`, how wide the tube is that certificate H proves, or by how much it does not.
+    or, `by_machine`, how wide the tube is that certificate H proves, or by how much it does not. `width`: of the tube
+    in the outputs that were asked for; None: its radius counts.
     """
 
     rate: Fraction
@@ -44,6 +45,7 @@ class Row:
     served: bool = False
     input_gain: float | None = None
     rho: float | None = None
+    width: float | None = None
     ultimate_radius: float | None = None
     adaptation_rate: float | None = None
     bandwidth: float | None = None
@@ -72,10 +74,10 @@ class Row:
         if self.by_machine:
             return (rank, self.demand, self.condition_number)
         if objective == "tube":
-            rho = (
-                inf if self.rho is None else log(self.rho) // _NARROWER
-            )  # a slower metric has to be worth it
-            return (rank, rho, self.demand, self.condition_number)
+            size = self.rho if self.width is None else self.width
+            # a slower metric has to be worth it
+            narrow = inf if size is None else log(size) // _NARROWER
+            return (rank, narrow, self.demand, self.condition_number)
         if self.idle:
             return (rank, 1, float(self.rate), self.condition_number)
         return (rank, 0, self.demand, self.condition_number)

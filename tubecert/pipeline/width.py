@@ -5,7 +5,7 @@ In: the section of certificate H, or a result. Out: one number, less is narrower
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -40,6 +40,12 @@ def measure_of(spec: Spec) -> Measure:
         box = zip(spec.states, spec.safe_set, strict=True)
         asked = {name: float(high - low) / 2 for name, (low, high) in box}
     return Measure(units=asked)
+
+
+def measure_in(spec: Spec, outputs: Sequence[str]) -> Measure | None:
+    """The states that were named, each in its own unit or that of its half-width; None where none were."""
+    asked = dict(spec.tube.half_widths)
+    return Measure(units={name: float(asked.get(name, 1)) for name in outputs}) if outputs else None
 
 
 def machine_of(result: Result) -> HardwareData | None:

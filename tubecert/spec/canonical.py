@@ -173,6 +173,8 @@ def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
         "route": wanted.route,
         "solver": wanted.solver,
     }
+    if wanted.outputs:
+        data["outputs"] = list(wanted.outputs)
     return data | _given(rate=wanted.rate, condition_number=wanted.condition_number)
 
 

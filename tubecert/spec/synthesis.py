@@ -15,6 +15,7 @@ from tubecert.spec.types import Synthesis
 KEYS: Final = (
     "rate",
     "objective",
+    "outputs",
     "degree",
     "variables",
     "condition_number",
@@ -39,10 +40,11 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
         return None
     rate = _unless_auto(entries.get("rate"))
     objective = entries["objective"].word(OBJECTIVES) if "objective" in entries else None
-    limit = entries.get("condition_number")
+    limit, outputs = entries.get("condition_number"), entries.get("outputs")
     found = Synthesis(
         rate=rate.number(names.values, above=0) if rate else None,
-        objective=objective or ("condition" if rate else "adaptation"),
+        objective=objective or ("tube" if outputs else "condition" if rate else "adaptation"),
+        outputs=_variables(outputs, names) or (),
         degree=_degree(_unless_auto(entries.get("degree")), names),
         variables=_variables(_unless_auto(entries.get("variables")), names),
         condition_number=limit.number(names.values, least=1) if limit else None,
@@ -113,6 +115,12 @@ def _variables(field: Field | None, names: Names) -> tuple[str, ...] | None:
 
 def _consistent(field: Field, found: Synthesis) -> None:
     """A rate belongs to some objectives, and must be searched for by the others."""
+    if found.outputs and found.objective != "tube":
+        field.fail(
+            codes.RANGE,
+            f"{field.path}: outputs are what the tube is to be small in; the objective is {found.objective}",
+            "leave the objective out, or write objective: tube",
+        )
     needs_rate = found.objective in ("condition", "margin")
     if needs_rate and found.rate is None:
         field.fail(

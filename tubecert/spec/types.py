@@ -153,7 +153,8 @@ class Synthesis:
     `rate` in 1/s, None if it is searched for; `objective`: least condition number, greatest margin (in C2), greatest
     rate, least adaptation rate of the distance form, smallest tube; `degree` and `variables` of W, None: chosen
     automatically; `condition_number`: not to be exceeded; `coordinates`: those in
-    which it is least, auto: half-widths of the safe set; `solver`: clarabel, scs or cvxpy:NAME.
+    which it is least, auto: half-widths of the safe set; `solver`: clarabel, scs or cvxpy:NAME. `outputs`: the states
+    in which the tube is to be small; none: all of it.
     """
 
     rate: Fraction | None = None
@@ -164,6 +165,7 @@ class Synthesis:
     coordinates: Literal["auto", "identity"] = "auto"
     route: str = "auto"
     solver: str = "clarabel"
+    outputs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -191,7 +191,7 @@ def _bounded(enclosed: Enclosed) -> Bounded:
     geodesics = _geodesics(enclosed)
     return Bounded(
         enclosed=enclosed,
-        half_widths=_half_widths(enclosed),
+        half_widths=half_widths(enclosed),
         geodesics=geodesics,
         machine=_machine(enclosed, geodesics),
         clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
@@ -336,7 +336,7 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
     return None
 
 
-def _half_widths(enclosed: Enclosed) -> dict[str, float]:
+def half_widths(enclosed: Enclosed) -> dict[str, float]:
     """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho; or the sides of the tube."""
     tube = enclosed.tube
     states = tube.question.spec.states

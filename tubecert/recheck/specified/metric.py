@@ -57,8 +57,9 @@ def read_metric(node: Node, plant: Plant) -> Metric | Wanted:
 def read_wanted(node: Node) -> Wanted:
     """What a metric that is to be synthesised must be; how it is searched for is idle."""
     keys = ("objective", "degree", "variables", "route", "solver")
-    own = node.closed(*keys, optional=("rate", "condition_number", "coordinates"))
+    own = node.closed(*keys, optional=("rate", "condition_number", "coordinates", "outputs"))
     own.get("coordinates", Node.text)
+    own.get("outputs", Node.texts)
     for key in ("objective", "degree", "route", "solver"):
         own[key].text()
     if own["variables"].value != "auto":
