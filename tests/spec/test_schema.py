@@ -153,7 +153,9 @@ def subschema(path: str, kind: str) -> dict[str, Any]:
             schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
         schema = schema.get("items", schema)
         named = schema.get("properties", {})
-        schema = named[key] if key in named else schema["additionalProperties"]  # tables have names of their own
+        schema = (
+            named[key] if key in named else schema["additionalProperties"]
+        )  # tables have names of their own
         choices = [item for item in schema.get("anyOf", ()) if "properties" in item]
         schema = choices[0] if choices and "properties" not in schema else schema
     while "$ref" in schema:
