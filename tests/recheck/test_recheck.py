@@ -10,6 +10,7 @@ import rechecked
 import tampers
 from flint import ctx
 from rechecked import examine, respecified, sealed
+from systems import SMALL
 from typer.testing import CliRunner
 
 import tubecert.bounds.start
@@ -205,7 +206,7 @@ BUGS = {
 @pytest.mark.parametrize("bug", BUGS)
 def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
     place, name, broken, claims = BUGS[bug]
-    system = spec.load(THREE)
+    system = spec.load_text(SMALL)
     with monkeypatch.context() as patch:
         patch.setattr(place, name, broken)
         result = pipeline.certify(system, pipeline.Options(conditions="all")).to_json()
