@@ -206,3 +206,20 @@ def test_the_files_say_what_is_covered():
     plain = exported(assembled(GIVEN["orbit"])).files
     assert "EXACT arithmetic" in plain["README.md"]
     assert "7.52316384526264e-37" not in plain["hardware_orbit.c"]  # as before: no limit of the feedback
+
+
+def test_what_may_be_a_root_of_less_than_nothing_has_no_bound():
+    """f with sqrt(1/4 - p), which the states of the tube reach: computed, it may be no number."""
+    text = PATH.replace('v, "p - v/2"', 'v, "p - v/2 + sqrt(p + 1/5) - sqrt(1/5)"')
+    own = recipe(rounding=(ANY,))
+    given = machine(text, recipe=own, horizon=None, feedback_gain=DU)
+    with pytest.raises(UncoveredError, match="no bound"):
+        rounding_of(assembled(replace(given, reach=Fraction(1))), "double")
+    assert rounding_of(assembled(replace(given, reach=Fraction(1, 50))), "double").estimate < Fraction(
+        1, 10**9
+    )
+
+
+def test_samples_beyond_the_counter_are_not_covered():
+    with pytest.raises(UncoveredError, match="counts"):
+        rounding_of(controller(held=True, horizon=Fraction(10**8)), "double")

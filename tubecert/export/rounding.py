@@ -12,7 +12,7 @@ that are exported.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
@@ -29,6 +29,7 @@ from tubecert.spec import Arithmetic
 
 _LIBRARY: Final = 8  # units of rounding that a function of math.h may be off: 4 in the last place
 _GAUSS: Final = 2016000  # of the error of Gauss's rule with three nodes: f^(6) length^6/2016000 of the mean
+_MOST_SAMPLES: Final = 2**32 - 1
 _PIECES: Final = 64  # of the horizon, along which a plan is followed
 
 
@@ -114,6 +115,8 @@ class _Analysis:
     def _horizon(self) -> Fraction:
         if self.c.horizon is None:
             raise UncoveredError("a plan that moves without end: the time itself loses digits")
+        if self.c.horizon >= _MOST_SAMPLES * self.c.sample_time:
+            raise UncoveredError("a plan of more samples than the code counts")
         return max(self.c.horizon, self.c.sample_time)
 
     def _late(self) -> Interval:
@@ -237,7 +240,7 @@ class _Analysis:
         acted = [_within(held, pieces) for _ in range(self.m)]
         given = {"held": acted, "before": acted}
         if self.c.gauss is not None:
-            given["played"] = self._played(self.c.gauss, us)
+            given["played"] = self._played(self.c.gauss, us, self._written(law, us))
         mean = self._run(self.c.applied, given)["mean"]
         q = [_within(self._estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
@@ -246,8 +249,11 @@ class _Analysis:
         # th and pi are decimals of 50 digits at least
         return _most(_length(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
 
-    def _played(self, gauss: Program, us: Sequence[Followed]) -> list[Followed]:
-        """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*."""
+    def _played(self, gauss: Program, us: Sequence[Followed], written: Interval) -> list[Followed]:
+        """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*.
+
+        What acted differs from u* by what is `written` at most.
+        """
         if self.c.bend is None:
             raise UncoveredError("the mean of a feedforward that moves within a sample")
         nodes = [_widened(u) for u in us]
@@ -257,7 +263,9 @@ class _Analysis:
         return [
             Followed(
                 value=x.value,
-                error=(Interval.exact(x.error) + share * Interval.exact(_widened(bend).value.magnitude)).hi,
+                error=(
+                    Interval.exact(x.error) + share * Interval.exact(_widened(bend).value.magnitude) + written
+                ).hi,
             )
             for x, bend in zip(found, bends, strict=True)
         ]
@@ -270,7 +278,7 @@ class _Analysis:
         """What comes out of a program; `apart`: vectors whose entries differ by the half-widths at most."""
         memory: list[Followed] = []
         for step in program.steps:
-            found = self._step(step, memory, given)
+            found = self._step(program, step, memory, given)
             if apart is not None and step.operation == "sub":
                 found = self._met(found, [program.steps[p] for p in step.places], apart)
             memory.append(found)
@@ -289,7 +297,11 @@ class _Analysis:
         )
 
     def _step(
-        self, step: Step, memory: Sequence[Followed], given: Mapping[str, Sequence[Followed]]
+        self,
+        program: Program,
+        step: Step,
+        memory: Sequence[Followed],
+        given: Mapping[str, Sequence[Followed]],
     ) -> Followed:
         if step.operation == "input":
             return given[step.name][step.index]
@@ -302,7 +314,11 @@ class _Analysis:
         if step.operation == "choose":
             return self._chosen(step.name, args[0], args[1])
         if step.operation == "call":
-            return self._called(step.name, args[0])
+            found = self._called(step.name, args[0])
+            clamped = program.steps[step.places[0]].name == GREATEST  # never below 0, whatever the rounding
+            least = (args[0].value - Interval.exact(args[0].error)).lo
+            sure = clamped or step.name != "sqrt" or bool(np.all(least >= 0))
+            return found if sure else replace(found, error=found.error + np.inf)
         return self._rounded(*_combined(step.operation, args[0], args[1]))
 
     def _rounded(self, value: Interval, error: Interval, units: int = 1) -> Followed:
