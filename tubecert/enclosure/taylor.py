@@ -199,9 +199,16 @@ class MatrixFunction:
 
     def linear(self, lo: Array, hi: Array) -> list[tuple[Array, Array]]:
         """For each matrix its value at the centre and its change to the right end by variable, (1 + d, N, p, q), and a
-        radius (N, p, q) for the rest: the mean value form, of a function of order 1.
+        radius (N, p, q) for the rest: the mean value form, of a function of order 1; of order 0 the rest alone.
         """
         assert not self._affine
+        if not self._order:
+            found = []
+            for mid, rad in map(midrad, self.at(lo, hi)):
+                parts = np.zeros((1 + len(self.variables), *mid.shape))
+                parts[0] = mid
+                found.append((parts, rad))
+            return found
         centre = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
         radius = np.maximum(np.nextafter(np.maximum(hi - centre, centre - lo), np.inf), _LEAST_RADIUS)
         at = self._of(centre, lo, hi, self._fixed)

@@ -11,7 +11,7 @@ elsewhere its function has a Lipschitz gradient, so that it is expanded to secon
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement, product
 from math import factorial, prod
 from typing import Protocol
@@ -23,13 +23,24 @@ from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.lookup import smooth_on
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
-from tubecert.recheck.terms import NOUGHT, Term, function, in_order, names, slopes, table_of
+from tubecert.recheck.terms import (
+    NOUGHT,
+    Term,
+    function,
+    in_order,
+    looked_up,
+    names,
+    remade,
+    slopes,
+    table_of,
+)
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]
 
 _CORNERS = 5  # variables whose corners are all tried
 _VERTICES = 64  # of which curvature may take its share
+_SIDES = 3  # tables of different arguments that are looked at on either side of a knot
 _TURNING = 4  # curved variables with which third derivatives are looked at
 
 
@@ -72,6 +83,7 @@ class Field:
         self._order = min([2, *map(_smoothness, (*kinks, *tables))]) if kinked else 2
         self._kinked = Field(entries, values, kinked=True) if (kinks or tables) and not kinked else None
         self._tables = [table_of(term) for term in tables]
+        self._sides = [Program(own, inputs) for own in _one_sided(entries)] if not self._order else []
         self._looked_up = Program([term.args[0] for term in tables], inputs)
         self._sizes = Program([function("norm", *term.args) for term in kinks], inputs)
         first = {v: slopes(entries, v) for v in self.variables} if self._order else {}
@@ -150,8 +162,13 @@ class Field:
         caused, spread = [0.0] * d, [0.0] * d
         if not self._order:
             wide = [hi - lo for lo, hi in box]
-            value = self.at(whole)
-            return [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value))], wide, wide
+            sides = [program.run([*whole, *self.values.values()]) for program in self._sides]
+            values = sides or [self.at(whole)]
+            return (
+                [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value)) for value in values],
+                wide,
+                wide,
+            )
         points, ranges = [], []
         for ends in product((0, 1), repeat=len(self._affine)):
             point, range_ = list(mid), list(whole)
@@ -237,6 +254,33 @@ class Field:
 def _smoothness(term: Term) -> int:
     """The order to which a kink, or a table at a knot, may be expanded."""
     return max(0, 2 - table_of(term).order) if term.op == "table" else int(term.op == "norm")
+
+
+def _one_sided(entries: Sequence[Term]) -> list[list[Term]]:
+    """The entries on either side of the knots of their tables, for every choice of sides; none if these are too many.
+
+    What jumps at a knot is on a box what it is on one side of it, at points on that side, or what it is on the other.
+    """
+    read = dict.fromkeys(
+        (term.args[0], table_of(term).points) for term in in_order(entries) if term.op == "table"
+    )
+    if not 0 < len(read) <= _SIDES:
+        return []
+    return [
+        _sided(entries, dict(zip(read, signs, strict=True))) for signs in product((-1, 1), repeat=len(read))
+    ]
+
+
+def _sided(entries: Sequence[Term], sides: Mapping[tuple[Term, object], int]) -> list[Term]:
+    new: dict[Term, Term] = {}
+    for term in in_order(entries):
+        args = tuple(new[arg] for arg in term.args)
+        if term.op == "table":
+            table = table_of(term)
+            new[term] = looked_up(replace(table, side=sides[term.args[0], table.points]), *args)
+        else:
+            new[term] = remade(term, args) if args else term
+    return [new[e] for e in entries]
 
 
 def _parts(entries: list[Ball], count: int) -> list[list[Ball]]:

@@ -25,18 +25,22 @@ _LAST = 4  # from there on all are alike: 0 between knots
 
 @dataclass(frozen=True)
 class Table:
-    """A derivative of the function of a table; `points` are (x, y, slope), x ascending."""
+    """A derivative of the function of a table; `points` are (x, y, slope), x ascending.
+
+    With a `side`, -1 or 1, it is looked at only on that side of an inner knot, where a ball touches a single one.
+    """
 
     name: str
     points: tuple[tuple[Fraction, Fraction, Fraction], ...]
     order: int = 0
+    side: int = 0
 
     def __hash__(self) -> int:
         """By what is short."""
         return hash((self.name, len(self.points), self.order))
 
     def __str__(self) -> str:
-        return f"{self.name}{self.order}{self.points}"
+        return f"{self.name}{self.order}{self.side}{self.points}"
 
     @property
     def slope(self) -> Table:
@@ -85,10 +89,14 @@ def over(table: Table, ball: Ball) -> Ball:
     if table.order >= _NONE_AT_KNOTS and not smooth_on(table, ball):
         return arb("nan")
     low, high = ball.lower(), ball.upper()
+    first, last = 0, len(made.pieces) - 1
+    touched = [k for k, knot in enumerate(made.knots[1:-1], 1) if knot.overlaps(ball)] if table.side else []
+    if len(touched) == 1:
+        first, last = (first, touched[0] - 1) if table.side < 0 else (touched[0], last)
     passed = bisect_left(made.upper, floor(low))  # knots that are proven to lie below
-    i = min(max(passed - 1, 0), len(made.pieces) - 1)
+    i = min(max(passed - 1, first), last)
     found: Ball | None = None
-    for k in range(i, len(made.pieces)):
+    for k in range(i, last + 1):
         left, right = made.knots[k], made.knots[k + 1]
         if k + 2 < len(made.knots) and right < low:
             continue
