@@ -27,6 +27,7 @@ class Phase(StrEnum):
     SWEEP = "sweep"  # points
     COMPILATION = "compilation"  # functions
     SIMULATION = "simulation"  # runs
+    DRIVE = "drive"  # samples of a compiled controller
     FIGURES = "figures"  # no count
     RECHECK = "recheck"  # claims
 

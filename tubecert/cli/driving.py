@@ -31,6 +31,8 @@ def drive(
     from tubecert.export.compiled import compiled
     from tubecert.export.controller import controller_of
     from tubecert.export.driven import driven
+    from tubecert.report import progress
+    from tubecert.report.terminal import Terminal
     from tubecert.simulate.certified import adopted, require_tube
     from tubecert.simulate.setting import setting_of
 
@@ -48,7 +50,9 @@ def drive(
         message = "a controller in Python is not driven: it computes what the reference computes"
         raise TubecertError([Finding(code="TC712", message=message, help="export it in C")])
     lanes = max(1, RUNS if count is None else count)
-    with compiled(found, lanes) as code:
+    terminal = Terminal.stderr(color=output.color)
+    loud = not (output.no_progress or output.quiet)
+    with compiled(found, lanes) as code, progress.shown(terminal, wanted=loud) as report:
         done = driven(
             setting_of(system, certificate.result, duration),
             code,
@@ -56,6 +60,7 @@ def drive(
             count=lanes,
             seed=SEED if seed is None else seed,
             precision=found.precision,
+            report=report,
         )
     write_stdout(json.dumps(asdict(done), indent=1) + "\n" if output.json else _text(done, paths[2]))
     return ExitCode.CERTIFIED if done.fine else ExitCode.NOT_CERTIFIED

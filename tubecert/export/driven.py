@@ -7,7 +7,6 @@ integrated by Runge and Kutta's rule, a few steps for each sample. Nothing is pr
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
@@ -21,6 +20,7 @@ from tubecert.export.controller import Controller
 from tubecert.export.program import Program, Writer
 from tubecert.export.reference import Reference, execute
 from tubecert.expression import ZERO
+from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.feedback import force
 from tubecert.simulate.monte_carlo import case, disturbance_of
 from tubecert.simulate.problem import Beside, Disturbance
@@ -30,7 +30,6 @@ _STEPS: Final = 2  # of the integration, at least, between instants at which an 
 _SQUARE, _GREEDY = 1.0, 2.0  # choices of noise, see `simulate.problem.Beside`
 _MIXED, _ADDED, _MODULUS = 1103515245, 12345, 2**31  # the draws of `simulate.machine`
 _STEEP, _THIN = 3.0, 0.05  # of winds, see `simulate.feedback`
-Report = Callable[[str, int, int], None]  # what is done, how many samples of how many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +73,7 @@ def driven(
     count: int,
     seed: int,
     precision: str,
-    report: Report | None = None,
+    report: Progress | None = None,
 ) -> Driven:
     """Random runs and adversaries, as `simulate` draws them; every run is a lane of `code`."""
     kind = setting.on_machine or setting.uncertainty
@@ -87,7 +86,7 @@ def driven(
     acting: Array = np.zeros((count, len(controller.inputs)))
     for k in range(samples):
         if report is not None and k % 100 == 0:
-            report("the compiled controller", k, samples)
+            report(Step(phase=Phase.DRIVE, done=k, of=samples))
         reference.sample = k
         plant.turn(x)
         y = plant.measured(x)
