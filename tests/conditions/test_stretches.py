@@ -18,6 +18,7 @@ from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers
 from tubecert.conditions.sampled import margin_sampled_along
 from tubecert.conditions.stretches import LevelProof, over
+from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Proof, check
 from tubecert.search.distance import recipe_at
 from tubecert.search.stretches import PartSearch
@@ -257,6 +258,23 @@ def test_a_recipe_for_other_windows_proves_nothing(proven):
         less = replace(one, **{name: getattr(one, name) * F(99, 100)})
         assert margin_distance_along(problem, [less]).lo[0] == -np.inf
     assert margin_sampled_along(problem, [replace(other, sample_time=F(3, 20))]).lo[0] == -np.inf
+
+
+def test_no_level_is_beyond_that_of_the_whole_tube(proven):
+    """Where a metric is larger in a part, sqrt(a) rho is, too; what is told of the whole tube is about the least a."""
+    problem, one, other = proven
+    larger = Constant(below=9.0, above=9.0)
+    parts = tuple(replace(part, constants=replace(part.constants, lower=larger)) for part in problem.parts)
+    metric = replace(problem, parts=parts)
+    for recipe, margin in ((one, margin_distance_along), (other, margin_sampled_along)):
+        assert margin(metric, [recipe]).lo[0] > 0
+        for level, holds in ((F("0.85"), True), (F("0.86"), False)):  # dbar = .9 sqrt(.9)
+            wide = recipe
+            for j in range(3):
+                wide = with_window(wide, j, level=level, speed=F(6))
+            if hasattr(wide, "uncertainty"):
+                wide = replace(wide, uncertainty=F(10), prediction_error=F(10))
+            assert bool(margin(metric, [wide]).lo[0] > 0) is holds
 
 
 def test_a_part_whose_b_is_constant_is_no_constant_b(proven):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from fractions import Fraction
+from types import SimpleNamespace
 
 import proven
 import pytest
@@ -12,6 +13,7 @@ from systems import GAINS_IN_WINDOWS
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.claims import of_certified
+from tubecert.recheck.kinds.windows import within_tube
 
 BUDGET = 4000  # boxes for each claim
 KINDS = {"distance": "B", "sampled": "C"}
@@ -234,3 +236,12 @@ def test_windows_of_a_specification_are_those_of_the_section(honest):
     claims = [item for item in of_certified(case_of(sealed(document))) if "windows follow" in item.name]
     assert len(claims) == 2
     assert not any(item.outcome(None).holds for item in claims)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_no_level_is_beyond_that_of_the_whole_tube(honest, share):
+    """Half-widths of the whole tube rest on d < dbar of the whole, however large the metric is in a window."""
+    setting = case_of(honest[0]).setting
+    course = SimpleNamespace(ground=SimpleNamespace(setting=setting))
+    level = Fraction(float(setting.reach) * share)
+    assert within_tube(course, level).holds is (share < 1)

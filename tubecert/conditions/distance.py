@@ -188,7 +188,7 @@ def _margin_in_windows(problem: TubeProblem, recipe: DistanceRecipe) -> Interval
     if not all(own.uncertainty.hi <= S.lo and own.error.hi <= e.lo for own in found):
         return nothing
     numbers = [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts]
-    return margin(numbers, recipe, [own.course for own in found])
+    return margin(problem, numbers, recipe, [own.course for own in found])
 
 
 def _describes_windows(problem: TubeProblem, recipe: DistanceRecipe) -> bool:

@@ -203,7 +203,7 @@ def _margin_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
         return nothing
     found = course_of(problem, recipe)
     numbers = [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts]
-    return margin(numbers, recipe, [own.course for own in found])
+    return margin(problem, numbers, recipe, [own.course for own in found])
 
 
 @quiet

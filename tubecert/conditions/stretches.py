@@ -169,13 +169,20 @@ def cover(problem: TubeProblem, recipe: InParts) -> bool:
 
 
 def margin(
-    numbers: Sequence[Numbers[Interval]], recipe: InParts, found: Sequence[Course[Interval]]
+    problem: TubeProblem,
+    numbers: Sequence[Numbers[Interval]],
+    recipe: InParts,
+    found: Sequence[Course[Interval]],
 ) -> Interval:
-    """The least (dbar - sup D)/dbar of the windows; -oo below where (4.18) is not proven."""
+    """The least (dbar - sup D)/dbar of the windows; -oo below where (4.18) is not proven.
+
+    No level is beyond the dbar of the whole tube, which its half-widths and the clearance rest on.
+    """
+    whole = reach(problem.proven())
     proven, low, high = True, np.inf, np.inf
     for n, own, course in zip(numbers, recipe.windows, found, strict=True):
         level, Y = Interval.of(own.level), Interval.of(own.speed)
-        fits = level.hi <= reach(n).lo
+        fits = level.hi <= reach(n).lo and level.hi <= whole.lo
         stays = course.supremum.hi < level.lo
         fast = speed_needed(n, level, course.uncertainty).hi < Y.lo
         proven = proven and bool(fits and stays and fast)

@@ -59,13 +59,15 @@ class PartSearch:
             self.numbers = [
                 replace(n, wind_matched=n.wind_speed, rest_matched=n.rest_speed) for n in self.numbers
             ]
+        whole = reach(problem.floats(R_H))
+        self.caps = [np.minimum(reach(n), whole) for n in self.numbers]
         self.lengths = [np.asarray(float(part.end - part.begin)) for part in problem.parts]
         self.shortest = min(part.end - part.begin for part in problem.parts)
 
     @quiet
     def lowered(self, run: Run, shape: tuple[int, ...], rounds: int) -> Levels:
         """Levels and speeds from the widest on."""
-        caps = [np.broadcast_to(reach(n), shape) for n in self.numbers]
+        caps = [np.broadcast_to(cap, shape) for cap in self.caps]
         levels = list(caps)
         speeds = [self._speed(n, level, n.Dh + n.R) for n, level in zip(self.numbers, levels, strict=True)]
         good: Mask = np.zeros(shape, dtype=bool)
@@ -217,7 +219,7 @@ class PartSearch:
 
     def _printed(self, found: Levels, room: float) -> tuple[LevelProof, ...]:
         """Levels and speeds with some room, none beyond its tube."""
-        ends = [round_down(float(reach(n)) * (1 - 1e-12), 13) for n in self.numbers]
+        ends = [round_down(float(cap) * (1 - 1e-12), 13) for cap in self.caps]
         return tuple(
             LevelProof(
                 level=min(round_up(float(level[0]) * (1 + room), 7), end),

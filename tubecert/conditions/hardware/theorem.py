@@ -57,6 +57,9 @@ def _margins_in_windows(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[I
         return nothing, nothing
     if not all(_describes_a_loop(own) for own in windows.within(recipe)):
         return nothing, nothing
+    # half-widths of the whole tube and the clearance rest on d < dbar of the whole, whatever a is in a window
+    if not Interval.of(recipe.level).hi <= reach(problem.proven()).lo:
+        return nothing, nothing
     found = windows.course_of(problem, recipe)
     if not all(_side_conditions(w.at) for w in found):
         return nothing, nothing

@@ -15,7 +15,13 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
-from tubecert.recheck.kinds.windows import Windows, WindowSection, claims_of_constants, claims_of_states
+from tubecert.recheck.kinds.windows import (
+    Windows,
+    WindowSection,
+    claims_of_constants,
+    claims_of_states,
+    within_tube,
+)
 from tubecert.recheck.legs import Reached, Stay
 from tubecert.recheck.metric import stated
 from tubecert.recheck.specified.numbers import Range
@@ -130,6 +136,7 @@ class Parts(Windows):
                 return
             setting = self.setting(window)
             yield stated(window.level == level.level, "the recipe has other levels")
+            yield within_tube(self, window.level)
             yield stated(window.supremum < window.level, "a window reaches its level")
             yield at_most(own.top, window.supremum, "what d reaches in a window")
             yield at_most(

@@ -293,8 +293,16 @@ def _hold(course: Course, recipe: Digital, margins: Callable[..., Outcome]) -> O
         least = root(course.setting(window).n.lower)
         outcomes.append(at_most(own.loop.top, window.supremum, "what d reaches in a window"))
         outcomes.append(stated(window.supremum < window.level, "a window reaches its level"))
+        outcomes.append(within_tube(course, window.level))
         outcomes.append(at_most(exact(window.level) / least, window.radius, "the radius of a window"))
     return all_of(outcomes)
+
+
+def within_tube(course: Windows, level: Fraction) -> Outcome:
+    """A level is not beyond dbar of the whole tube, which its half-widths and the clearance rest on."""
+    return stated(
+        bool(exact(level) <= course.ground.setting.reach), "a level is beyond that of the whole tube"
+    )
 
 
 def claims_of_states(course: Windows, j: int, window: WindowSection) -> Iterator[Claim]:
