@@ -105,7 +105,7 @@ def read_specification(node: Node) -> Specification:
 
 def _moving(own: Members, found: Specification, *, written: bool) -> None:
     """What an f that depends on t goes with: theorems 0, A, B and C along a known plan with an end."""
-    alone = found.hardware is None and found.disturbance is None and not found.plant.ranges
+    alone = found.hardware is None and found.disturbance is None and not (found.plant.ranges or found.windows)
     if not (alone and written and found.trajectory.horizon is not None and isinstance(found.metric, Metric)):
         raise own["system"].refused("has an f that depends on t, beside what no theorem covers with it")
 

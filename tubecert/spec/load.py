@@ -217,6 +217,7 @@ def _read_named(
                 ("hardware" in entries, "which certificate H is not stated for"),
                 ("disturbance" in entries, "which is not covered beside a disturbance"),
                 (bool(names.ranges), "which is not covered beside parameters known by ranges"),
+                (tube is not None and tube.windows is not None, "which is not covered beside tube.windows"),
                 (not written, f"which is not covered along a trajectory of kind {plan.kind}"),
                 (written and plan.horizon is None, "so a trajectory with a horizon is needed"),
                 (synthesis is not None, "and metrics are not found for that: give one"),
