@@ -49,6 +49,7 @@ def test_the_certificate_says_how_closely_and_is_confirmed():
     assert text != SMALL
     document = certified(text, conditions="B")
     gaps = document["result"]["effort"]["gaps"]
+    assert set(gaps) <= set(document["result"]["constants"])
     assert gaps["f"] == 0.2
     assert gaps["h"] <= 0.2
     assert document["result"]["spec"]["effective"]["tube"]["gap"] == "auto"

@@ -39,7 +39,9 @@ _CLOSER: Final = (3, 30)  # times, in one round
 _ROUNDS: Final = 12
 _AIM: Final = 0.9  # of what is left to gain
 _MOVED: Final = 0.1  # of what a constant was to come down by: with less, it is as low as it gets
-_SURE: Final = frozenset({"lower", "upper", "initial_distance"})  # close in any case
+_SURE: Final = frozenset(  # close in any case, or known with the geodesics
+    {"lower", "upper", "initial_distance", "feedback_slope", "noise_metric", "symbols", "symbols_slope"}
+)
 _OF_LIMITS: Final = frozenset(
     {"h", "feedback_gain"}
 )  # what inputs with limits are judged by beside the gains

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 from tubecert.bounds.compute import Radius
 from tubecert.certificate.effective import Effective
@@ -97,7 +98,7 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         effort=Work(
             gap=options.gap,
             budget=options.budget,
-            gaps={} if reached.enclosed is None else reached.enclosed.gaps,
+            gaps=_gaps(reached),
         ),
         plan=_plan(reached),
         safe_set=dict(zip(spec.states, spec.safe_set, strict=True)),
@@ -208,6 +209,12 @@ def _tube(reached: _Reached) -> TubeData | None:
         half_widths=dict(bounded.half_widths),
         coordinates=None if rows is None else tuple(tuple(map(number_text, row)) for row in rows),
     )
+
+
+def _gaps(reached: _Reached) -> dict[str, Fraction]:
+    """Those of the constants that the certificate has."""
+    own = {} if reached.enclosed is None else reached.enclosed.gaps
+    return {name: own[name] for name in _constants(reached) if name in own}
 
 
 def _constants(reached: _Reached) -> dict[str, Bound]:
