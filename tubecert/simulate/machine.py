@@ -167,15 +167,17 @@ def _measure(own: Lane, now: Moment, looks: bool, work: Work) -> int:
     if beside.choice[lane] == _SQUARE:
         place, sign = 0, 1.0 if (kept.tally[0] // int(beside.period[lane])) % 2 == 0 else -1.0
     elif beside.choice[lane] == _GREEDY and looks:
-        most = -np.inf
-        for q in range(table.shape[0]):
-            for i in range(y.shape[0]):
-                y[i] = now.x[i] + table[q, i]
-            status = max(status, _law(own, now.t, now.plan, y, work.point))
-            loss = dot(kept.push, work.point.k)  # c'kappa at the state, of (H.14)
-            if loss > most:
-                most, place = loss, q
-        place = int(decide(beside.decided[lane], kept.tally[0], 0, float(place)))
+        decided, count = beside.decided[lane], kept.tally[0]
+        if count >= decided.shape[0] or np.isnan(decided[count, 0]):  # else it is known from longer steps
+            most = -np.inf
+            for q in range(table.shape[0]):
+                for i in range(y.shape[0]):
+                    y[i] = now.x[i] + table[q, i]
+                status = max(status, _law(own, now.t, now.plan, y, work.point))
+                loss = dot(kept.push, work.point.k)  # c'kappa at the state, of (H.14)
+                if loss > most:
+                    most, place = loss, q
+        place = int(decide(decided, count, 0, float(place)))
     square, room = 0.0, beside.most[lane] * (now.t - kept.then[0])
     for i in range(y.shape[0]):
         square += (sign * table[place, i] - kept.noise[i]) ** 2

@@ -244,8 +244,13 @@ def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
 
 
 def noises(noise: float | Array, B_pinv: Array) -> Array:
-    """Noise (Q, n) of a ball in the states, or of a box: what B^+ (m, n) makes most of, then all directions."""
+    """Noise (Q, n) of a ball in the states, or of a box: what B^+ (m, n) makes most of, then all directions.
+
+    One row where there is none: nothing is to be chosen then.
+    """
     n = B_pinv.shape[1]
+    if not np.any(noise):
+        return np.zeros((1, n))
     rng = np.random.default_rng(0)
     if np.ndim(noise):
         table = np.where(rng.random((_CANDIDATES, n)) < 0.5, -1.0, 1.0)
