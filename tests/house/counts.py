@@ -70,7 +70,12 @@ def _is_mapping_of_any(node: ast.Subscript) -> bool:
 def _reads_a_key(node: ast.AST) -> bool:
     """`data["key"]` and `data.get("key")`; not where a key is written."""
     if isinstance(node, ast.Subscript):
-        return isinstance(node.ctx, ast.Load) and _is_text(node.slice)
+        of_a_type = isinstance(node.value, ast.Name) and node.value.id in (
+            "list",
+            "tuple",
+            "type",
+        )  # a forward reference
+        return isinstance(node.ctx, ast.Load) and _is_text(node.slice) and not of_a_type
     is_get = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "get"
     return is_get and bool(node.args) and _is_text(node.args[0])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from tubecert.claims.advice import HardwareCause, HardwarePart
 from tubecert.conditions import hardware as theorem_h
@@ -30,6 +30,13 @@ from tubecert.search.stretches import propose_distance_in_parts, propose_sampled
 LEAST, MACHINE, LARGEST = "least_adaptation", "machine", "largest"
 
 
+class _Rated(Protocol):
+    """Gains with an adaptation rate."""
+
+    @property
+    def adaptation_rate(self) -> Fraction: ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposer:
     """`propose` gains; `slopes`: how the least adaptation rate reacts to each constant, if there is one.
@@ -40,7 +47,7 @@ class Proposer:
 
     propose: Callable[[TubeProblem, Asked], Proposal[Any]]
     slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
-    least: Callable[[TubeProblem], Any] | None = None
+    least: Callable[[TubeProblem], _Rated | None] | None = None
     machine: bool = False
 
     def explain(
@@ -63,7 +70,7 @@ class Proposer:
 
     def _least(self, problem: TubeProblem) -> Fraction | None:
         recipe = None if self.least is None else self.least(problem)
-        return None if recipe is None else Fraction(recipe.adaptation_rate)
+        return None if recipe is None else recipe.adaptation_rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
