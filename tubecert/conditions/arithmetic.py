@@ -105,15 +105,19 @@ def log1p_ratio(x: T) -> T:
     if isinstance(x, Interval):
         return Interval(_ratio_at(x.hi).lo, _ratio_at(x.lo).hi).sanitised()
     small = np.abs(x) < 1e-5
+    if not small.any():
+        return np.asarray(np.log1p(x) / x)
     return np.where(small, 1 - x / 2 + x * x / 3, np.log1p(x) / np.where(small, 1.0, x))
 
 
 def _ratio_at(x: Array) -> Interval:
     """The same at floats; near 0 from 1 - x/2 <= r(x) <= 1 - x/2 + x^2/2, which holds for |x| <= 1/3."""
     point = Interval.exact(x)
-    line = 1 - point / 2
     quotient = iv.log1p(point) / point
     near = np.abs(x) <= 1e-5
+    if not near.any():
+        return quotient
+    line = 1 - point / 2
     return Interval(
         np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
     )
@@ -125,15 +129,19 @@ def decay_mean(y: T) -> T:
     if isinstance(y, Interval):
         return Interval(_decay_mean_at(y.hi).lo, _decay_mean_at(y.lo).hi).sanitised()
     near = np.abs(y) < 1e-5
+    if not near.any():
+        return np.asarray(-np.expm1(-y) / y)
     return np.where(near, 1 - y / 2 + y * y / 6, -np.expm1(-y) / np.where(near, 1.0, y))
 
 
 def _decay_mean_at(y: Array) -> Interval:
     """The same at floats; near 0 from 1 - y/2 <= value <= 1 - y/2 + y^2/2."""
     point = Interval.exact(y)
-    line = 1 - point / 2
     quotient = iv.expm1(-point) / (-point)
     near = np.abs(y) <= 1e-5
+    if not near.any():
+        return quotient
+    line = 1 - point / 2
     return Interval(
         np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
     )
