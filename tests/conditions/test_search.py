@@ -537,6 +537,7 @@ def test_the_least_rate_alone_is_that_of_the_whole_proposal(recipe, problem):
     assert proposer.least(problem) == proposer.propose(problem, Asked()).at(LEAST)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_problems_end_in_a_verdict_that_says_why(seed):
     rng = np.random.default_rng(seed)

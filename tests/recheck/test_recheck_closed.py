@@ -69,18 +69,21 @@ def forever(document):
     return document
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["expressions", "csv", "ilqr"])
 def test_a_plan_that_moves_has_a_horizon(plans, kind):
     assert plans[kind]["result"]["verdict"] == "certified"
     assert "trajectory.horizon is missing" in refused(forever(plans[kind]))
 
 
+@pytest.mark.slow
 def test_a_plan_that_grows_is_no_plan_for_all_time(plans):
     document = forever(plans["expressions"])
     document["result"]["spec"]["effective"]["trajectory"]["x"][1] = "0.1*sin(t) + 0.1*cos(t) + 1000000*t**3"
     refused(document)
 
 
+@pytest.mark.slow
 def test_no_other_kind_takes_a_plan_that_moves(plans):
     document = forever(plans["expressions"])
     trajectory = document["result"]["spec"]["effective"]["trajectory"]
@@ -90,6 +93,7 @@ def test_no_other_kind_takes_a_plan_that_moves(plans):
     refused(document)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("horizon", [None, "0", "-3", "1/0", 3, "t", "1e400"])
 def test_a_horizon_is_a_positive_number(plans, horizon):
     document = copy.deepcopy(plans["expressions"])

@@ -356,6 +356,7 @@ def test_outcomes_of_a_forged_certificate_are_not_those_of_another(honest):
     assert refused(document, memory)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lower", "h", "plan_defect"])
 def test_claims_of_h_depend_on_all_that_they_rest_on(honest, name):
     case, other = case_of(honest[0]), copy.deepcopy(honest[0])

@@ -229,6 +229,7 @@ def test_no_constant_of_a_window_may_be_less_than_it_is(honest, name):
         assert any(item.startswith(f"B: window {j}: {name} ") for item in found), (j, name)
 
 
+@pytest.mark.slow
 def test_windows_of_a_specification_are_those_of_the_section(honest):
     """Other times in the specification: the cheap claims say so."""
     document = copy.deepcopy(honest[0])

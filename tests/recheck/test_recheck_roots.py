@@ -40,6 +40,7 @@ def test_roots_of_the_same_number_are_the_same(text, zero):
     assert vanish(terms([text], "xyz")) is zero
 
 
+@pytest.mark.slow
 def test_a_plan_whose_input_has_a_root_over_the_whole_horizon():
     """A root of a wide range has no bounds: the plan is cut until it has."""
     document = certified(DRAG, conditions="distance")
