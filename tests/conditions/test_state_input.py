@@ -58,6 +58,7 @@ def test_constants_agree_with_closed_forms(result):
         assert constant["above"] <= 1.01 * value, name
 
 
+@pytest.mark.slow
 def test_the_largest_rate_is_the_closed_form(result):
     # C2 reads 2 (-1 - 0.5 (2 + sin x2)) + 2 rate <= 0
     low, high = result["metric"]["largest_rate"]

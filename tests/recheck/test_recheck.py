@@ -286,6 +286,7 @@ def test_a_certificate_forged_for_another_system_fails_by_name(shipped, change, 
     assert claim in found.failing.name
 
 
+@pytest.mark.slow
 def test_another_metric_in_the_section_alone_is_named(shipped):
     document = shipped(THREE)
     document["result"]["metric"]["dual_metric"][0][0] = "0.20366"

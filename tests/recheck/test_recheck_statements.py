@@ -244,6 +244,7 @@ KINKED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINKED)
 def test_every_branch_of_a_kink_counts(name):
     """Just above the truth it is proven, also over boxes that hold the kink; just below it never is."""
