@@ -19,8 +19,9 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 gc.disable()  # thousands of tests are collected, and none of them is garbage
 
 
-def pytest_collection_finish():
-    """What stays until the end need not be looked through again and again."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop():
+    """What was collected stays until the end, and need not be looked through again and again."""
     gc.freeze()
     gc.enable()
 
