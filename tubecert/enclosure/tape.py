@@ -73,7 +73,11 @@ class Tape:
             memory[target] = values[index]
         with np.errstate(all="ignore"):
             for op, target, arguments, exponent in self._steps:
-                if op == "table":
+                if op == "mul":  # nearly all steps are of these two: without a list and a call
+                    memory[target] = memory[arguments[0]] * memory[arguments[1]]
+                elif op == "add":
+                    memory[target] = memory[arguments[0]] + memory[arguments[1]]
+                elif op == "table":
                     memory[target] = lookup.values(self._tables[exponent], memory[arguments[0]])
                 else:
                     memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
@@ -116,8 +120,6 @@ def _constant(node: Expression) -> Interval:
 
 
 _FLOATS: Mapping[str, Callable[[list[Array], int], Array]] = {
-    "add": lambda a, _: a[0] + a[1],
-    "mul": lambda a, _: a[0] * a[1],
     "div": lambda a, _: a[0] / a[1],
     "pow": lambda a, n: np.power(a[0], n) if n > 0 else 1.0 / np.power(a[0], -n),
     "sqrt": lambda a, _: np.sqrt(a[0]),
