@@ -318,6 +318,7 @@ def test_the_units_of_a_drift_are_the_least_noise():
         feedback_time=None,
         predict=False,
         bandwidth=None,
+        arithmetic=None,
     )
     assert promise(asked).drift == 30
 
