@@ -17,6 +17,7 @@ from tubecert.export.folder import exported
 from tubecert.export.program import GREATEST, LEAST, Program
 from tubecert.export.reference import execute
 from tubecert.export.rounding import UncoveredError, rounding_of, within
+from tubecert.expression import constant
 from tubecert.model import build
 from tubecert.spec import load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -213,7 +214,7 @@ def test_what_may_be_a_root_of_less_than_nothing_has_no_bound():
     text = PATH.replace('v, "p - v/2"', 'v, "p - v/2 + sqrt(p + 1/5) - sqrt(1/5)"')
     own = recipe(rounding=(ANY,))
     given = machine(text, recipe=own, horizon=None, feedback_gain=DU)
-    with pytest.raises(UncoveredError, match="no bound"):
+    with pytest.raises(UncoveredError, match="overflows"):
         rounding_of(assembled(replace(given, reach=Fraction(1))), "double")
     assert rounding_of(assembled(replace(given, reach=Fraction(1, 50))), "double").estimate < Fraction(
         1, 10**9
@@ -223,3 +224,19 @@ def test_what_may_be_a_root_of_less_than_nothing_has_no_bound():
 def test_samples_beyond_the_counter_are_not_covered():
     with pytest.raises(UncoveredError, match="counts"):
         rounding_of(controller(held=True, horizon=Fraction(10**8)), "double")
+
+
+def test_units_in_which_the_feedback_leaves_the_type_are_not_covered():
+    """|c|^2 overflows: in single the share would be 0, and no feedback were left."""
+    given = GIVEN["held_orbit"]
+    W = tuple(tuple(e * constant(Fraction(1, 10**22)) for e in row) for row in given.model.W)
+    odd = replace(given, model=replace(given.model, W=W), recipe=replace(given.recipe, rounding=(ANY,)))
+    with pytest.raises(UncoveredError, match="overflows"):
+        rounding_of(assembled(replace(odd, feedback_gain=DU)), "single")
+
+
+def test_a_number_that_single_has_not_is_not_covered():
+    text = PATH.replace("[0], [1]", "[0], [1e39]")
+    given = machine(text, recipe=recipe(rounding=(ANY,)), horizon=None, feedback_gain=DU)
+    with pytest.raises(UncoveredError, match="too large"):
+        rounding_of(assembled(given), "single")

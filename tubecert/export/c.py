@@ -14,7 +14,7 @@ from tubecert.export.vectors import Vectors
 from tubecert.export.words import TIMING, heading, promise
 
 _UNSAFE: Final = (
-    "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__",
+    "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__", "_M_FP_FAST",
 )  # fmt: skip
 
 

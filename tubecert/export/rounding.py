@@ -47,9 +47,11 @@ class Float:
 
     def near(self, value: Fraction) -> Fraction:
         """The number of the type that stands in the code for a constant."""
-        return (
-            Fraction(float(np.float32(float(value)))) if self.unit > DOUBLE.unit else Fraction(float(value))
-        )
+        with np.errstate(over="ignore"):
+            near = float(np.float32(float(value))) if self.unit > DOUBLE.unit else float(value)
+        if not np.isfinite(near):
+            raise UncoveredError("a number that is too large for this type")
+        return Fraction(near)
 
 
 DOUBLE: Final = Float(unit=Fraction(1, 2**53), least=Fraction(1, 2**1074), most=2.0**1022)
@@ -178,7 +180,8 @@ class _Analysis:
             found = self._rounded(*_combined("mul", r, found))
             found = self._rounded(*_combined("add", powers[k], found))
         wrong = 4 * late * Interval.exact(float(np.max(slope.sanitised().magnitude)))
-        return Followed(value=found.value, error=(Interval.exact(found.error) + wrong).hi)
+        worst = np.full_like(found.error, np.max(found.error))  # of whichever piece the code takes
+        return Followed(value=found.value, error=(Interval.exact(worst) + wrong).hi)
 
     def _near(self, xs: Sequence[Followed]) -> list[Followed]:
         """What may be measured: in the tube around x*, and without an error, as it is what the code has."""
@@ -209,10 +212,19 @@ class _Analysis:
         L = du * reach + beyond
         if not bool(np.all(beyond.hi <= (du * reach).lo)):
             raise UncoveredError("the feedback, in this type: its limit has no digit that is right")
-        above = beyond + theta * L
         least = sqrt(Interval.of(LEAST_SIZE))
+        self._require_no_overflow((C * C, (L + excess.most) / least, found["told"][0].most))
+        # a share and its product with c may underflow
+        above = beyond + theta * L + self.eta * (2 * C + 2 * self.m + 4)
         r_a = e_a + L * (7 * e_c + 4 * theta * (C + e_c)) + 2 * C * beyond + 2 * L * least + C * above
         return _Law(lost=_most(r_a), beside=_most(above), feedback=_most(L + above))
+
+    def _require_no_overflow(self, sizes: Sequence[Interval]) -> None:
+        """Of what (H.37) computes after c and alpha/2."""
+        if not all(bool(np.all(x.sanitised().hi < self.real.most)) for x in sizes):
+            raise UncoveredError(
+                "a feedback that overflows in this type; other units of the metric may serve"
+            )
 
     def _written(self, law: _Law, us: Sequence[Followed]) -> Interval:
         """u* and the two sums that make the input of kappa, u* and the estimate."""
@@ -225,7 +237,11 @@ class _Analysis:
 
     def _clipped(self) -> Interval:
         """The projection: of a box its ends are rounded, of a ball the length, the share and the product."""
-        return (self.m + 8) * self.u * self._estimate + 4 * self.m * self.eta
+        square = self.m * self._estimate * self._estimate
+        self._require_no_overflow((square,))
+        # a length of which the square underflows may not be clipped
+        unseen = 2 * sqrt((self.m + 2) * self.eta)
+        return (self.m + 8) * self.u * self._estimate + 4 * self.m * self.eta + unseen
 
     # -- the estimate
 

@@ -15,8 +15,9 @@ _EXACT: Final = (
 )
 _ROUNDED: Final = (
     "What the proof covers: the loop of theorem H-R, which is this code with the rounding of its arithmetic.",
-    "Assumed of the computer: IEEE 754, rounded to nearest, functions of math.h within 4 units in the last",
-    "place, inputs that act as they are given, and measurements that are the numbers handed in.",
+    "Assumed of the computer: IEEE 754 with subnormal numbers, rounded to nearest, functions of math.h within",
+    "4 units in the last place, inputs that act as they are given, measurements that are the numbers handed",
+    "in, and times given to `feedforward` that are off by their last digit at most.",
 )
 TIMING: Final = (
     "`start` with what is measured at t = 0 gives the input that acts at once. Then",

@@ -275,5 +275,7 @@ def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRec
             break
     if recipe is None:
         return Proposal()
-    curve = _curve(search, setting) if asked.curve and serves(problem, recipe) else ()
+    # what rounding may cost belongs to one sample time: no curve over others
+    wanted = asked.curve and not search.rounding
+    curve = _curve(search, setting) if wanted and serves(problem, recipe) else ()
     return Proposal(decisive=recipe, role="largest" if searched else "machine", curve=curve)

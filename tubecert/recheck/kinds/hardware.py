@@ -463,6 +463,8 @@ def _curve_holds(section: HardwareSection, recipe: Digital, ground: Ground) -> O
     """Every point of the curve is feasible for the same machine, by a recipe that is found here."""
     if ground.machine is None:
         return stated(False, "there is no machine")
+    if recipe.losses is not None and section.curve:
+        return stated(False, "what rounding may cost belongs to one sample time, and there are others")
     return all_of(_feasible(point, recipe, ground) for point in section.curve)
 
 
