@@ -232,7 +232,7 @@ def test_units_in_which_the_feedback_leaves_the_type_are_not_covered():
     W = tuple(tuple(e * constant(Fraction(1, 10**22)) for e in row) for row in given.model.W)
     odd = replace(given, model=replace(given.model, W=W), recipe=replace(given.recipe, rounding=(ANY,)))
     with pytest.raises(UncoveredError, match="overflows"):
-        rounding_of(assembled(replace(odd, feedback_gain=DU)), "single")
+        rounding_of(assembled(replace(odd, feedback_gain=DU / 10**11, reach=given.reach * 10**11)), "single")
 
 
 def test_a_number_that_single_has_not_is_not_covered():
