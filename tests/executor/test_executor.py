@@ -56,8 +56,8 @@ def test_results_are_in_the_order_of_the_items(executor):
     assert executor.map(slow_first, range(5)) == [0, 1, 4, 9, 16]
     assert executor.map(slow_first, []) == []
     done: list[int] = []
-    assert executor.map(slow_first, range(3), lambda: done.append(len(done))) == [0, 1, 4]
-    assert done == [0, 1, 2]
+    assert executor.map(slow_first, range(3), lambda place, found: done.append(place)) == [0, 1, 4]
+    assert sorted(done) == [0, 1, 2]
     assert nobody_is_left()
 
 
@@ -67,7 +67,7 @@ def test_an_exception_of_a_piece_is_raised(executor):
     with pytest.raises(ZeroDivisionError, match="of a worker"):
         executor.map(failing, range(50))
     with pytest.raises(ZeroDivisionError, match="of a worker"):
-        executor.map(failing, range(50), lambda: None)
+        executor.map(failing, range(50), lambda place, found: None)
     assert nobody_is_left()
 
 

@@ -19,7 +19,7 @@ from test_sweep import ONE, bytes_in
 from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.libraries import versions
 from tubecert.simulate import monte_carlo
-from tubecert.simulate.setting import Choice, loop_of
+from tubecert.simulate.tuning import Choice, loop_of
 
 pytestmark = [
     pytest.mark.slow,

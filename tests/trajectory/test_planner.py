@@ -308,7 +308,7 @@ def test_an_unwritable_cache_is_noted_and_does_no_harm(tmp_path, monkeypatch):
     blocked.write_text("", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     seen = []
-    laid(edited(SMALL, FREE), MODEL, ROOM, lambda name, count, unit: seen.append(name))
+    laid(edited(SMALL, FREE), MODEL, ROOM, lambda step: seen.append(step.name))
     assert any("not kept" in name for name in seen)
 
 

@@ -285,8 +285,9 @@ class Ladder:
                 self.proven.append(outcome)
                 return outcome
             if proposal.coefficients is not None and not retreated and self.request.thorough:
-                back_offs, retreated = [back_off * _RETREAT], True
-            elif retreated:
+                # what was found may be no solution but for a solver's last digits: smaller ones are left to be tried
+                back_offs, retreated = [back_off * _RETREAT, *back_offs], True
+            elif retreated and proposal.coefficients is not None:
                 return None
         return None
 
