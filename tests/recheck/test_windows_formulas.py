@@ -170,7 +170,8 @@ def cases():
     """Windows of which every term is alive, with a filter, without one and on two clocks."""
     found = []
 
-    @settings(database=None, derandomize=True, max_examples=40, phases=[Phase.generate], deadline=None)
+    # enough of them for every bug, whichever they are: they depend on what else is loaded
+    @settings(database=None, derandomize=True, max_examples=160, phases=[Phase.generate], deadline=None)
     @given(courses())
     def gathered(case):
         if len(case[1].windows) > 1:

@@ -198,7 +198,7 @@ class _Analysis:
         f = self._run(self.c.drift, {"x": y})["f"]
         vs = self._run(self.c.flow, {"x": xs, "u": us})["v"]
         found = self._run(self.c.law, {"y": y, "f": f, "xs": xs, "vs": vs, "us": us}, apart=("y", "xs"))
-        z, c, (excess,) = found["z"], found["c"], found["excess"]
+        z, c, (excess,), (square, *_) = (found[name] for name in ("z", "c", "excess", "told"))
         e_z, e_c, e_a = _length(z), _length(c), Interval.exact(excess.error)
         C = _size(c)
         theta = 2 * (self.m + 8) * self.u + self.m * self.eta / Interval.of(LEAST_SIZE)
@@ -213,7 +213,7 @@ class _Analysis:
         if not bool(np.all(beyond.hi <= (du * reach).lo)):
             raise UncoveredError("the feedback, in this type: its limit has no digit that is right")
         least = sqrt(Interval.of(LEAST_SIZE))
-        self._require_no_overflow((C * C, (L + excess.most) / least, found["told"][0].most))
+        self._require_no_overflow((C * C, (L + excess.most) / least, square.most))
         # a share and its product with c may underflow
         above = beyond + theta * L + self.eta * (2 * C + 2 * self.m + 4)
         r_a = e_a + L * (7 * e_c + 4 * theta * (C + e_c)) + 2 * C * beyond + 2 * L * least + C * above
