@@ -193,7 +193,7 @@ class _Analysis:
     # -- the feedback
 
     def _law(self, xs: Sequence[Followed], us: Sequence[Followed]) -> _Law:
-        """r_a, and what kappa may be above du d: theory 8.11, (H.37)-(H.39)."""
+        """r_a, and what kappa may be above du d: theory 8.11, (H.37), (H.38)."""
         y = self._near(xs)
         f = self._run(self.c.drift, {"x": y})["f"]
         vs = self._run(self.c.flow, {"x": xs, "u": us})["v"]
@@ -208,7 +208,7 @@ class _Analysis:
         du, reach = Interval.of(self.c.feedback_gain), Interval.of(self.c.reach)
         off = sqrt(self.norm_M) * e_z
         lost = sqrt(self.eta * (self.n + 2) ** 2 * (1 + self.norm_M) * (1 + reach * reach * self.norm_W))
-        beyond = du * (off + (nu + 6 * self.u) * (reach + off) + lost)  # e_l, (H.37)
+        beyond = du * (off + (nu + 6 * self.u) * (reach + off) + lost)  # e_l, (H.38)
         L = du * reach + beyond
         if not bool(np.all(beyond.hi <= (du * reach).lo)):
             raise UncoveredError("the feedback, in this type: its limit has no digit that is right")
