@@ -294,4 +294,4 @@ def test_the_largest_d_of_a_short_stretch_is_no_limit():
     D = DistanceBound(
         d0=one(F(1, 10)), beta=one(1), H0=one(2), S=one(2), e=one(0), delta=one(0), lam=one(1), omega=one(9)
     )
-    assert float(stretches._highest(replace(D, horizon=one(F(1, 100))), one(F(1, 100))).hi) < 0.13
+    assert float(replace(D, horizon=one(F(1, 100))).supremum().hi) < 0.13

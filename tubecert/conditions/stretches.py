@@ -16,7 +16,7 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import T, exp, expm1, maximum, minimum, number, quiet
 from tubecert.conditions.inputs import InputShares, shares
-from tubecert.conditions.kernels import DistanceBound, kappa
+from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import Numbers, Part, TubeProblem
 from tubecert.conditions.wind import drifting, pushed
@@ -78,7 +78,7 @@ def through(n: Numbers[T], omega: T, stretches: Sequence[Stretch[T]], start: Gon
             omega=omega,
             horizon=each.length,
         )
-        highest = maximum(highest, _highest(D, each.length))
+        highest = maximum(highest, D.supremum())
         most = maximum(most, maximum(mu, each.S) + each.e)
         at = Gone(distance=D.at(each.length), memory=_towards(mu, each.S, omega * each.length))
     return Course(supremum=highest, uncertainty=most, end=at)
@@ -87,16 +87,6 @@ def through(n: Numbers[T], omega: T, stretches: Sequence[Stretch[T]], start: Gon
 def _towards(start: T, end: T, age: T) -> T:
     """S + (mu - S) e^(-age)."""
     return start * exp(-age) - end * expm1(-age)
-
-
-def _highest(D: DistanceBound[T], length: T) -> T:
-    """sup D: the smaller of the exact supremum and of max(d0, m(L)) + max(C1, 0) kappa, m being D without C1 K.
-
-    Where H0 = S, intervals cannot tell whether D has a maximum inside, and L may be too short to reach A1.
-    """
-    ends = maximum(D.d0, _towards(D.d0, D.ultimate(), D.lam * length))
-    C1 = maximum(number(0, D.S), D.beta * (D.H0 - D.S))
-    return minimum(D.supremum(), ends + C1 * kappa(D.lam, D.omega))
 
 
 @quiet

@@ -13,13 +13,12 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Generic
 
-from tubecert.conditions.arithmetic import T, decay_mean, exp, expm1, maximum, minimum, number, quiet
+from tubecert.conditions.arithmetic import T, decay_mean, exp, expm1, maximum, number, quiet
 from tubecert.conditions.hardware.course import Course, course, mean_wait, resumed
 from tubecert.conditions.hardware.estimation import Past, estimate
 from tubecert.conditions.hardware.evaluation import Evaluated
 from tubecert.conditions.hardware.feedback import loss
 from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, loop_of, plant
-from tubecert.conditions.kernels import kappa
 from tubecert.conditions.machine import Window
 from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.interval import Interval
@@ -115,17 +114,10 @@ def _left(p: Plant[T], loop: Loop[T], span: Span[T]) -> T:
 
 
 def _highest(run: Course[T], length: T) -> T:
-    """sup D from where the bound begins, over a length of time.
-
-    The smaller of the exact supremum and of max(d0, m(L)) + max(C1, 0) kappa, m being D without C1 K: where H0 = S,
-    intervals cannot tell whether D has a maximum inside, and L may be much too short to reach A1.
-    """
-    D = replace(run.bound, horizon=length)
-    ends = maximum(D.d0, _without_filter(run, length))
+    """sup D from where the bound begins, over a length of time."""
     if run.omega is None:
-        return ends
-    C1 = maximum(number(0, D.S), D.beta * (D.H0 - D.S))
-    return minimum(D.supremum(), ends + C1 * kappa(D.lam, D.omega))
+        return maximum(run.bound.d0, _without_filter(run, length))
+    return replace(run.bound, horizon=length).supremum()
 
 
 def _at(run: Course[T], t: T) -> T:
