@@ -1,9 +1,12 @@
 """What fills the tube: the causes make up the whole, and each is what it is called."""
 
+from dataclasses import replace
+
 import pytest
 from proven import proven
 
 from tubecert.certificate.result import Certificate
+from tubecert.report.sections import beyond_its_theorem
 from tubecert.report.shares import filled
 
 WINDY = """
@@ -39,3 +42,13 @@ def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
     assert told["sampled"]["wind that the estimate takes for uncertainty"] == pytest.approx(
         0.05 / 0.8, rel=1e-6
     )
+
+
+def test_a_certificate_that_is_not_stated_for_wind_says_so():
+    windy = Certificate.from_json(proven(WINDY)).result
+    [line] = beyond_its_theorem(windy)
+    assert line.startswith(
+        "A (26) is undecided: the theorem is stated for inputs and matched uncertainty alone"
+    )
+    calm = replace(windy, claim=replace(windy.claim, wind=None))
+    assert not list(beyond_its_theorem(calm))

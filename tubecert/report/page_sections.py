@@ -187,6 +187,7 @@ def _gains(result: Result) -> Iterator[Block]:
         NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
     ]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
+    yield from (Words(text=line) for line in sections.beyond_its_theorem(result))
     yield from (Words(text=line) for line in sections.without_adaptation(result))
     if (limit := sections.sample_time_limit(result)) is not None:
         yield Words(text=f"However large the bandwidth, C needs a sample time below {down(limit)} s.")

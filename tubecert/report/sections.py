@@ -17,7 +17,7 @@ from tubecert.claims.assumptions import MachineAsGiven
 from tubecert.claims.family import Assumption, Reason
 from tubecert.digits import UNKNOWN, down, end, exact, near, percent, short, up
 from tubecert.enclosure.constant import Witness
-from tubecert.kinds import ALONE, HARDWARE, SAMPLED
+from tubecert.kinds import ALONE, HARDWARE, RATES, SAMPLED
 from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report import windows
@@ -31,6 +31,7 @@ from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
 from tubecert.words.claims import message, title
+from tubecert.words.conditions import SAYS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -151,8 +152,16 @@ def _gains(result: Result) -> list[RenderableType]:
         NAMES[key] for key in NAMES if key in result.sections and all(row.section != key for row in found)
     ]
     body += [Text(f"{title}: no gains were found") for title in missing]
-    body += [Text(line) for line in without_adaptation(result)]
+    body += [Text(line) for line in (*beyond_its_theorem(result), *without_adaptation(result))]
     return body + _limit(result)
+
+
+def beyond_its_theorem(result: Result) -> Iterator[str]:
+    """Why certificate A decides nothing though it has gains: what acts is more than it is stated for."""
+    section = result.sections.get(RATES.key)
+    acts = result.claim.wind is not None or result.claim.parameters is not None
+    if acts and section is not None and section.verdict == Verdict.UNDECIDED:
+        yield f"{NAMES[RATES.key]} is undecided: {SAYS['wind_not_covered']}."
 
 
 def without_adaptation(result: Result) -> Iterator[str]:
