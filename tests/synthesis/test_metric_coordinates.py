@@ -1,4 +1,4 @@
-"""Metrics do not depend on the units of the states."""
+"""Metrics do not depend on the units of states, inputs and time."""
 
 from fractions import Fraction
 
@@ -15,7 +15,10 @@ from tubecert.spec import Synthesis, load_text
 from tubecert.spec.canonical import synthesis_data
 from tubecert.synthesis.coordinates import coordinates
 from tubecert.synthesis.family import metric_family
+from tubecert.synthesis.ladder import Ladder, Request
+from tubecert.synthesis.problem import FLOORS
 from tubecert.synthesis.rounding import rounded
+from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
 JOINT = """
@@ -143,3 +146,79 @@ def test_digits_are_those_of_the_entry(entries, digits, power):
     values = np.array([[[4, b], [b, c]]]) + a * 0
     found = np.array(rounded(values * size, digits, size), dtype=float)[0] / size
     assert np.abs(found - values[0]).max() <= 0.5 * 10.0 ** (1 - digits) * (1 + 1e-9)
+
+
+# -- units of inputs and of time
+
+# a, b, c, T: how many of the new units one of the old is; one of the old unit of time is 1/T of the new one
+DRIVEN = """
+tubecert: 1
+name: driven
+system:
+  states: [q, w]
+  inputs: [u]
+  parameters: {{a: {a}, b: {b}, c: {c}, T: {T}}}
+  f: ["a*w/b*T", "b*T*(3*sin(q/a) - 0.5*w/b)"]
+  B: [[0], ["b*T*2/c"]]
+safe_set: {{q: [-a, a], w: [-4*b, 4*b]}}
+uncertainty: {{h: ["c*(0.2*sin(2*T*t) + 0.1*q/a)"]}}
+trajectory: {{kind: equilibrium, at: [0, 0], input: [0]}}
+initial_state: {{at: [0.02*a, 0]}}
+tube: {{half_widths: {{q: 0.2*a, w: b}}}}
+"""
+ONES = dict.fromkeys("abcT", 1)
+any_unit = st.sampled_from([1, 57, 1000, Fraction(1, 8), Fraction(1, 1000)])
+
+
+@pytest.mark.slow
+@given(st.fixed_dictionaries(dict.fromkeys("abcT", any_unit)), st.sampled_from(["cegis", "sos"]))
+@settings(deadline=None, max_examples=4)
+def test_what_is_least_does_not_depend_on_the_units_of_inputs_and_time(units, route):
+    """kappa over both floors: B B' is as large as its unit, and the rows of C2 have 1/s in them."""
+    found = []
+    for each in (ONES, units):
+        spec = load_text(DRIVEN.format(**each))
+        ladder = Ladder(
+            Request(
+                model=build(spec),
+                safe_set=spec.safe_set,
+                routes=routes(route),
+                degree=0,
+                coordinates="auto",
+                half_widths=(Fraction(each["a"]) / 5, Fraction(each["b"])),
+            )
+        )
+        metrics = [ladder.metric(Fraction(7, 4) * Fraction(each["T"]), floor) for floor in FLOORS]
+        found.append([metric.proposal.kappa for metric in metrics])
+    assert found[1] == pytest.approx(found[0], rel=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("time", ["1/1000", "1000"])
+def test_a_bare_synthesis_finds_the_same_in_another_unit_of_time(time):
+    tables = []
+    for units in (ONES, ONES | {"b": 8, "c": "1/1000", "T": time}):
+        found = pipeline.synthesise(
+            load_text(DRIVEN.format(**units)),
+            Synthesis(rate=Fraction(7, 4) * Fraction(units["T"]), objective="adaptation", degree=0),
+            Options(conditions="distance"),
+        )
+        T, c = float(Fraction(units["T"])), float(Fraction(units["c"]))
+        tables.append(
+            [
+                (float(row.rate) / T, (row.bandwidth or 0) / T, (row.adaptation_rate or 0) / c**2)
+                for row in found.rows
+            ]
+        )
+    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_largest_rate_does_not_depend_on_the_unit_of_time():
+    rates = []
+    for T in ("1", "1/4096", "10000"):
+        spec = load_text(DRIVEN.format(**(ONES | {"T": T})))
+        wanted = Synthesis(objective="rate", condition_number=Fraction(30), degree=0)
+        found = pipeline.synthesise(spec, wanted, Options())
+        rates.append(float(found.file.rate / Fraction(T)))
+    assert rates == pytest.approx([rates[0]] * 3, rel=0.011)

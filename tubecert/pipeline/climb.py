@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import inf, sqrt
+from math import inf, log2, sqrt
 
 import numpy as np
 
@@ -30,6 +30,7 @@ _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
 _ROUNDER = 0.95  # of the condition number
 _UP = 1 + 1e-9  # so that rounding down starts from what the last digits of a mode do not change
+_UNUSUAL = 64  # such a slow scale, or its inverse, is one of another unit of time
 _NOTHING = 1e-3  # a mode is 0 below this share of the fastest motion
 
 Compare = Callable[[Fraction, Floor, bool], Row | None]
@@ -174,6 +175,12 @@ def slow_scale(model: ControlAffineModel, spec: Spec) -> Fraction:
     if spec.trajectory.horizon is not None:
         scale = max(scale, 1 / float(spec.trajectory.horizon))
     return two_digits(Fraction(scale * _UP))
+
+
+def pace(slow: Fraction) -> Fraction:
+    """Where a search for the largest rate begins, in 1/s: at 1, but for systems of quite another scale of time."""
+    usual = 1 / _UNUSUAL <= slow <= _UNUSUAL
+    return Fraction(1) if usual else Fraction(4) ** round(log2(slow) / 2)
 
 
 def _slowest(A: np.ndarray) -> float:

@@ -54,7 +54,7 @@ from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
 from tubecert.pipeline.checks import missing_radii
-from tubecert.pipeline.climb import Climb, slow_scale
+from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.pipeline.width import measure_in
@@ -130,6 +130,7 @@ class SynthesisRun:
                 coordinates=wanted.coordinates,
                 half_widths=_half_widths(spec),
                 effort=self.effort,
+                pace=pace(slow_scale(self.model, spec)),
                 progress=self._tell,
             )
         )

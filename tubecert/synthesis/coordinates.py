@@ -2,7 +2,8 @@
 
 In the states' own units a condition number depends on the units: a speed in mm/s makes another metric the best. With
 x = S z, S = diag(half-widths of the safe set), the metric in z is S^-1 W S^-1, and what is best there is best in
-every unit. The columns of a frame are scaled as well, so that all unknowns are of one size.
+every unit. The columns of a frame are scaled as well, so that all unknowns are of one size. B B', which is a floor of
+W, is measured by its own size, and C2 by the rate that is asked for: so the unit of time is gone, too.
 Untrusted: W is proven in the states' own coordinates.
 """
 
@@ -17,6 +18,8 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
+from tubecert.expression.matrix import Matrix
+from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily
 
 Choice = Literal["auto", "identity"]
@@ -24,10 +27,15 @@ Choice = Literal["auto", "identity"]
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:
-    """`states` (n,): the diagonal of S; `columns` (n,): by what the columns of the frame are multiplied."""
+    """`states` (n,): the diagonal of S; `columns` (n,): by what the columns of the frame are multiplied.
+
+    `input`: what |S^-1 B| is measured in; `rate`: what rates are measured in, in 1/s.
+    """
 
     states: Array
     columns: Array
+    input: float = 1.0
+    rate: float = 1.0
 
     @property
     def entries(self) -> Array:
@@ -54,10 +62,22 @@ def coordinates(
 
 def _frame(family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]) -> Array:
     """The frame at the centre of the safe set, (n, n); the identity where it cannot be evaluated."""
-    n = len(safe_set)
+    values = _at_centre(family.frame, family.states, safe_set)
+    return values if (np.abs(values).max(axis=0) > 0).all() else np.eye(len(safe_set))
+
+
+def input_size(
+    model: ControlAffineModel, states: Array, safe_set: Sequence[tuple[Fraction, Fraction]]
+) -> float:
+    """|S^-1 B| at the centre of the safe set, S = diag(states); 1 where it is no positive number."""
+    size = float(np.linalg.norm(_at_centre(model.B, model.states, safe_set) / states[:, None], 2))
+    return size if 0 < size < np.inf else 1.0
+
+
+def _at_centre(entries: Matrix, names: Sequence[str], safe_set: Sequence[tuple[Fraction, Fraction]]) -> Array:
+    """A matrix of n rows at the centre of the safe set; 0 where it cannot be evaluated."""
     centre = np.array([[float((low + high) / 2)] for low, high in safe_set])
     with np.errstate(all="ignore"):
-        tape = Tape([e for row in family.frame for e in row], family.states)
-        values = np.asarray(tape.run_floats(list(centre), (1,)), dtype=float).reshape(n, n)
-    usable = np.isfinite(values).all() and (np.abs(values).max(axis=0) > 0).all()
-    return values if usable else np.eye(n)
+        tape = Tape([e for row in entries for e in row], names)
+        values = np.asarray(tape.run_floats(list(centre), (1,)), dtype=float).reshape(len(entries), -1)
+    return values if np.isfinite(values).all() else np.zeros_like(values)

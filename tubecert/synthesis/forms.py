@@ -28,6 +28,7 @@ class PointForms:
     """What the conditions at N points are made of.
 
     Shapes: frame E and input B B' (N, n, n); P, Q (N, r, n) with r = n - rank B; values g and rates f.grad g (N, K).
+    `unit`: the rate by which rows of C2 are divided.
     """
 
     frame: Array
@@ -36,6 +37,7 @@ class PointForms:
     Q: Array
     values: Array
     rates: Array
+    unit: float
 
     def inner(self, coefficients: Array) -> Array:
         """sum_k g_k V_k, (N, n, n)."""
@@ -61,12 +63,11 @@ class PointForms:
         return unknowns.spread(_pairs(self.P, self.P, unknowns), self.values)
 
     def contraction_rows(self, unknowns: Unknowns, rate: float) -> Array:
-        """Coefficients of the upper triangle of -N'(F_0 + 2 rate W)N on the unknowns, (N, r(r+1)/2, U)."""
+        """Coefficients of the upper triangle of -N'(F_0 + 2 rate W)N/unit on the unknowns, (N, r(r+1)/2, U)."""
         own = _pairs(self.P, self.P, unknowns)
         mixed = _pairs(self.Q, self.P, unknowns)
-        return unknowns.spread(own, self.rates - 2 * rate * self.values) - unknowns.spread(
-            2 * mixed, self.values
-        )
+        rows = unknowns.spread(own, self.rates - 2 * rate * self.values)
+        return (rows - unknowns.spread(2 * mixed, self.values)) / self.unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +123,11 @@ class FormsTape:
         self.variables = _used(entries, model)
         self._basis = np.eye(len(family.functions))
 
+    @property
+    def speeds(self) -> Array:
+        """What the entries of f are measured in, (n,)."""
+        return self._scaled.states * self._scaled.rate
+
     def orthonormalise(self, points: Array) -> None:
         """Change to functions that are orthonormal on the points (N, n): monomials are nearly dependent on small boxes.
 
@@ -154,11 +160,12 @@ class FormsTape:
         N = null_bases(B) if annihilator is None else annihilator * rows
         return PointForms(
             frame=E,
-            input=B @ _t(B),
+            input=B @ _t(B) / self._scaled.input**2,
             P=_t(N) @ E,
             Q=_t(N) @ A,
             values=g @ self._basis,
             rates=rates @ self._basis,
+            unit=self._scaled.rate,
         )
 
     def bases(self, points: Array) -> Array:
@@ -220,11 +227,12 @@ def _flat(forms: PointForms) -> Array:
     """Everything that multiplies a coefficient in C2, (N, anything)."""
     count = len(forms.values)
     own, mixed = (
-        np.einsum("pai,pbj->paibj", left, forms.P).reshape(count, -1) for left in (forms.P, forms.Q)
+        np.einsum("pai,pbj->paibj", left, forms.P).reshape(count, -1)
+        for left in (forms.P, forms.Q / forms.unit)
     )
     products = [
         np.einsum("pk,ps->pks", weights, pairs).reshape(count, -1)
-        for weights, pairs in ((forms.values, own), (forms.values, mixed), (forms.rates, own))
+        for weights, pairs in ((forms.values, own), (forms.values, mixed), (forms.rates / forms.unit, own))
     ]
     return np.concatenate(products, axis=1)
 

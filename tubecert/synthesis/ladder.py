@@ -25,7 +25,7 @@ _DEGREES = (0, 1, 2, 3, 4)
 _BACK_OFF = (1e-3, 1e-4, 1e-5)  # relative to the rate: what the proof may need
 _ROOM = 6.0  # so much more where W moves: it is proven box by box, and the more to spare the fewer there are
 _RETREAT = 10.0  # a feasible proposal that fails its proof is asked for again with so much more
-_LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in 1/s
+_LEAST, _MOST = Fraction(1, 1024), Fraction(1024)  # of searched rates, in those that the system is of
 _PAYS = 0.9  # a higher degree must lower the condition number to this share
 _SHARP = 1.01  # a searched rate is settled to this factor
 _LOOKS = 4  # for advice on what would work instead
@@ -44,7 +44,8 @@ class Request:
 
     `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
     for constant W, backwards where W moves; `limit` of the condition number. Unless
-    `thorough`, only the first route and back-off are tried; `rounds`: of all proposals together.
+    `thorough`, only the first route and back-off are tried; `rounds`: of all proposals together. `pace`: where the
+    search for the largest rate begins, in 1/s.
     """
 
     model: ControlAffineModel = field(repr=False)
@@ -59,6 +60,7 @@ class Request:
     thorough: bool = True
     rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
+    pace: Fraction = Fraction(1)
     progress: Progress | None = None
 
 
@@ -120,7 +122,7 @@ class Ladder:
         if best is None:
             return None
         failed = None
-        while failed is None and best.rate < _MOST:
+        while failed is None and best.rate < _MOST * self.request.pace:
             found = self._within(two_digits(best.rate * 2), limit)
             failed = two_digits(best.rate * 2) if found is None else None
             best = found or best
@@ -176,11 +178,11 @@ class Ladder:
     # -- one rate -----------------------------------------------------------------------------------------------
 
     def _first(self, limit: float | None, least: Fraction | None) -> VerifiedMetric | None:
-        """A metric at `least`, or at the largest power of two that has one."""
+        """A metric at `least`, or at the largest power of four times the pace that has one."""
         if least is not None:
             return self._within(least, limit)
-        rate = Fraction(1)
-        while rate >= _LEAST:
+        rate = self.request.pace
+        while rate >= _LEAST * self.request.pace:
             if found := self._within(rate, limit):
                 return found
             rate /= 4

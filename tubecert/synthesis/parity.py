@@ -31,10 +31,10 @@ def invariant_entries(
     mask = np.repeat(np.triu(np.ones((n, n), dtype=bool))[None], len(family.functions), axis=0)
     points = np.random.default_rng(7).uniform(box[:, 0], box[:, 1], (3, n))
     tape = Tape(model.f, model.states)
-    drift, here, projectors = _drift(tape, points), forms(points), forms.projectors(points)
+    drift, here, projectors = _drift(tape, points, forms), forms(points), forms.projectors(points)
     shared = []
     for signs in _candidates(box, forms.variables):
-        if not _same(_drift(tape, points * signs), drift * signs):
+        if not _same(_drift(tape, points * signs, forms), drift * signs):
             continue
         if not _same(forms.projectors(points * signs), signs[:, None] * projectors * signs):
             continue
@@ -69,8 +69,9 @@ def _candidates(box: Array, variables: tuple[int, ...]) -> list[Array]:
     return [np.array(signs) for signs in product(*choices) if min(signs) < 0]
 
 
-def _drift(tape: Tape, points: Array) -> Array:
-    return np.asarray(tape.run_floats(list(points.T), (len(points),)).T)
+def _drift(tape: Tape, points: Array, forms: FormsTape) -> Array:
+    """f at points, (N, n), free of units where the forms are."""
+    return np.asarray(tape.run_floats(list(points.T), (len(points),)).T / forms.speeds)
 
 
 def _same(a: Array, b: Array) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Final, Literal
 
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
 from tubecert.progress import Progress
-from tubecert.synthesis.coordinates import Choice, Coordinates, coordinates
+from tubecert.synthesis.coordinates import Choice, Coordinates, coordinates, input_size
 from tubecert.synthesis.family import MetricFamily
 
 Floor = Literal["identity", "input"]
@@ -21,7 +21,8 @@ class SynthesisProblem:
     """Find the member of `family` with the least kappa such that on the safe set (n pairs, in the order of the states)
 
     - floor <= W(x) <= kappa I, where the floor is I (kappa bounds the condition number sup lmax(W)/inf lmin(W)), or
-      `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well);
+      `input`: B B' <= W (kappa bounds (beta/sqrt(a))^2; W is kept definite by a small multiple of I as well), B being
+      measured by its size in these coordinates;
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
     I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
@@ -44,8 +45,12 @@ class SynthesisProblem:
 
     @property
     def scaled(self) -> Coordinates:
-        """The coordinates in which I is meant."""
-        return coordinates(self.coordinates, self.family, self.safe_set, self.half_widths)
+        """The coordinates in which I is meant, B B' is measured and C2 is written."""
+        found = coordinates(self.coordinates, self.family, self.safe_set, self.half_widths)
+        if self.coordinates == "identity":
+            return found
+        size = input_size(self.model, found.states, self.safe_set)
+        return replace(found, input=size, rate=self.rate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -65,7 +65,8 @@ class PointProgram:
     def central(self, kappa: float, slack: float, reference: Array) -> ConicSolution:
         """With kappa given, the greatest extra rate mu (the last unknown), W kept inside by a relative `slack`.
 
-        -N'(F_0 + 2 rate W)N >= 2 mu N'W_r N with W_r given by `reference`, the unknowns found before (U,).
+        -N'(F_0 + 2 rate W)N >= 2 mu N'W_r N with W_r given by `reference`, the unknowns found before (U,); mu is in the
+        unit of the rows.
         """
         cost = np.zeros(self.unknowns.count + 1)
         cost[-1] = -1.0
