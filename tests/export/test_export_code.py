@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import importlib.util
 import os
 import re
+import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import controllers
@@ -15,7 +18,7 @@ import numpy as np
 import pytest
 from controllers import CONTROLLERS, wandering
 
-from tubecert.export.compiled import COMPILERS, FLAGS, compiled, compiler
+from tubecert.export.compiled import COMPILERS, FLAGS, Compiled, compiled, compiler
 from tubecert.export.folder import exported
 from tubecert.export.reference import Reference
 from tubecert.export.vectors import run, vectors
@@ -24,6 +27,8 @@ needs_cc = pytest.mark.skipif(
     compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"
 )
 SANITIZED = "-fsanitize=address,undefined"
+PRESENT = [name for name in ("gcc", "clang") if shutil.which(name)] or [compiler()]
+STACK = 2048  # bytes, of all functions together
 
 
 @pytest.fixture(scope="module", params=sorted(CONTROLLERS))
@@ -78,10 +83,18 @@ def test_single_precision_is_close(controller):
     assert np.abs(found - exact).max() > 1e-9  # it is not double
 
 
-def built(folder, *flags):
+def built(folder, *flags, cc=None):
     sources = sorted(str(path) for path in folder.glob("*.c"))
-    command = [compiler(), *FLAGS, *flags, *sources, "-o", str(folder / "test"), "-lm"]
+    command = [cc or compiler(), *FLAGS, *flags, *sources, "-o", str(folder / "test"), "-lm"]
     return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@cache
+def sanitizes(cc):
+    """Whether the libraries of the sanitizers are there: a package of its own."""
+    command = [cc, SANITIZED, "-x", "c", "-", "-o", os.devnull]
+    text = "int main(void) { return 0; }"
+    return not subprocess.run(command, input=text, text=True, capture_output=True, check=False).returncode
 
 
 def self_tested(folder):
@@ -90,10 +103,13 @@ def self_tested(folder):
 
 @pytest.mark.slow
 @needs_cc
+@pytest.mark.parametrize("cc", PRESENT)
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_strict_compilers_and_sanitizers_have_nothing_to_say(controller, precision, tmp_path):
+def test_strict_compilers_and_sanitizers_have_nothing_to_say(controller, precision, cc, tmp_path):
+    if not sanitizes(cc):
+        pytest.skip(f"{cc} has no sanitizers here")
     exported(controller, precision=precision).save(str(tmp_path))
-    done = built(tmp_path, "-Wshadow", "-Wconversion", SANITIZED, "-fno-sanitize-recover=all")
+    done = built(tmp_path, "-Wshadow", "-Wconversion", SANITIZED, "-fno-sanitize-recover=all", cc=cc)
     assert done.returncode == 0, done.stderr
     done = self_tested(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -101,12 +117,54 @@ def test_strict_compilers_and_sanitizers_have_nothing_to_say(controller, precisi
 
 
 @needs_cc
-@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only"])
-def test_fast_math_is_refused(flag, tmp_path):
+@pytest.mark.parametrize("cc", PRESENT)
+@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only", "-Ofast"])
+def test_fast_math_is_refused(flag, cc, tmp_path):
     exported(controllers.orbit()).save(str(tmp_path))
-    done = built(tmp_path, flag)
+    done = built(tmp_path, flag, cc=cc)
     assert done.returncode
     assert "compile without" in done.stderr
+
+
+@needs_cc
+@pytest.mark.parametrize("cc", PRESENT)
+@pytest.mark.parametrize("flag", ["-funsafe-math-optimizations", "-freciprocal-math", "-fno-signed-zeros"])
+def test_a_part_of_fast_math_is_refused_or_changes_nothing(flag, cc, tmp_path):
+    """Clang does not say that it was given one: there the source takes it back."""
+    controller = controllers.orbit()
+    files = exported(controller)
+    y = wandering(controller, 300, 1, 8)
+    found = []
+    for flags in ((), (flag,)):
+        files.save(str(tmp_path))
+        target, source = str(tmp_path / f"of{len(found)}.so"), str(tmp_path / f"{controller.name}.c")
+        command = [cc, "-std=c99", "-O2", *flags, "-shared", "-fPIC", source, "-o", target, "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if flags and cc == "gcc":
+            assert "compile without" in done.stderr
+            return
+        assert done.returncode == 0, done.stderr
+        own = Compiled(ctypes.CDLL(target), controller, single=False, lanes=1)
+        found.append(np.array([own.start(y[0]), *(own.step(row) for row in y)]))
+    assert np.array_equal(*found)
+
+
+@pytest.mark.slow
+@needs_cc
+@pytest.mark.parametrize("cc", PRESENT)
+def test_the_stack_is_bounded_and_there_is_no_heap(controller, cc, tmp_path):
+    """Frames as the compiler tells them: together they are more than any chain of calls."""
+    exported(controller).save(str(tmp_path))
+    command = [cc, "-std=c99", "-O2", "-fstack-usage", "-c", f"{controller.name}.c", "-o", "own.o"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (told,) = tmp_path.glob("*.su")
+    frames = [line.split("\t") for line in told.read_text("utf-8").splitlines()]
+    assert all(kind == "static" for _, _, kind in frames)
+    assert sum(int(size) for _, size, _ in frames) <= STACK
+    needs = subprocess.run(["nm", "-u", str(tmp_path / "own.o")], capture_output=True, text=True, check=True)
+    called = set(needs.stdout.split()) - {"U", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+    assert called <= {"sqrt", "sin", "cos", "tanh", "exp", "sincos", "memcpy", "memset"}
 
 
 def test_nothing_is_allocated_and_nothing_calls_itself(controller):
