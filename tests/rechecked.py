@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ def digest(data: object) -> str:
 
 def sealed(document: Document) -> Document:
     """The hashes made right again, and what repeats the specification or says what is claimed with it."""
-    document = copy.deepcopy(document)
+    document = pickle.loads(pickle.dumps(document))  # a copy, in a tenth of the time of `deepcopy`
     if "result" not in document:
         return document
     inner = document["result"].get("spec")
@@ -50,7 +50,7 @@ def sealed(document: Document) -> Document:
 
 def respecified(document: Document, change: Any) -> Document:
     """The specification inside changed, with everything that repeats it, and both hashes."""
-    document = copy.deepcopy(document)
+    document = pickle.loads(pickle.dumps(document))
     result = document["result"]
     effective = result["spec"]["effective"]
     change(effective)

@@ -19,8 +19,9 @@ from systems import SMALL
 from tubecert import certificate, pipeline, spec
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression.text import number_text
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import _SHORT, Node
 from tubecert.recheck.run import recheck
+from tubecert.recheck.spelling import spelled
 
 PLAN = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}"
 START = "initial_state: {at: [0.05, 0]}"
@@ -436,3 +437,8 @@ def test_the_spelling_is_the_one_that_is_written(value):
     """Whatever the producer writes is read, as the same number."""
     assume(value == 0 or Fraction(1, 10**300) <= abs(value) <= 10**300)
     assert Node(number_text(value), "place").exact() == value
+
+
+@given(st.from_regex(_SHORT, fullmatch=True))
+def test_a_text_that_is_not_spelled_again_is_the_one_spelling(text):
+    assert spelled(Fraction(text)) == text

@@ -219,10 +219,11 @@ class Interval:
             return Interval.exact(np.ones(self.shape))
         if n % 2:
             return Interval(_power(self.lo, n, upward=False), _power(self.hi, n, upward=True))
-        big, small = self.magnitude, self.mignitude
-        nan = np.isnan(self.lo) | np.isnan(self.hi)
-        lo, hi = _power(small, n, upward=False), _power(big, n, upward=True)
-        return Interval(np.where(nan, _UNKNOWN, lo), np.where(nan, _UNKNOWN, hi))
+        # NaN in an end is NaN in both
+        return Interval(
+            _power(self.mignitude, n, upward=False, positive=True),
+            _power(self.magnitude, n, upward=True, positive=True),
+        )
 
 
 def _numbers(a: Interval, b: Interval) -> bool:
@@ -252,15 +253,31 @@ def _ends(function: np.ufunc, a: Interval, b: Interval) -> tuple[Array, Array]:
     return lo, hi
 
 
-def _power(x: Array, n: int, *, upward: bool) -> Array:
-    """x**n by repeated multiplication, rounded upward or downward; x >= 0 if n is even."""
+def _power(x: Array, n: int, *, upward: bool, positive: bool = False) -> Array:
+    """x**n by repeated multiplication, rounded upward or downward; `positive`: no x is below 0."""
     if x.size == 1 and not isnan(number := x.item()):
+        if positive:
+            number = abs(number)
         return np.array(_power_of_number(number, n, upward=upward), ndmin=x.ndim)
     magnitude = np.abs(x)
-    above, below = magnitude, magnitude
-    for _ in range(n - 1):
-        above, below = up(above * magnitude), np.maximum(_ZERO, down(below * magnitude))
+    if positive:
+        return _power_above(magnitude, n) if upward else _power_below(magnitude, n)
+    above, below = _power_above(magnitude, n), _power_below(magnitude, n)
     return np.where(x >= _ZERO, above, -below) if upward else np.where(x >= _ZERO, below, -above)
+
+
+def _power_above(magnitude: Array, n: int) -> Array:
+    value = magnitude
+    for _ in range(n - 1):
+        value = up(value * magnitude)
+    return value
+
+
+def _power_below(magnitude: Array, n: int) -> Array:
+    value = magnitude
+    for _ in range(n - 1):
+        value = np.maximum(_ZERO, down(value * magnitude))
+    return value
 
 
 def _power_of_number(x: float, n: int, *, upward: bool) -> float:

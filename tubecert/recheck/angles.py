@@ -27,8 +27,10 @@ def by_addition(terms: Sequence[Term]) -> list[Term]:
     found = expanded(arguments)
     if found is None:
         return list(terms)
-    parts = _Parts(*found)
-    sums = dict(zip(arguments, found[1], strict=True))
+    factors, polynomials = found
+    written = [{monomial: Fraction(*q) for monomial, q in p.items()} for p in polynomials]
+    parts = _Parts(factors, written)
+    sums = dict(zip(arguments, written, strict=True))
     new: dict[Term, Term] = {}
     for term in order:
         own = sums.get(term.args[0]) if term.op in (*_WAVES, "exp") else None

@@ -24,7 +24,10 @@ MOST_BYTES = 64_000_000
 _VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
 _DEEPEST = 60
 _LEAST, _MOST = Fraction(1, 10**300), Fraction(10**300)
+_MOST_FLOAT = 1e300  # whose shortest decimal is _MOST
 _PLAIN = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?")  # most numbers: read without a grammar
+# nearly all of these: the form alone says that `spelled` gives the same text, and that the size is that of a float
+_SHORT = re.compile(r"0|-?[1-9][0-9]{0,20}|-?(0|[1-9][0-9]{0,12})\.[0-9]{0,20}[1-9]")
 _DECIMAL = re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][-+]?[0-9]+)?)")
 T = TypeVar("T")
 
@@ -120,10 +123,9 @@ class Node:
         """A number of JSON: the decimal that is written, which is the one that is hashed."""
         if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
             raise self._expected("a number")
-        q = Fraction(repr(self.value))
-        if abs(q) > _MOST:
+        if not abs(self.value) <= _MOST_FLOAT:
             raise self._expected("a number of at most 1e300")
-        return q
+        return Fraction(Decimal(repr(self.value)))
 
     def decimal(self) -> Fraction:
         """A number of JSON, or a text where it is not the shortest decimal of a float: a decimal or `p/q`."""
@@ -134,6 +136,8 @@ class Node:
     def exact(self) -> Fraction:
         """A text that stands for a rational number, in the one spelling that it has (unless it is very long)."""
         text = self.text()
+        if _SHORT.fullmatch(text):
+            return Fraction(Decimal(text))
         try:
             q = self._sized(Fraction(text) if _PLAIN.fullmatch(text) else read_number(text))
         except GrammarError as error:
@@ -251,7 +255,9 @@ def read(text: str, file: str) -> Node:
 def _float(text: str) -> float:
     """A number whose shortest decimal is what is written: the hash, which is of that decimal, binds it exactly."""
     value = float(text)
-    if len(text) > LONGEST or not math.isfinite(value) or Decimal(repr(value)) != Decimal(text):
+    if len(text) > LONGEST or not math.isfinite(value):
+        raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
+    if repr(value) != text and Decimal(repr(value)) != Decimal(text):
         raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
     return value
 

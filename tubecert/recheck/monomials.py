@@ -8,13 +8,12 @@ from polynomials over the rationals, with sin^2 = 1 - cos^2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from math import inf
 from typing import Any
 
 from flint import Ordering, arb, arb_mat, fmpq, fmpq_mpoly_ctx
 
-from tubecert.recheck.balls import Ball, exact, power
+from tubecert.recheck.balls import Ball, power
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import UNIT, Term, in_order, number_of
 
@@ -22,6 +21,7 @@ _CHEAPER = 10  # terms of a product of matrices for each step of a program: a st
 _LARGE = 4_000  # terms of a polynomial
 
 Monomial = tuple[tuple[int, int], ...]  # (factor, exponent), factors ascending
+Quotient = tuple[int, int]  # of whole numbers without a common divisor
 Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
 
 
@@ -36,7 +36,7 @@ class Combinations:
         if found is None:
             return
         factors, polynomials = found
-        rows: dict[tuple[tuple[Monomial, Fraction], ...], int] = {}
+        rows: dict[tuple[tuple[Monomial, Quotient], ...], int] = {}
         self._row = [rows.setdefault(tuple(sorted(p.items())), len(rows)) for p in polynomials]
         monomials = sorted({monomial for p in polynomials for monomial in p})
         if len(rows) * len(monomials) > most:
@@ -45,7 +45,7 @@ class Combinations:
         table = [[arb(0)] * len(monomials) for _ in rows]
         for line, k in rows.items():
             for monomial, q in line:
-                table[k][place[monomial]] = exact(q)
+                table[k][place[monomial]] = arb(fmpq(*q))
         self._table = arb_mat(len(rows), len(monomials), [e for line in table for e in line])
         self._monomials = _Monomials(monomials, factors, inputs)
 
@@ -89,7 +89,7 @@ class _Monomials:
 
 def expanded(
     outputs: Sequence[Term], most: float = inf
-) -> tuple[list[Term], list[dict[Monomial, Fraction]]] | None:
+) -> tuple[list[Term], list[dict[Monomial, Quotient]]] | None:
     """Factors, and every output as a polynomial in them; None if there are no factors, or more than `most` terms."""
     order = in_order(outputs)
     place: dict[Term, int] = {}
@@ -169,10 +169,10 @@ def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: An
     return found if len(found) <= _LARGE else None
 
 
-def _written(p: Polynomial, relations: Sequence[Polynomial]) -> dict[Monomial, Fraction]:
+def _written(p: Polynomial, relations: Sequence[Polynomial]) -> dict[Monomial, Quotient]:
     for relation in relations:
         p = divmod(p, relation)[1]
     return {
-        tuple((k, int(n)) for k, n in enumerate(exponents) if n): Fraction(int(q.p), int(q.q))
+        tuple((k, int(n)) for k, n in enumerate(exponents) if n): (int(q.p), int(q.q))
         for exponents, q in p.to_dict().items()
     }

@@ -96,17 +96,23 @@ def table_of(term: Term) -> Table:
 
 def _make(op: str, *args: Term, value: Value = None) -> Term:
     key = (op, value, *(id(arg) for arg in args))
-    found = _known.get(key)
-    if found is None:
-        found = Term()
-        found.op, found.args, found.value, found.serial = op, args, value, next(_serial)
-        _known[key] = found
+    return _known.get(key) or _kept(key, op, args, value)
+
+
+def _kept(key: tuple[object, ...], op: str, args: tuple[Term, ...], value: Value) -> Term:
+    _known[key] = found = Term()
+    found.op, found.args, found.value, found.serial = op, args, value, next(_serial)
     return found
 
 
 def number(q: Fraction | int) -> Term:
     """A rational constant."""
-    return _make("const", value=Fraction(q))
+    key = (
+        "const",
+        q.numerator,
+        q.denominator,
+    )  # the hash of a fraction costs as much as a product of polynomials
+    return _known.get(key) or _kept(key, "const", (), q if isinstance(q, Fraction) else Fraction(q))
 
 
 def variable(name: str) -> Term:
