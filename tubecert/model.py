@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import combinations, islice
-from math import gcd, lcm
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,9 +28,7 @@ from tubecert.expression import (
     Expression,
     Obligation,
     constant,
-    derivative,
     free_symbols,
-    rebuild,
     substitute,
     symbol,
     to_text,
@@ -51,6 +48,7 @@ from tubecert.expression.matrix import (
     null_space,
     transpose,
 )
+from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding
 from tubecert.verdict import Verdict
 
@@ -213,56 +211,25 @@ def build(spec: Spec) -> ControlAffineModel:
 
 
 def _time_of(spec: Spec) -> Range | None:
-    """The horizon where f depends on t: the reader takes no such f without one."""
+    """The times of f, None where it is free of t: the horizon, or one period of all that depends on t.
+
+    The reader takes no f that has neither.
+    """
     if TIME not in free_symbols(term.expression for term in spec.f):
         return None
-    assert spec.trajectory.horizon is not None
-    return Fraction(0), spec.trajectory.horizon
+    if spec.trajectory.horizon is not None:
+        return Fraction(0), spec.trajectory.horizon
+    period = time_period(moving_parts(spec))
+    if period is None:
+        raise ValueError("f depends on t without a horizon or a period")
+    return 0.0, float(period.hi)
 
 
-@dataclass(frozen=True, slots=True)
-class Frequencies:
-    """Of the waves in t that expressions consist of: all `rational`, or all rational multiples `of_pi`, in rad/s."""
-
-    rational: tuple[Fraction, ...]
-    of_pi: tuple[Fraction, ...]
-
-    @property
-    def period(self) -> tuple[Fraction, bool] | None:
-        """The common period as (q, whether times pi), in s; None if nothing changes with t."""
-        found = [q for q in self.rational or self.of_pi if q]
-        if not found:
-            return None
-        common = Fraction(
-            reduce(gcd, (q.numerator for q in found)), reduce(lcm, (q.denominator for q in found))
-        )
-        return 2 / abs(common), bool(self.rational)
-
-
-def frequencies(h: Iterable[Expression]) -> Frequencies | None:
-    """The waves of expressions that depend on t through sin, cos, tan only; None if they depend on it otherwise."""
-    rational: list[Fraction] = []
-    of_pi: list[Fraction] = []
-    replaced: dict[Expression, Expression] = {}
-    roots = list(h)
-    for node in topological(roots):
-        args = tuple(replaced[arg] for arg in node.args)
-        replaced[node] = node if args == node.args else rebuild(node, args)
-        if node.op in ("sin", "cos", "tan") and TIME in free_symbols([node]):
-            slope = derivative(node.args[0], TIME)
-            if slope.is_constant:
-                rational.append(slope.fraction)
-            elif slope.op == "pi":
-                of_pi.append(Fraction(1))
-            elif slope.op == "mul" and slope.args[0].is_constant and slope.args[1].op == "pi":
-                of_pi.append(slope.args[0].fraction)
-            else:
-                return None
-            # a name of its own: t times a difference of waves must not lose its t
-            replaced[node] = symbol(f"wave#{len(replaced)}")
-    if TIME in free_symbols(replaced[root] for root in roots) or (rational and of_pi):
-        return None
-    return Frequencies(tuple(rational), tuple(of_pi))
+def moving_parts(spec: Spec) -> list[Expression]:
+    """What may depend on t for all time, h and f, and what must hold for them to be defined."""
+    terms = [*(spec.uncertainty.h or ()), *spec.f]
+    owed = (duty.argument for term in terms for duty, _ in term.owed())
+    return [*(term.expression for term in terms), *owed]
 
 
 def time_period(h: Iterable[Expression]) -> Interval | None:
@@ -270,7 +237,7 @@ def time_period(h: Iterable[Expression]) -> Interval | None:
 
     None if there is none to be seen; [0, 0] if t does not occur.
     """
-    found = frequencies(h)
+    found = frequencies(h, TIME)
     if found is None:
         return None
     if not found.rational and not found.of_pi:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -10,12 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rechecked import certified, examine, failing, respecified, sealed
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
 
+from tubecert.certificate import dump, seal
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError, TubecertError
+from tubecert.findings import Severity
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
-from tubecert.pipeline import Options, synthesise
+from tubecert.pipeline import Options, certify, synthesise
+from tubecert.pipeline.membership import membership
 from tubecert.spec import load_text
 from tubecert.spec.types import Synthesis
 
@@ -115,7 +121,6 @@ def test_a_longer_horizon_is_not_confirmed():
 @pytest.mark.parametrize(
     "change",
     [
-        lambda e: e["trajectory"].pop("horizon"),
         lambda e: e["system"].update(B=[["0.001*t"], ["1"]]),
         lambda e: e.update(disturbance={"E": [["1"], ["0"]], "bound": "0"}),
         lambda e: e["system"]["parameters"].update(c=["1", "2"]),
@@ -137,3 +142,107 @@ def test_no_metric_is_searched_for():
     assert isinstance(wanted, Synthesis)
     with pytest.raises(SpecError, match="metrics are not found"):
         synthesise(spec, wanted, Options())
+
+
+PERIODIC = """\
+tubecert: 1
+name: swinging
+system:
+  states: [x, y]
+  inputs: [u]
+  f: ["-x + y + 0.1*sin(2*t)*x", "-y + 0.2*cos(3*t)"]
+  B: [[0], [1]]
+safe_set: {x: [-1, 1], y: [-1.5, 1.5]}
+uncertainty: {h: ["0.1*sin(3/2*t)"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+metric: {rate: 0.5, dual_metric: [[1, -0.3], [-0.3, 2]]}
+tube: {epsilon: 0.3, rho_a: 0.1, gap: auto}
+initial_state: {within: 0.05}
+"""
+FAMILY = PERIODIC.replace(
+    "{kind: equilibrium, at: [0, 0], input: [0]}",
+    "{kind: any, x: {x: [-0.2, 0.2], y: [-0.3, 0.3]}, u: {u: [-0.5, 0.5]}, defect: 0.02}",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [PERIODIC, FAMILY], ids=["rest", "family"])
+def test_one_period_is_all_time(text):
+    """2, 3 and 3/2 rad/s have the period 4 pi; suprema are reached at times that no shorter range has."""
+    document = copy.deepcopy(certified(text, conditions="distance"))
+    result = document["result"]
+    assert (result["claim"]["for_all_time"], result["claim"]["period"]) == ("periodic", "4*pi")
+    rho = float(result["tube"]["rho"])
+    generator = np.random.default_rng(2)
+    t = generator.uniform(0, 100, 200_000)
+    v = generator.normal(size=(2, len(t)))
+    centre, u = np.zeros((2, len(t))), 0.0
+    if text is FAMILY:
+        centre = generator.choice([-1, 1], size=centre.shape) * np.array([[0.2], [0.3]])
+        u = generator.choice([-0.5, 0.5], size=len(t))
+    x, y = centre + rho * v / np.linalg.norm(v, axis=0)
+    f = np.array([-x + y + 0.1 * np.sin(2 * t) * x, -y + 0.2 * np.cos(3 * t) + u])
+    below, above = value(document, "drift_on_plan")
+    assert 0.97 * below <= np.linalg.norm(f, axis=0).max() <= above
+    assert failing(examine(document)) == []
+    slower = respecified(
+        document, lambda e: e["system"].update(f=["-x + y + 0.1*sin(2*t)*x", "-y + 0.2*cos(9/4*t)"])
+    )
+    assert ("the claim is that of the specification", "claim.period is not that of the specification") in (
+        failing(examine(slower))
+    )
+    longer = respecified(document, lambda e: e["system"].update(f=["-x + y + 0.1*sin(2*t)*x", "-y + 0.2*t"]))
+    with pytest.raises(TubecertError, match="period"):
+        examine(longer)
+
+
+@pytest.mark.slow
+def test_a_family_has_members_by_their_own_time():
+    family = load_text(FAMILY)
+    u = "0.057*cos(3*t) + 0.019*sin(3*t) - 0.2*cos(3*t)"
+
+    def member(u):
+        plan = f'{{kind: expressions, x: ["0", "0.019*sin(3*t)"], u: ["{u}"], horizon: 3}}'
+        return load_text(PERIODIC.replace("{kind: equilibrium, at: [0, 0], input: [0]}", plan))
+
+    (found,) = membership(member(u), family, "plan")
+    assert found.severity is Severity.NOTE  # x* = 0 misses y* by 0.019
+    (found,) = membership(member(u.replace("0.2*cos(3*t)", "0.2*cos(3*t + 0.2)")), family, "plan")
+    assert "misses" in found.message
+    (found,) = membership(load_text(PERIODIC), family, "rest")
+    assert "0.2 at t = " in found.message  # |f(t, 0)|, which is no equilibrium
+
+
+@pytest.mark.slow
+def test_knots_know_their_time(tmp_path):
+    """Slopes f(t, x) + B u at the knots: what the plan misses, against a spline by scipy."""
+    t = np.linspace(0, 2, 21)
+    u = 0.1 * t
+
+    def f(t, z):
+        return np.array([-z[0] + z[1] + 0.1 * np.sin(2 * t) * z[0], -z[1] + 0.2 * np.cos(3 * t) + 0.1 * t])
+
+    x = solve_ivp(f, (0, 2), [0.05, 0], t_eval=t, rtol=1e-10, atol=1e-12).y
+    rows = [f"{a:.9f},{b:.9f},{c:.9f},{d:.9f}" for a, b, c, d in zip(t, *x, u, strict=True)]
+    (tmp_path / "plan.csv").write_text("\n".join(["t,x,y,u", *rows]) + "\n", encoding="utf-8")
+    text = PERIODIC.replace(
+        "{kind: equilibrium, at: [0, 0], input: [0]}", "{kind: csv, file: plan.csv}"
+    ).replace("{within: 0.05}", "{at: [0.05, 0]}")
+    spec = load_text(text, str(tmp_path / "spec.yaml"))
+    document = json.loads(dump(seal(certify(spec, Options(conditions="distance")).to_json(), {})))
+    spline = CubicHermiteSpline(t, x.T, np.array([f(a, z) for a, z in zip(t, x.T, strict=True)]))
+    s = np.linspace(0, 2, 5001)
+    missed = np.array([spline(a, 1) - f(a, spline(a)) for a in s])
+    below, above = value(document, "plan_defect")
+    assert above < 2e-4
+    assert below * (1 - 1e-6) <= np.linalg.norm(missed, axis=1).max() * 1.01
+    assert np.linalg.norm(missed, axis=1).max() <= above
+    assert failing(examine(document)) == []
+    document["result"]["constants"]["plan_defect"] |= {"above": 0.5 * above, "below": 0.4 * below}
+    assert failing(examine(sealed(document)))
+
+
+@pytest.mark.parametrize("h", ["sin(pi*t)", "t", "sin(t**2)"])
+def test_what_has_no_common_period_needs_a_horizon(h):
+    with pytest.raises(SpecError, match="so a trajectory with a horizon is needed"):
+        load_text(PERIODIC.replace("0.1*sin(3/2*t)", h))

@@ -18,7 +18,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Spec, Table
 
 _FALLS: Final = 0.05  # to which share of it a defect falls where its cause is found
@@ -43,20 +43,21 @@ class _Dynamics:
 
     def __init__(self, model: ControlAffineModel, *, held: bool) -> None:
         self.held = held
-        self.tape = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs))
+        self.tape = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
 
-    def rate(self, x: Array, u: Array) -> Array:
-        """F + B u at points (K, n), (K, m): (K, n)."""
-        return np.asarray(self.tape.run_floats([*x.T, *u.T], (len(x),)).T)
+    def rate(self, t: Array, x: Array, u: Array) -> Array:
+        """F + B u at points (K,), (K, n), (K, m): (K, n)."""
+        return np.asarray(self.tape.run_floats([*x.T, *u.T, t], (len(x),)).T)
 
     def defect(self, points: _Points) -> Array:
         """|x' - f - B u| in the middle of every piece, (K - 1,), in units of the states per s."""
-        h = np.diff(points.t)[:, None]
+        t0, t1 = points.t[:-1], points.t[1:]
+        h = (t1 - t0)[:, None]
         x0, x1, u0 = points.x[:-1], points.x[1:], points.u[:-1]
         u1 = u0 if self.held else points.u[1:]
-        before, after = self.rate(x0, u0), self.rate(x1, u1)
+        before, after = self.rate(t0, x0, u0), self.rate(t1, x1, u1)
         u = (u0 + u1) / 2 if points.between is None else points.between
-        middle = self.rate((x0 + x1) / 2 + h * (before - after) / 8, u)
+        middle = self.rate((t0 + t1) / 2, (x0 + x1) / 2 + h * (before - after) / 8, u)
         size = np.linalg.norm(1.5 * (x1 - x0) / h - (before + after) / 4 - middle, axis=1)
         found: Array = np.nan_to_num(size, nan=np.inf)
         return found
@@ -77,7 +78,7 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
     dynamics = _Dynamics(model, held=knots.interpolation == "hold")
     size = dynamics.defect(points)
     worst = float(size.max())
-    speed = float(np.nanmax(np.linalg.norm(dynamics.rate(points.x, points.u), axis=1), initial=0.0))
+    speed = float(np.nanmax(np.linalg.norm(dynamics.rate(points.t, points.x, points.u), axis=1), initial=0.0))
     known = spec.metric is not None and radius > 0
     bearable = codes.NOTABLE_DEFECT * nearest(model.rate) * radius if known else _SHARE * speed
     if not worst > bearable:

@@ -24,6 +24,7 @@ from tubecert.printable import visible
 from tubecert.spec import Knots, Spec, canonical, load, load_text
 from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
+from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import plan_of
 
 NO_MEMBER, UNDECIDED = "TC411", "TC412"
@@ -138,8 +139,9 @@ def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction, effort: Effo
     if all(row[0] is ZERO for row in p):
         return _Part(kept=True, words="it satisfies the dynamics exactly")
     objective = SumOfNorms([p], plan.fixed)
+    domain = Defect.of(plan, model, 0.0, effort).domain
     for gap in _GAPS:
-        found = supremum(objective, plan.domain, replace(effort, gap=gap, absolute=gap * float(limit)))
+        found = supremum(objective, domain, replace(effort, gap=gap, absolute=gap * float(limit)))
         kept = _kept(found, limit)
         if kept is not None:
             break

@@ -34,7 +34,7 @@ def own_claim(spec: Specification) -> Claim:
     for_all_time = period = None
     if horizon is None:
         assert isinstance(spec.trajectory, (Resting, AnyPlan)), "every other plan has a horizon"
-        found = period_of(spec.uncertainty)
+        found = period_of(spec.uncertainty, spec.plant.moving)
         for_all_time = "periodic" if found.length else "autonomous"
         period = found.text if found.length else None
     return Claim(

@@ -19,10 +19,12 @@ from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.cover import Range
 from tubecert.recheck.program import Program
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.terms import Term, names, number, replaced, slopes, variable
 
 CLOCK = "s#"  # no state can have this name
 SKIPPED = "skipped#"
+SINCE = "since#"
 Ends = list[tuple[float, float]]
 _HALVINGS = 12  # of a part of the plan, until its ranges have bounds
 
@@ -187,12 +189,22 @@ def _hull(boxes: Sequence[Ends]) -> Ends:
     return [(min(lo for lo, _ in side), max(hi for _, hi in side)) for side in zip(*boxes, strict=True)]
 
 
-def expressed(x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction | None) -> Curve:
-    """A curve given by terms of `time`; only a point needs no horizon (`ValueError`)."""
+def expressed(
+    x: Sequence[Term],
+    u: Sequence[Term],
+    time: str,
+    horizon: Fraction | None,
+    period: Ball | None = None,
+) -> Curve:
+    """A curve given by terms of `time`; only a point needs no horizon (`ValueError`).
+
+    s runs over one `period` of what else depends on t, where there is no horizon.
+    """
     if horizon is None and time in names([*x, *u]):
         raise ValueError("a plan that moves needs a horizon")
     clock = {time: variable(CLOCK)}
-    part = Part(exact(0), exact(0 if horizon is None else horizon), {})
+    length = exact(horizon) if horizon is not None else exact(0) if period is None else period
+    part = Part(exact(0), length, {})
     start = tuple(replaced(x, {time: number(0)}))
     return Curve(tuple(replaced(x, clock)), tuple(replaced(u, clock)), (part,), horizon, start)
 
@@ -216,22 +228,24 @@ def hermite(
 ) -> Curve:
     """The cubics with the knots as ends and the slopes f + B u there, on the right side of each jump of u*.
 
-    `drift` is f + B u in the states and inputs. The last piece ends at the horizon.
+    `drift` is f + B u in states, inputs and t. The last piece ends at the horizon. Where f contains t, every part knows
+    when it begins.
     """
     s = variable(CLOCK)
     x = [_polynomial([variable(f"x{i}#{k}") for k in range(4)], s) for i in range(len(states))]
     powers = 3 if knots.inner else 2
     u = [_polynomial([variable(f"u{j}#{k}") for k in range(powers)], s) for j in range(len(inputs))]
-    rate = Program(drift, (*states, *inputs))
+    moving = TIME in names(drift)
+    rate = Program(drift, (*states, *inputs, *((TIME,) if moving else ())))
     parts = []
     for k, (begin, end) in enumerate(pairwise(knots.t)):
         if begin >= horizon:
             break
         h, left = end - begin, knots.u[k]
         right = left if knots.held else knots.u[k + 1]
-        m0 = rate.run([*map(exact, knots.x[k]), *map(exact, left)])
-        m1 = rate.run([*map(exact, knots.x[k + 1]), *map(exact, right)])
-        values: dict[str, Ball] = {}
+        ends = ((begin, knots.x[k], left), (end, knots.x[k + 1], right))
+        m0, m1 = (rate.run([*map(exact, (*y, *v, *((t,) if moving else ())))]) for t, y, v in ends)
+        values: dict[str, Ball] = {SINCE: exact(begin)} if moving else {}
         for i, (a, b) in enumerate(zip(knots.x[k], knots.x[k + 1], strict=True)):
             secant, width = exact((b - a) / h), exact(h)
             values |= {

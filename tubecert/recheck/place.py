@@ -13,7 +13,7 @@ from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
 from tubecert.recheck.cover import Boxed, Outcome, Range, prove
-from tubecert.recheck.curve import CLOCK, Curve, expressed
+from tubecert.recheck.curve import CLOCK, SINCE, Curve, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
@@ -74,11 +74,13 @@ class Place:
 
     @property
     def _clock(self) -> dict[str, Term]:
-        """The time in f by the s of the plan: they are the same for a plan of one part that begins at 0."""
+        """The time in f by the s of the plan: since a knot, or the same for a plan of one part that begins at 0."""
         if not self.system.varies:
             return {}
-        (part,) = self.curve.parts
-        if self.when is not None or not (part.start == 0 and not part.values):
+        parts = self.curve.parts
+        if self.when is None and all(SINCE in part.values for part in parts):
+            return {TIME: variable(SINCE) + variable(CLOCK)}
+        if self.when is not None or not (len(parts) == 1 and parts[0].start == 0 and not parts[0].values):
             raise ValueError("f depends on t along a part of a plan")
         return {TIME: variable(CLOCK)}
 

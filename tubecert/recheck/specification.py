@@ -18,9 +18,17 @@ from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
 from tubecert.recheck.specified.numbers import Numbers, Range, ends, positive
 from tubecert.recheck.specified.plant import Plant, Uncertainty, read_plant, read_uncertainty
 from tubecert.recheck.specified.start import Start, read_start
-from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Trajectory, read_trajectory
+from tubecert.recheck.specified.trajectory import (
+    AnyPlan,
+    Expressed,
+    Planned,
+    Resting,
+    Trajectory,
+    read_trajectory,
+)
 from tubecert.recheck.specified.windows import KEY as WINDOWS
 from tubecert.recheck.specified.windows import read_windows
+from tubecert.recheck.times import period_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +101,7 @@ def read_specification(node: Node) -> Specification:
     read_idle(own, plant)
     written = isinstance(found.trajectory, (Resting, Expressed))
     if plant.varies:
-        _moving(own, found, written=written)
+        _moving(own, found)
     if plant.gained is not None and found.windows:
         raise own["tube"].refused("has windows beside an uncertain B")
     if plant.gained is not None and (hardware is None or not written):
@@ -103,10 +111,16 @@ def read_specification(node: Node) -> Specification:
     return found
 
 
-def _moving(own: Members, found: Specification, *, written: bool) -> None:
-    """What an f that depends on t goes with: theorems 0, A, B and C along a known plan with an end."""
+def _moving(own: Members, found: Specification) -> None:
+    """What an f that depends on t goes with: theorems 0, A, B and C along a plan that is not searched for."""
     alone = found.hardware is None and found.disturbance is None and not (found.plant.ranges or found.windows)
-    if not (alone and written and found.trajectory.horizon is not None and isinstance(found.metric, Metric)):
+    known = not isinstance(found.trajectory, Planned) and isinstance(found.metric, Metric)
+    if found.trajectory.horizon is None:
+        try:
+            period_of(found.uncertainty, found.plant.moving)
+        except ValueError as error:
+            raise own["system"].refused(f"cannot be examined: {error}") from None
+    if not (alone and known):
         raise own["system"].refused("has an f that depends on t, beside what no theorem covers with it")
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
+from tubecert.recheck.balls import Ball
 from tubecert.recheck.cover import Range as CoverRange
 from tubecert.recheck.curve import Curve, Knots, expressed, hermite
 from tubecert.recheck.document import wrong
@@ -22,6 +23,7 @@ from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
 from tubecert.recheck.terms import (
     Matrix,
+    Term,
     all_zero,
     matrix_slopes,
     number,
@@ -31,7 +33,7 @@ from tubecert.recheck.terms import (
     turned,
     variable,
 )
-from tubecert.recheck.times import time_range
+from tubecert.recheck.times import period_of, time_range
 
 
 @dataclass(frozen=True)
@@ -58,18 +60,29 @@ class System:
     ranges: dict[str, Range] = field(default_factory=dict)  # of parameters of the plant's drift,
     unknown: Matrix | None = None  # which is this, (n, 1), in place of f
     gained: Matrix | None = None  # the plant's B, if they stand in it
-    varies: bool = False  # whether t occurs in f, or in what f owes; then there is a horizon
+    moving: tuple[Term, ...] = ()  # f and what it owes, if t occurs in them
 
     @property
-    def time(self) -> Range | None:
-        """The times of f; None where it is free of t."""
-        assert not self.varies or self.horizon is not None
-        return (Fraction(0), self.horizon) if self.varies and self.horizon is not None else None
+    def varies(self) -> bool:
+        """Whether t occurs in f, or in what f owes."""
+        return bool(self.moving)
+
+    @property
+    def time(self) -> CoverRange | None:
+        """The times of f; None where it is free of t. Raises `ValueError` like `times`."""
+        return self.times if self.varies else None
 
     @property
     def times(self) -> CoverRange | None:
         """The times that matter for f and h; raises `ValueError` if there are no such bounds."""
-        return self.time or time_range(self.uncertainty, self.horizon)
+        return time_range(self.uncertainty, self.horizon, self.moving)
+
+    @property
+    def period(self) -> Ball | None:
+        """One period of f and h, where f depends on t and there is no horizon."""
+        if not self.varies or self.horizon is not None:
+            return None
+        return period_of(self.uncertainty, self.moving).ball
 
     @property
     def h(self) -> Matrix | None:
@@ -153,7 +166,7 @@ def system_of(spec: Specification) -> System:
         ranges=spec.plant.ranges,
         unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
         gained=spec.plant.gained,
-        varies=spec.plant.varies,
+        moving=spec.plant.moving,
     )
 
 
@@ -168,6 +181,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
             [number(q) for q in trajectory.input],
             TIME,
             trajectory.horizon,
+            s.period,
         )
     if isinstance(trajectory, Expressed):
         return expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon)

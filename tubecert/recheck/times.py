@@ -1,4 +1,4 @@
-"""The times that matter for h: a horizon, a period, or none where nothing depends on t."""
+"""The times that matter for h and f: a horizon, a period, or none where nothing depends on t."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.terms import Term, in_order, names, number_of, slopes
 
 _WAVES = ("sin", "cos", "tan")
-_NEEDED = "h depends on t without a period that can be seen, so a horizon is needed"
+_NEEDED = "h or f depends on t without a period that can be seen, so a horizon is needed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +41,19 @@ class Period:
         return "pi" if self.length == 1 else f"{self.length}*pi"
 
 
-def period_of(given: Uncertainty) -> Period:
-    """A common period of h and of what h owes; raises `ValueError` if none can be seen."""
-    return common_period(_terms(given))
+def period_of(given: Uncertainty, moving: Sequence[Term] = ()) -> Period:
+    """A common period of h, of what h owes and of what else is `moving`; `ValueError` if none can be seen."""
+    return common_period([*_terms(given), *moving])
 
 
-def time_range(given: Uncertainty, horizon: Fraction | None) -> Range | None:
-    """The times that matter for h: the horizon, one period where there is none, None if h is free of t.
+def time_range(given: Uncertainty, horizon: Fraction | None, moving: Sequence[Term] = ()) -> Range | None:
+    """The times that matter for h and what else is `moving`: the horizon, or one period; None if all are free of t.
 
-    Raises `ValueError` if h depends on t with no horizon and no period that can be seen.
+    Raises `ValueError` if something depends on t with no horizon and no period that can be seen.
     """
-    if TIME not in names(_terms(given)):
+    if TIME not in names([*_terms(given), *moving]):
         return None
-    return Fraction(0), (period_of(given).ball if horizon is None else horizon)
+    return Fraction(0), (period_of(given, moving).ball if horizon is None else horizon)
 
 
 def _terms(given: Uncertainty) -> list[Term]:

@@ -20,7 +20,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Knots, Spec
 from tubecert.spec.types import Bundle
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
@@ -48,20 +48,23 @@ class Drawing:
     U: Array
     drift: Tape
 
-    def speed(self, x: Array, u: Array) -> Array:
-        """f(x) + B(x) u for points (N, n) and (N, m)."""
-        return np.asarray(self.drift.run_floats([*x.T, *u.T], (len(x),)).T)
+    def speed(self, t: float | Array, x: Array, u: Array) -> Array:
+        """f(t, x) + B(x) u for points (N, n) and (N, m), at one time or at N."""
+        return np.asarray(self.drift.run_floats([*x.T, *u.T, np.broadcast_to(t, (len(x),))], (len(x),)).T)
 
-    def walk(self, x: Array, u: tuple[Array, Array], p: Array, length: float, steps: int) -> Array:
-        """x* (N, steps + 1, n) over a segment of a linear u* and a defect p, by RK4."""
+    def walk(
+        self, begin: float, x: Array, u: tuple[Array, Array], p: Array, length: float, steps: int
+    ) -> Array:
+        """x* (N, steps + 1, n) from `begin` on over a segment of a linear u* and a defect p, by RK4."""
         dt, path = length / steps, [x]
         for k in range(steps):
+            t = begin + k * dt
             at = [u[0] + (u[1] - u[0]) * (k + part) / steps for part in (0.0, 0.5, 1.0)]
             with np.errstate(all="ignore"):
-                k1 = self.speed(x, at[0]) + p
-                k2 = self.speed(x + dt / 2 * k1, at[1]) + p
-                k3 = self.speed(x + dt / 2 * k2, at[1]) + p
-                k4 = self.speed(x + dt * k3, at[2]) + p
+                k1 = self.speed(t, x, at[0]) + p
+                k2 = self.speed(t + dt / 2, x + dt / 2 * k1, at[1]) + p
+                k3 = self.speed(t + dt / 2, x + dt / 2 * k2, at[1]) + p
+                k4 = self.speed(t + dt, x + dt * k3, at[2]) + p
                 x = x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             path.append(x)
         return np.stack(path, axis=1)
@@ -83,7 +86,7 @@ def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing
         horizon=Fraction(repr(horizon)),
         P=_inner(bundle.x),
         U=_inner(bundle.u, 0.0),
-        drift=Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs)),
+        drift=Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME)),
     )
 
 
@@ -125,12 +128,13 @@ def _corners(
     while len(paths) <= segments:
         x = np.repeat(paths[-1][-1:], _CANDIDATES, axis=0)
         corners, p = _input(drawing, rng, _CANDIDATES), _missed(drawing, rng, _CANDIDATES)
-        rough = drawing.walk(x, (np.repeat(u[-1][None], _CANDIDATES, axis=0), corners), p, length, _COARSE)
+        now, begin = np.repeat(u[-1][None], _CANDIDATES, axis=0), (len(paths) - 1) * length
+        rough = drawing.walk(begin, x, (now, corners), p, length, _COARSE)
         kept = np.flatnonzero(drawing.inside(rough) == _COARSE + 1)
-        ahead = _ahead(drawing, rough[kept, -1], corners[kept], length, rng)
+        ahead = _ahead(drawing, (begin + length, rough[kept, -1]), corners[kept], length, rng)
         if len(kept) and ahead.max() > 1:  # the next segment, too, can be kept to
             best = [kept[int(np.argmax(ahead + 0.5 * rng.random(len(kept))))]]
-            path = drawing.walk(x[best], (u[-1][None], corners[best]), p[best], length, steps)
+            path = drawing.walk(begin, x[best], (u[-1][None], corners[best]), p[best], length, steps)
             if drawing.inside(path)[0] == steps + 1:
                 u.append(corners[best][0])
                 paths.append(path[0])
@@ -143,17 +147,21 @@ def _corners(
     return u, paths[1:]
 
 
-def _ahead(drawing: Drawing, x: Array, u: Array, length: float, rng: np.random.Generator) -> Array:
-    """For how many segments x* can be kept in its box from each of the states (N, n), by the best of a few inputs."""
+def _ahead(
+    drawing: Drawing, at: tuple[float, Array], u: Array, length: float, rng: np.random.Generator
+) -> Array:
+    """For how many segments x* can be kept in its box from a time and each of the states (N, n) then, by the best of
+    a few inputs.
+    """
+    begin, x = at
     if not len(x):
         return np.zeros(0)
     wishes = _input(drawing, rng, _WAYS)
     lanes, now = np.repeat(x, _WAYS, axis=0), np.repeat(u, _WAYS, axis=0)
     target = np.tile(wishes, (len(x), 1))
-    first = drawing.walk(lanes, (now, target), np.zeros_like(lanes), length, _COARSE)
-    rest = drawing.walk(
-        first[:, -1], (target, target), np.zeros_like(lanes), (_AHEAD - 1) * length, (_AHEAD - 1) * _COARSE
-    )
+    first = drawing.walk(begin, lanes, (now, target), np.zeros_like(lanes), length, _COARSE)
+    still, later = np.zeros_like(lanes), (_AHEAD - 1) * length
+    rest = drawing.walk(begin + length, first[:, -1], (target, target), still, later, (_AHEAD - 1) * _COARSE)
     kept = drawing.inside(np.concatenate([first, rest[:, 1:]], axis=1)) / _COARSE
     return np.asarray(kept.reshape(len(x), _WAYS).max(axis=1))
 
@@ -221,7 +229,8 @@ def _sampled(drawing: Drawing, plan: PiecewisePlan) -> tuple[tuple[Array, Array]
     slope = c[..., 1] + s * (2 * c[..., 2] + 3 * s * c[..., 3])
     at = u[..., 0] + s * u[..., 1]
     x, slope, at = (part.reshape(-1, part.shape[2]) for part in (x, slope, at))
-    missing = slope - drawing.speed(x, at)
+    t = (pieces.start.mid[:, None] + tau).ravel()
+    missing = slope - drawing.speed(t, x, at)
     return (np.linalg.norm(missing, axis=1), np.linalg.norm(slope, axis=1)), x
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 from typing import Final
 
@@ -29,7 +29,6 @@ from tubecert.spec.settings import (
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import (
-    WRITTEN,
     check_gains,
     check_moving,
     is_uncertain,
@@ -37,9 +36,19 @@ from tubecert.spec.system import (
     read_dynamics,
     read_metric,
     read_uncertainty,
+    returns,
     wanted_metric,
 )
-from tubecert.spec.types import Metric, Places, Spec, Synthesis, Term, TermMatrix
+from tubecert.spec.types import (
+    Metric,
+    Places,
+    Spec,
+    Synthesis,
+    Term,
+    TermMatrix,
+    Trajectory,
+    Tube,
+)
 from tubecert.spec.windows import check_windows
 
 VERSION: Final = 1
@@ -209,20 +218,9 @@ def _read_named(
         check_gains(B, plan.kind, has_hardware="hardware" in entries, has_windows=windows)
     disturbance = read_disturbance(entries.get("disturbance"), names)
     if f is not None and dynamics is not None and plan is not None:
-        written = plan.kind in WRITTEN
-        check_moving(
-            f,
-            dynamics[0],
-            (
-                ("hardware" in entries, "which certificate H is not stated for"),
-                ("disturbance" in entries, "which is not covered beside a disturbance"),
-                (bool(names.ranges), "which is not covered beside parameters known by ranges"),
-                (tube is not None and tube.windows is not None, "which is not covered beside tube.windows"),
-                (not written, f"which is not covered along a trajectory of kind {plan.kind}"),
-                (written and plan.horizon is None, "so a trajectory with a horizon is needed"),
-                (synthesis is not None, "and metrics are not found for that: give one"),
-            ),
-        )
+        h = () if uncertainty is None or uncertainty.h is None else uncertainty.h
+        waves = (*dynamics[0], *h)
+        check_moving(f, dynamics[0], _beside_moving(entries.keys(), names, (plan, tube, synthesis), waves))
     if plan is not None and tube is not None and not reader.findings:
         check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
@@ -266,6 +264,24 @@ def _read_named(
         disturbance=disturbance,
         locations=Places(reader.places),
     )
+
+
+def _beside_moving(
+    sections: Set[str],
+    names: Names,
+    parts: tuple[Trajectory, Tube | None, Synthesis | None],
+    waves: Sequence[Term],
+) -> Iterator[tuple[bool, str]]:
+    """What no theorem is stated for where f depends on t; `waves` is all that does."""
+    plan, tube, synthesis = parts
+    yield "hardware" in sections, "which certificate H is not stated for"
+    yield "disturbance" in sections, "which is not covered beside a disturbance"
+    yield bool(names.ranges), "which is not covered beside parameters known by ranges"
+    yield tube is not None and tube.windows is not None, "which is not covered beside tube.windows"
+    yield plan.task is not None, f"and plans of the kind {plan.kind} are not found for that"
+    lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
+    yield plan.horizon is None and not returns(waves), lasting
+    yield synthesis is not None, "and metrics are not found for that: give one"
 
 
 def _metric(field: Field | None, names: Names) -> tuple[Metric | None, Synthesis | None]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Final
 
 from tubecert.expression import constant, free_symbols, root_above, substitute, to_text
+from tubecert.expression.waves import frequencies
 from tubecert.spec import codes
 from tubecert.spec.algebra import asymmetric_entry, dependent_columns
 from tubecert.spec.document import MappingNode
@@ -17,6 +18,7 @@ from tubecert.spec.synthesis import read_synthesis
 from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
+_LONG: Final = 10**12  # s, or that many times pi
 WRITTEN: Final = ("equilibrium", "expressions")  # kinds of plans
 
 
@@ -51,7 +53,7 @@ def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
     return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
 
 
-def check_moving(f: Field, drift: Sequence[Term], beside: Sequence[tuple[bool, str]]) -> None:
+def check_moving(f: Field, drift: Sequence[Term], beside: Iterable[tuple[bool, str]]) -> None:
     """What is covered where f depends on t: what the theorems are proven for; `beside` is what they are not."""
     own = [term.expression for term in drift]
     own += [owed.argument for term in drift for owed in term.obligations]
@@ -60,6 +62,13 @@ def check_moving(f: Field, drift: Sequence[Term], beside: Sequence[tuple[bool, s
     for found, message in beside:
         if found:
             f.fail(codes.RANGE, f"f depends on t, {message}", "docs/language.md says what f(t, x) goes with")
+
+
+def returns(terms: Sequence[Term]) -> bool:
+    """Whether a common period of terms, and of what they owe, is to be seen."""
+    owed = (duty.argument for term in terms for duty, _ in term.owed())
+    found = frequencies([*(term.expression for term in terms), *owed], TIME)
+    return found is not None and (found.period is None or found.period[0] < _LONG)
 
 
 def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: bool) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -66,20 +67,22 @@ class Defect:
         return all(row[0] is ZERO for row in self.p)
 
     @property
-    def _domain(self) -> Domain:
-        """Where the plan's variables live; of a plan that stays, all times where f depends on them."""
-        moving = self.plan.is_constant and self.model.time is not None
-        return BoxDomain({TIME: self.model.time}) if moving and self.model.time else self.plan.domain
+    def domain(self) -> Domain:
+        """Where the plan's variables live; of a plan that stays, its times, or all of f, where f depends on them."""
+        if not self.plan.is_constant or self.model.time is None:
+            return self.plan.domain
+        horizon = self.plan.horizon
+        return BoxDomain({TIME: self.model.time if horizon is None else (Fraction(0), horizon)})
 
     def in_state(self) -> Supremum:
         """delta_p."""
         small = replace(self.effort, absolute=self._negligible)
-        return self.search("plan_defect", SumOfNorms([self.p], self.plan.fixed), self._domain, small)
+        return self.search("plan_defect", SumOfNorms([self.p], self.plan.fixed), self.domain, small)
 
     def in_metric(self) -> Supremum:
         """Delta; negligible is what is negligible for |p|, in the units of the metric."""
         W = self.plan.on(self.model, Fields(self.model, self.coordinates).W)
-        fixed, domain = self.plan.fixed, self._domain
+        fixed, domain = self.plan.fixed, self.domain
         name, eye = "plan_defect_metric", identity(len(self.p))
         stretch = self.search(name, Pencil(eye, W, fixed=fixed), domain, self.effort)
         absolute = self._negligible * float(np.sqrt(max(stretch.below, 0.0)))

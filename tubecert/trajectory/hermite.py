@@ -1,7 +1,7 @@
 """The data of a plan through knots: coefficients of its pieces as intervals, and their ranges.
 
-Knots are exact. Between two of them x* is the cubic with the values x_k, x_k+1 and the one-sided slopes
-f(x_k) + B(x_k) u(t_k+), f(x_k+1) + B(x_k+1) u(t_k+1-); u* is held or linear. Where rows are in turn a knot and a point
+Knots are exact. Between two of them x* is the cubic with the values x_k, x_k+1 and the one-sided slopes f(t_k, x_k) +
+B(x_k) u(t_k+), f(t_k+1, x_k+1) + B(x_k+1) u(t_k+1-); u* is held or linear. Where rows are in turn a knot and a point
 between two knots (Hermite-Simpson), u* is quadratic through the three; x in that point is no part of the curve. Where
 u* jumps x* has a kink, as it must: one smooth curve through a held input would have a defect of the size of the jump.
 Implements: theory 4, plan defect.
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.tape import Tape
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Knots, Vector
 
 Index = NDArray[np.intp]
@@ -134,8 +134,9 @@ def pieces(model: ControlAffineModel, knots: Knots, horizon: Fraction) -> Pieces
     )
     u_left, u_right = sides(knots, count)
     rate = _Drift(model)
-    m0 = rate(x[:-1], intervals_of_rows(u_left))
-    m1 = rate(x[1:], intervals_of_rows(u_right))
+    at = intervals(t)
+    m0 = rate(at[:-1], x[:-1], intervals_of_rows(u_left))
+    m1 = rate(at[1:], x[1:], intervals_of_rows(u_right))
     a2 = (3 * secant - 2 * m0 - m1) / h
     a3 = (m0 + m1 - 2 * secant) / (h * h)
     powers = [intervals_of_rows([row[power] for row in inputs[:count]]) for power in range(len(inputs[0]))]
@@ -183,14 +184,14 @@ def _quadratic(knots: Knots, k: int) -> tuple[Vector, Vector]:
 
 
 class _Drift:
-    """f(x) + B(x) u as an interval function of rows."""
+    """f(t, x) + B(x) u as an interval function of rows, at times (N,)."""
 
     def __init__(self, model: ControlAffineModel) -> None:
         outputs = [row[0] for row in model.drift_on_plan()]
-        self._tape = Tape(outputs, (*model.states, *model.inputs))
+        self._tape = Tape(outputs, (*model.states, *model.inputs, TIME))
 
-    def __call__(self, x: Interval, u: Interval) -> Interval:
-        columns = [x[:, i] for i in range(x.lo.shape[1])] + [u[:, j] for j in range(u.lo.shape[1])]
+    def __call__(self, t: Interval, x: Interval, u: Interval) -> Interval:
+        columns = [x[:, i] for i in range(x.lo.shape[1])] + [u[:, j] for j in range(u.lo.shape[1])] + [t]
         found = self._tape.run(columns, (len(x.lo),))
         return Interval(found.lo.T, found.hi.T)
 

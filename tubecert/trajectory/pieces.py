@@ -25,6 +25,7 @@ from tubecert.trajectory.hermite import Pieces, pieces
 from tubecert.trajectory.plan import PIECE, Plan, missing
 
 TAU = "tau#"  # no state can have this name
+SINCE = "since#"  # when a piece begins
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,13 @@ class PiecewisePlan(Plan):
         data = {
             name: getattr(self.pieces, kind)[:, i, k] for name, (kind, i, k) in _columns(self.pieces).items()
         }
+        data[SINCE] = self.pieces.start
         return PieceDomain(data, self.pieces.length)
 
     @cached_property
     def fixed(self) -> frozenset[str]:
-        """The coefficients."""
-        return frozenset(_columns(self.pieces))
+        """The coefficients, and when a piece begins."""
+        return frozenset((*_columns(self.pieces), SINCE))
 
     @property
     def defined(self) -> bool:
@@ -92,6 +94,11 @@ class PiecewisePlan(Plan):
             both = self.pieces.over(lo, hi, None if span is None else np.rint(span).astype(np.intp))
         n = len(self.x)
         return both[:, :n], both[:, n:]
+
+    @property
+    def clock(self) -> Expression:
+        """The time t, in the variables of the plan."""
+        return symbol(SINCE) + symbol(TAU)
 
     def defect(self, model: ControlAffineModel) -> Matrix:
         """p in tau and the coefficients, (n, 1)."""

@@ -85,6 +85,11 @@ class Plan:
         return {}
 
     @property
+    def clock(self) -> Expression:
+        """The time t, in the variables of the plan."""
+        return symbol(TIME)
+
+    @property
     def allowance(self) -> Fraction | None:
         """What the defect is limited to, for plans that are not known; None where it follows from the plan."""
         return None
@@ -143,8 +148,10 @@ class Plan:
     def on(self, model: ControlAffineModel, rows: Matrix) -> Matrix:
         """A matrix of the model's expressions along the plan: expressions in the variables of the plan."""
         values = dict(zip((*model.states, *model.inputs), (*self.x, *self.u), strict=True))
-        width = len(rows[0])
-        flat = substitute([e for row in rows for e in row], values)
+        width, entries = len(rows[0]), [e for row in rows for e in row]
+        if TIME in free_symbols(entries):
+            values[TIME] = self.clock
+        flat = substitute(entries, values)
         return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
 
     def defect(self, model: ControlAffineModel) -> Matrix:

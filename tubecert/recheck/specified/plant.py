@@ -11,7 +11,7 @@ from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.lookup import Table
 from tubecert.recheck.reading import TIME, Column, Reader
 from tubecert.recheck.specified.numbers import Range, ends, not_negative
-from tubecert.recheck.terms import Matrix, names, number, replaced
+from tubecert.recheck.terms import Matrix, Term, names, number, replaced
 
 _MOST_STATES = 32
 _MOST_POINTS = 500  # of a table
@@ -35,7 +35,12 @@ class Plant:
     unknown: Column | None
     gained: Matrix | None
     tables: dict[str, Table] = field(default_factory=dict)
-    varies: bool = False  # whether t occurs in f
+    moving: tuple[Term, ...] = ()  # f and what it owes, if t occurs in them
+
+    @property
+    def varies(self) -> bool:
+        """Whether t occurs in f, or in what f owes."""
+        return bool(self.moving)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +79,7 @@ def read_plant(node: Node, box: Node) -> Plant:
     reader = Reader.of((*states, *ranges), tables)
     moving = Reader.of((*states, TIME, *ranges), tables)
     drift, B = moving.column(own["f"], n), reader.matrix(own["B"], n, m)
-    varies = TIME in names([*drift, *(duty.argument for duty in moving.duties)])
+    whole = (*drift, *(duty.argument for duty in moving.duties))
     gained = not names(e for row in B for e in row).isdisjoint(ranges)
     sides = box.closed(*states)
     return Plant(
@@ -88,7 +93,7 @@ def read_plant(node: Node, box: Node) -> Plant:
         unknown=drift if ranges else None,
         gained=B if gained else None,
         tables=tables,
-        varies=varies,
+        moving=whole if TIME in names(whole) else (),
     )
 
 
