@@ -30,7 +30,12 @@ def tube_of(name: str, kind: str, **options):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("three_state", "A"), ("two_state", "C"), ("state_dependent_input", "B")],
+    [
+        ("three_state", "A"),
+        ("two_state", "C"),
+        ("state_dependent_input", "A"),
+        ("state_dependent_input", "B"),
+    ],
 )
 def test_gains_are_those_of_close_constants(name, kind):
     by_effect = enclosed(tube_of(name, kind, by_effect=True))

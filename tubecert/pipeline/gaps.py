@@ -157,6 +157,13 @@ class _Known:
         least = self.least(name)
         return self.constants[name].above / least - 1 if least > 0 else float(_COARSE)
 
+    def _reached(self, name: str) -> float:
+        """How closely a constant is known: often far closer than was asked for."""
+        value = self.constants.get(name)
+        if value is None or not (value.below > 0 and isfinite(value.above)):
+            return inf
+        return value.above / value.below - 1
+
     def _all_closer(self, least: Mapping[str, float]) -> dict[str, Fraction]:
         wanted = {
             part: gap
@@ -168,10 +175,9 @@ class _Known:
     def _to_gap(self, name: str, gap: float) -> Iterator[tuple[str, Fraction]]:
         """The gaps of a constant and of what it is made of, to come to one of about this size."""
         for part in _MADE_OF.get(name, (name,)):
-            own = float(self.gaps[part])
-            wanted = round_down(min(max(gap, own / _CLOSER[1]), own / _CLOSER[0]), 2)
-            if wanted >= _LEAST:
-                yield part, wanted
+            own = min(float(self.gaps[part]), self._reached(part))
+            if own > _CLOSER[0] * _LEAST:
+                yield part, max(round_down(min(max(gap, own / _CLOSER[1]), own / _CLOSER[0]), 2), _LEAST)
 
 
 def _constants(problem: TubeProblem) -> Iterator[tuple[str, Constant]]:
