@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from fractions import Fraction
 from importlib.util import find_spec
 
 import numpy as np
@@ -16,10 +18,16 @@ import pytest
 from simulated import setting
 from test_sweep import ONE, bytes_in
 
+from tubecert.enclosure import branch_and_bound
+from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.executor import Cluster, Serial, WorkerError
+from tubecert.expression import parse, symbol
 from tubecert.libraries import versions
 from tubecert.simulate import monte_carlo
 from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.trajectory import constant_plan
+from tubecert.tube import Tube
 
 pytestmark = [
     pytest.mark.slow,
@@ -28,7 +36,26 @@ pytestmark = [
         find_spec("distributed") is None, reason="an extra"
     ),  # a second to import, for all tests
 ]
+NINE = Effort(gap=0.05, cheap=0, budget=700)
 OVER = ("--over", "tube.epsilon=.2:.4:6")
+
+
+def nine_states():
+    """A quadrotor that is driven by a linear feedback of all its nine states, over a tube around hover."""
+    states = ("px", "py", "pz", "vx", "vy", "vz", "thrust", "phi", "theta")
+    symbols = {name: symbol(name) for name in states}
+    f = [
+        "vx",
+        "vy",
+        "vz",
+        "-thrust*sin(theta)",
+        "thrust*cos(theta)*sin(phi)",
+        "9.8 - thrust*cos(theta)*cos(phi)",
+    ]
+    f += ["9.8 - thrust + 2*pz + 3*vz", "-phi - py - 2*vy", "-theta + px + 2*vx"]
+    field = [[parse(text, symbols=symbols).expression] for text in f]
+    hover = constant_plan([Fraction(0)] * 6 + [Fraction("9.8"), Fraction(0), Fraction(0)], [], None)
+    return SumOfNorms([field]), Tube(hover, 0.5, states=states, inputs=(), time=None)
 
 
 @contextmanager
@@ -163,6 +190,25 @@ def test_files_are_checked_on_a_cluster(cluster, tmp_path):
     ]
     assert [each.returncode for each in own] == [2, 2], own
     assert own[1].stdout.replace(f"{tmp_path}/", "") == own[0].stdout
+
+
+def test_the_boxes_of_one_supremum_are_shared_and_none_is_lost_with_a_worker(cluster, monkeypatch):
+    address, workers = cluster
+    monkeypatch.setattr(branch_and_bound, "_ALONE", 200)
+    monkeypatch.setattr(branch_and_bound, "_PARTS", 6)
+    objective, domain = nine_states()
+    own = supremum(objective, domain, NINE)
+    apart: list[int] = []
+
+    def after_the_first_part(step):
+        if step.count >= 200:  # told when the search falls apart, then after each part
+            apart.append(step.count)
+        if len(apart) == 2:
+            workers[1].send_signal(signal.SIGKILL)
+
+    effort = replace(NINE, workers=Cluster(address), progress=after_the_first_part)
+    assert supremum(objective, domain, effort) == own
+    assert len(apart) == 7
 
 
 def test_results_are_in_the_order_of_the_items_and_exceptions_are_raised(cluster):

@@ -21,6 +21,7 @@ from tubecert.cli import (
     synthesising,
     verifying,
 )
+from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
 from tubecert.cli.options import Budget, Deadline, Output, Settings, SpecFile, number_option, with_output
 from tubecert.errors import ExitCode
@@ -140,6 +141,10 @@ def certify(
     ] = None,
     budget: Budget = None,
     deadline: Deadline = None,
+    jobs: Annotated[
+        str, typer.Option(metavar="NUMBER", help="Processes that share the boxes of a long search.")
+    ] = "1",
+    scheduler: Scheduler = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -176,6 +181,8 @@ def certify(
                 "budget": budget,
                 "deadline": deadline,
             },
+            jobs=jobs,
+            scheduler=scheduler,
             target=output,
             pages=report or (),
         )

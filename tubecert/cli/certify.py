@@ -18,7 +18,7 @@ from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
-from tubecert.library.asked import certification_numbers
+from tubecert.library.asked import certification_numbers, jobs_of
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
@@ -39,6 +39,8 @@ class Given:
     conditions: str | None
     formulas: Formulas
     numbers: Mapping[str, str | None]
+    jobs: str
+    scheduler: str | None
     target: str | None
     pages: Sequence[str]
 
@@ -46,6 +48,7 @@ class Given:
 def run(given: Given, output: Output) -> ExitCode:
     """Certify."""
     numbers = certification_numbers(given.numbers, flag)
+    jobs = jobs_of("--jobs", given.jobs)
     radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
     settings = settings_of(given.settings, metric=given.metric, **radii)
     target = _target(given)
@@ -60,8 +63,10 @@ def run(given: Given, output: Output) -> ExitCode:
     from tubecert.library.certifying import (
         certified,  # numpy and the rest, once the input is known to be readable
     )
+    from tubecert.library.workers import workers_of
     from tubecert.report import progress
 
+    workers = workers_of(jobs, given.scheduler, "--scheduler")
     options = numbers.options(conditions=given.conditions, formulas=given.formulas, metric=given.metric)
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
@@ -72,6 +77,7 @@ def run(given: Given, output: Output) -> ExitCode:
             report,
             seconds=numbers.deadline,
             command=command,
+            workers=workers,
             told=None if output.quiet or _is_data(target, output) else _told_by(terminal),
         )
     if target != certificate.STDOUT:

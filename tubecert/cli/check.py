@@ -157,8 +157,8 @@ def _nothing(paths: Sequence[str]) -> list[Checked]:
 
 def _executor(scheduler: str | None, jobs: int, files: int) -> Executor:
     """The cluster, where there is one, or as many processes as are wanted."""
-    from tubecert.cli.clusters import cluster_at
     from tubecert.executor import chosen
+    from tubecert.library.workers import cluster_at
 
     return chosen(jobs, files) if scheduler is None else cluster_at(scheduler)
 

@@ -1,39 +1,12 @@
-"""`--scheduler`: an address in, a Dask cluster out whose workers would find the very same results."""
+"""`--scheduler`: the option; what is at its address is for `library.workers` to say."""
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Annotated, TypeAlias
 
 import typer
-
-from tubecert.errors import SpecError
-from tubecert.executor import Cluster, WorkerError
-from tubecert.findings import Finding
-from tubecert.libraries import versions
-from tubecert.printable import visible
 
 Scheduler: TypeAlias = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Work on a running Dask cluster (extra: tubecert[cluster])."),
 ]
-
-
-def cluster_at(address: str) -> Cluster:
-    """The cluster at an address; raises `SpecError` if there is none, or if its workers could find other results."""
-    if importlib.util.find_spec("distributed") is None:
-        message = "--scheduler needs distributed"
-        help = "install tubecert with its extra: pip install 'tubecert[cluster]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-    cluster, own = Cluster(address), versions()
-    try:
-        others = cluster.versions(versions)
-    except WorkerError as error:
-        help = "start one: dask scheduler, then dask worker ADDRESS on each machine"
-        raise SpecError([Finding(code="TC122", message=visible(str(error)), help=help)]) from None
-    other = {name for each in others for name in {*own, *each} if own.get(name) != each.get(name)}
-    if other:
-        message = f"workers of {visible(address)} have other versions of {', '.join(sorted(other))}"
-        help = "what comes out must not depend on who computes it: install the same everywhere"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-    return cluster

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
-from tubecert.cli.clusters import cluster_at
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
@@ -26,6 +25,7 @@ from tubecert.library.simulating import (
     simulation_numbers,
     wishes_of,
 )
+from tubecert.library.workers import cluster_at
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report import progress
 from tubecert.report.terminal import Terminal

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate, pipeline
-from tubecert.cli.clusters import cluster_at
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
@@ -19,6 +18,7 @@ from tubecert.executor import chosen
 from tubecert.files import replace
 from tubecert.findings import Finding
 from tubecert.library.numbers import Numbers
+from tubecert.library.workers import cluster_at
 from tubecert.printable import printable_json, visible
 from tubecert.records import exact_json
 from tubecert.report import progress

@@ -2,24 +2,33 @@
 
 The result encloses the supremum: `below` is a value proven at a point proven to lie in the domain, `above` a bound
 proven for every box that may meet it. Which boxes are split, and where, is heuristic; what is dropped never is.
+
+A search that is long falls apart into parts, each a search of its own among some of the boxes that are left, with a
+share of the budget: the same parts whoever searches them, so the result does not depend on how many workers there are.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, Protocol
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.executor import Executor, WorkerError
 from tubecert.progress import Phase, Progress, Step
 from tubecert.verdict import Verdict
 
 _BATCH: Final = 1024
 _UNKNOWN: Final = 1e300  # an overestimate of this size tells nothing about its cause
 _PROBES: Final = 64  # boxes whose corners are tried as points, per round
+_ALONE: Final = 100_000  # boxes after which a supremum falls apart
+_PARTS: Final = 32
+_Boxes: TypeAlias = tuple[Array, Array, Array]  # lower corners (N, d), upper ones, and a bound (N,) for each
 
 
 class Domain(Protocol):
@@ -64,7 +73,8 @@ class Effort:
     """How hard to try.
 
     A relative `gap`, or an `absolute` one, suffices; a tenth of the gap is aimed at while the search is `cheap`
-    (boxes); after `budget` boxes it gives up and reports the gap that it has.
+    (boxes); after `budget` boxes it gives up and reports the gap that it has. `workers` search the parts of a long
+    supremum, if there are any: nothing that comes out depends on them.
     """
 
     gap: float = 0.01
@@ -72,6 +82,7 @@ class Effort:
     budget: int = 2_000_000
     cheap: int = 4_000
     progress: Progress | None = None
+    workers: Executor | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +143,25 @@ class _Search:
         bound = np.full(len(lo), np.inf)
         self.extent = hi.max(axis=0) - lo.min(axis=0)
         self._probe(0.5 * (lo + hi))
-        while len(lo) and self._goes_on:
+        alone = _ALONE if self.threshold is None else None
+        lo, hi, bound = self.search(lo, hi, bound, alone)
+        if len(lo) and self._goes_on:
+            bound = self._apart(lo, hi, bound)
+        above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
+        if above == -np.inf:  # an objective that is not bounded settles at inf
+            raise ValueError("the domain is empty")
+        tolerance = max(self.effort.gap * abs(self.below), self.effort.absolute)
+        return Supremum(
+            below=float(self.below),
+            above=above,
+            at=self.at,
+            boxes=self.count,
+            reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
+        )
+
+    def search(self, lo: Array, hi: Array, bound: Array, alone: int | None = None) -> _Boxes:
+        """Split boxes until none is left, the budget is spent or so many were examined; those that are left."""
+        while len(lo) and self._goes_on and (alone is None or self.count < alone):
             order = np.argsort(-bound, kind="stable")
             children, done = [], 0
             # the longer the queue, the more is taken at once: otherwise sorting would cost its square
@@ -147,24 +176,45 @@ class _Search:
                 np.concatenate([old[rest][kept], *new])
                 for old, new in zip((lo, hi, bound), zip(*children, strict=True), strict=True)
             )
-            if self.effort.progress:
-                above = float(max(self.settled, bound.max(initial=-np.inf)))
-                self.effort.progress(
-                    Step(phase=Phase.CERTIFICATION, count=self.count, below=self.below, above=above)
-                )
-        if self.below == self.settled == -np.inf and not len(
-            lo
-        ):  # an objective that is not bounded settles at inf
-            raise ValueError("the domain is empty")
-        above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
-        tolerance = max(self.effort.gap * abs(self.below), self.effort.absolute)
-        return Supremum(
-            below=float(self.below),
-            above=above,
-            at=self.at,
-            boxes=self.count,
-            reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
+            self._tell(float(bound.max(initial=-np.inf)))
+        return lo, hi, bound
+
+    def _tell(self, above: float) -> None:
+        if self.effort.progress:
+            told = float(max(self.settled, above))
+            self.effort.progress(
+                Step(phase=Phase.CERTIFICATION, count=self.count, below=self.below, above=told)
+            )
+
+    def _apart(self, lo: Array, hi: Array, bound: Array) -> Array:
+        """Search the boxes in parts that know nothing of each other; bounds (P,) for what each holds.
+
+        Every P-th box by bound is in the same part, so that the parts are alike.
+        """
+        order = np.argsort(-bound, kind="stable")
+        taken = [order[first::_PARTS] for first in range(min(_PARTS, len(order)))]
+        share = max(1, (self.effort.budget - self.count) // len(taken))
+        part = _Part(
+            self.objective,
+            self.domain,
+            replace(self.effort, budget=share, cheap=-1, progress=None, workers=None),
+            self.below,
+            self.extent,
         )
+        left = {place: float(bound[take].max()) for place, take in enumerate(taken)}
+
+        def ready(place: int, held: _Held) -> None:
+            self.count += held.boxes
+            left[place] = held.above
+            self._tell(max(left.values()))
+
+        found = _shared(
+            part, [(lo[take], hi[take], bound[take]) for take in taken], self.effort.workers, ready
+        )
+        for each in found:
+            if each.below > self.below:
+                self.below, self.at = each.below, each.at
+        return np.array([each.above for each in found])
 
     @property
     def _goes_on(self) -> bool:
@@ -230,6 +280,58 @@ class _Search:
         if values[best] > self.below:
             self.below = float(values[best])
             self.at = {v: float(x) for v, x in zip(self.variables, 0.5 * (lo + hi)[best], strict=True)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Held:
+    """What a part of a search came to: as `Supremum`, of its own boxes."""
+
+    below: float
+    above: float
+    at: dict[str, float]
+    boxes: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A search in boxes, each with a bound, that knows the value `below`; sent to workers as it is."""
+
+    objective: Objective
+    domain: Domain
+    effort: Effort
+    below: float
+    extent: Array
+
+    def __call__(self, boxes: _Boxes) -> _Held:
+        """What the boxes hold."""
+        with np.errstate(all="ignore"):
+            search = _Search(self.objective, self.domain, self.effort)
+            search.below, search.extent = self.below, self.extent
+            _, _, bound = search.search(*boxes)
+        above = float(max(search.settled, bound.max(initial=-np.inf)))
+        return _Held(below=search.below, above=above, at=search.at, boxes=search.count)
+
+
+def _shared(
+    part: _Part,
+    items: Sequence[_Boxes],
+    workers: Executor | None,
+    ready: Callable[[int, _Held], None],
+) -> list[_Held]:
+    """What every part holds, in order; what is left of workers that are lost is done here."""
+    found: dict[int, _Held] = {}
+
+    def kept(place: int, held: _Held) -> None:
+        found[place] = held
+        ready(place, held)
+
+    if workers is not None:
+        with contextlib.suppress(WorkerError):
+            workers.map(part, items, kept)
+    for place, item in enumerate(items):
+        if place not in found:
+            kept(place, part(item))
+    return [found[place] for place in range(len(items))]
 
 
 def _cuts(lo: Array, hi: Array, choice: NDArray[np.intp]) -> Array:

@@ -9,6 +9,7 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 | `plain`, `specification` | values of Python as a specification |
 | `certification`, `certifying` | a certificate as a value; how one is made |
 | `metrics` | metrics found, or decided |
+| `workers` | who helps: processes, or a cluster |
 | `simulating`, `rechecking`, `pages` | what can be done with a certificate |
 | `figures` | the tube and the trade-off, drawn into axes |
 """

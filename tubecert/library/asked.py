@@ -78,6 +78,14 @@ def certification_numbers(given: Mapping[str, str | None], named: Named) -> Cert
     return CertificationNumbers(**radii, **gains, gap=gap, by_effect=by_effect, budget=budget)
 
 
+def jobs_of(name: str, given: str | None) -> int | None:
+    """How many processes are asked for; raises `SpecError`."""
+    numbers = Numbers()
+    found = numbers.count(name, given)
+    numbers.check()
+    return found
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerificationNumbers:
     """The numbers that a verification may be asked with, exact."""

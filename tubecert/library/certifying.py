@@ -10,13 +10,22 @@ from fractions import Fraction
 from pathlib import Path
 
 from tubecert import certificate, pipeline
+from tubecert.executor import Executor
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
-from tubecert.library.asked import CertificationNumbers, certification_numbers, one_of, refuse, require_once
+from tubecert.library.asked import (
+    CertificationNumbers,
+    certification_numbers,
+    jobs_of,
+    one_of,
+    refuse,
+    require_once,
+)
 from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
+from tubecert.library.workers import workers_of
 from tubecert.pipeline import Options, Result
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
@@ -37,13 +46,17 @@ def certify(
     gap: Number | None = None,
     budget: int | None = None,
     deadline: Number | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Certification:
     """Prove the tube around the plan and find the smallest gains: `tubecert certify`, with the same options.
 
     `metric` stands in for the specification's own: a file, a mapping with `rate` and `dual_metric`, or what
     `synthesise` found. `conditions`: the letter of the certificate that decides the verdict, or `all`. `progress` is
-    called with every `Step` that is told. Numbers are exact; a float stands for its shortest decimal.
+    called with every `Step` that is told. Numbers are exact; a float stands for its shortest decimal. The boxes of a
+    long search are shared by `jobs` processes (then the caller's own code stands below `if __name__ == "__main__":`),
+    or by the workers of a Dask cluster at the address `scheduler`; no result depends on that.
 
     Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless.
     """
@@ -64,7 +77,14 @@ def certify(
     if metric is not None:
         whole, name = with_metric(whole, metric)
         options = replace(options, metric=Path(name))
-    return certified(whole, options, timed(progress), seconds=numbers.deadline, command="tubecert.certify")
+    return certified(
+        whole,
+        options,
+        timed(progress),
+        seconds=numbers.deadline,
+        command="tubecert.certify",
+        workers=workers_of(jobs_of("jobs", str(jobs)), scheduler, "scheduler"),
+    )
 
 
 def certified(
@@ -75,14 +95,17 @@ def certified(
     seconds: Fraction | None,
     command: str,
     told: Callable[[Result], None] | None = None,
+    workers: Executor | None = None,
 ) -> Certification:
     """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric.
 
-    `told` hears a verdict that is not `certified` before it is looked for what would be.
+    `told` hears a verdict that is not `certified` before it is looked for what would be; `workers` share long searches.
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
-    result = pipeline.certify(spec, options, progress, deadline=deadline, advise=True, told=told)
+    result = pipeline.certify(
+        spec, options, progress, deadline=deadline, advise=True, told=told, workers=workers
+    )
     run = {
         "command": command,
         "started": started.isoformat(timespec="seconds"),

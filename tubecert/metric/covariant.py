@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -177,42 +177,34 @@ class Geometry:
 
     def slope_of_form(self) -> MetricTensorNorm:
         """D_nF: |D_v F| over vectors v of length 1, all in the metric."""
-        model, count = self.model, len(self._moving)
+        model = self.model
         F_x = [differentiate(model.F, name) for name in model.states]
         own = [i for i, slope in enumerate(F_x) if _moves(slope)]
-
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            F, slopes, rest = forms[0], forms[1 : 1 + count], forms[1 + count :]
-            turn = contract(
-                "kac,cl->akl",
-                self._symbols(frame, slopes),
-                contract("cd,dl->cl", frame.M, frame.both(F)),
-            )
-            found = turn + turn.turned(0, 2, 1)
-            return found + frame.along(own, stacked(rest)) if own else found
-
         matrices = [model.F, *self._slopes, *(F_x[i] for i in own)]
-        return MetricTensorNorm(model.W, matrices, tensor, rank=3, rows=((0, 1), (0,)))
+        return MetricTensorNorm(
+            model.W, matrices, partial(self._turned_form, own), rank=3, rows=((0, 1), (0,))
+        )
+
+    def _turned_form(self, own: list[int], frame: Frame, forms: list[Form]) -> Form:
+        """D^a F, (a, k, l); `own` are the states that F depends on."""
+        count = len(self._moving)
+        F, slopes, rest = forms[0], forms[1 : 1 + count], forms[1 + count :]
+        lowered = contract("cd,dl->cl", frame.M, frame.both(F))
+        turn = contract("kac,cl->akl", self._symbols(frame, slopes), lowered)
+        found = turn + turn.turned(0, 2, 1)
+        return found + frame.along(own, stacked(rest)) if own else found
 
     def slope_of_field(self, X: Matrix) -> MetricTensorNorm:
         """D_nX: |D X| in the metric of a vector field (n, 1)."""
-        count = len(self._moving)
-
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            return self._derivative(frame, forms[0], forms[1], forms[2 : 2 + count])
-
         matrices = [X, _jacobian(X, self.model.states), *self._slopes]
-        return MetricTensorNorm(self.model.W, matrices, tensor, rank=2, rows=((0,),))
+        return MetricTensorNorm(self.model.W, matrices, self._of_field, rank=2, rows=((0,),))
+
+    def _of_field(self, frame: Frame, forms: list[Form]) -> Form:
+        return self._derivative(frame, forms[0], forms[1], forms[2:])
 
     def size_of_field(self, X: Matrix) -> MetricTensorNorm:
         """|Theta X| of a vector field (n, 1)."""
-        return MetricTensorNorm(
-            self.model.W,
-            [X],
-            lambda frame, forms: contract("ij,jz->zi", frame.T, forms[0]),
-            rank=1,
-            rows=((0,),),
-        )
+        return MetricTensorNorm(self.model.W, [X], _length, rank=1, rows=((0,),))
 
     def _derivative(self, frame: Frame, X: Form, X_x: Form, slopes: Sequence[Form]) -> Form:
         """(D^b X)_k, (k, b)."""
@@ -222,28 +214,25 @@ class Geometry:
 
     def slope_of_inputs(self, on: On, fixed: frozenset[str]) -> MetricTensorNorm:
         """D_nb: |(<D_v b_j, z>)_j| over v and z of length 1 in the metric, of expressions on the plan."""
-        model, m, count = self.model, len(self.model.inputs), len(self._moving)
+        model, rows = self.model, ((0, 1), (0, 2), (0,))
         columns = [column(b) for b in model.columns]
-
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            slopes = forms[2 * m : 2 * m + count]
-            return stacked([self._derivative(frame, forms[j], forms[m + j], slopes) for j in range(m)])
-
         matrices = [on(a) for a in (*columns, *(_jacobian(b, model.states) for b in columns), *self._slopes)]
-        rows = ((0, 1), (0, 2), (0,))
-        return MetricTensorNorm(on(model.W), matrices, tensor, rank=2, rows=rows, fixed=fixed)
+        return MetricTensorNorm(on(model.W), matrices, self._of_inputs, rank=2, rows=rows, fixed=fixed)
+
+    def _of_inputs(self, frame: Frame, forms: list[Form]) -> Form:
+        m = len(self.model.inputs)
+        return stacked([self._derivative(frame, forms[j], forms[m + j], forms[2 * m :]) for j in range(m)])
 
     def curvature(self) -> MetricTensorNorm:
         """K_R: the greatest |sectional curvature|, at most the norm of the curvature as a form of bivectors."""
         count = len(self._moving)
         pairs = [(i, j) for i in range(count) for j in range(count)]
         second = [differentiate(self._slopes[i], self.model.states[self._moving[j]]) for i, j in pairs]
+        return MetricTensorNorm(self.model.W, [*self._slopes, *second], self._curved, rank=4, rows=((0,),))
 
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            slopes = forms[:count]
-            return _bivectors(self._riemann(frame, slopes, forms[count:]))
-
-        return MetricTensorNorm(self.model.W, [*self._slopes, *second], tensor, rank=4, rows=((0,),))
+    def _curved(self, frame: Frame, forms: list[Form]) -> Form:
+        count = len(self._moving)
+        return _bivectors(self._riemann(frame, forms[:count], forms[count:]))
 
     def _riemann(self, frame: Frame, slopes: Sequence[Form], second: Sequence[Form]) -> Form:
         """R_ijkl = (g_il,jk + g_jk,il - g_ik,jl - g_jl,ik)/2 + g_np (Gamma^n_jk Gamma^p_il - Gamma^n_jl Gamma^p_ik)."""
@@ -264,28 +253,32 @@ class Geometry:
 
     def slope_by_coordinates(self, fields: Fields) -> MetricTensorNorm:
         """D_Fx: |T_v| in the metric over |v| = 1 in z, T_v = F_v - W_v M F - F M W_v."""
-        n = len(self.model.states)
-
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            F, F_z, W_z = forms[0], frame.each(stacked(forms[1 : 1 + n])), frame.each(stacked(forms[1 + n :]))
-            turn = contract("akc,cl->akl", W_z, contract("cd,dl->cl", frame.M, frame.both(F)))
-            return F_z - (turn + turn.turned(0, 2, 1))
-
         matrices = [self.model.F, *fields.slopes(self.model.F), *fields.slopes(self.model.W)]
-        return MetricTensorNorm(self.model.W, matrices, tensor, rank=2, rows=((0, 1), (0,)))
+        return MetricTensorNorm(self.model.W, matrices, _by_coordinates, rank=2, rows=((0, 1), (0,)))
 
     def tilt_by_coordinates(self, fields: Fields, on: On, fixed: frozenset[str]) -> MetricTensorNorm:
         """D_cx: |(B_v' - B'M W_v) L^-1| over |v| = 1 in z, of expressions on the plan."""
-        n = len(self.model.states)
-
-        def tensor(frame: Frame, forms: list[Form]) -> Form:
-            B = contract("cd,dj->cj", frame.M, contract("ij,jk->ik", frame.T, forms[0]))
-            B_z = contract("ij,ajm->ami", frame.T, stacked(forms[1 : 1 + n]))
-            return B_z - contract("cm,ack->amk", B, frame.each(stacked(forms[1 + n :])))
-
         B, W = self.model.B, self.model.W
         matrices = [on(a) for a in (B, *fields.slopes(B), *fields.slopes(W))]
-        return MetricTensorNorm(on(W), matrices, tensor, rank=1, rows=((0, 1), (0, 2)), fixed=fixed)
+        return MetricTensorNorm(on(W), matrices, _tilted, rank=1, rows=((0, 1), (0, 2)), fixed=fixed)
+
+
+def _length(frame: Frame, forms: list[Form]) -> Form:
+    return contract("ij,jz->zi", frame.T, forms[0])
+
+
+def _by_coordinates(frame: Frame, forms: list[Form]) -> Form:
+    n = len(forms) // 2
+    F, F_z, W_z = forms[0], frame.each(stacked(forms[1 : 1 + n])), frame.each(stacked(forms[1 + n :]))
+    turn = contract("akc,cl->akl", W_z, contract("cd,dl->cl", frame.M, frame.both(F)))
+    return F_z - (turn + turn.turned(0, 2, 1))
+
+
+def _tilted(frame: Frame, forms: list[Form]) -> Form:
+    n = len(forms) // 2
+    B = contract("cd,dj->cj", frame.M, contract("ij,jk->ik", frame.T, forms[0]))
+    B_z = contract("ij,ajm->ami", frame.T, stacked(forms[1 : 1 + n]))
+    return B_z - contract("cm,ack->amk", B, frame.each(stacked(forms[1 + n :])))
 
 
 def _column(a: Form) -> Form:

@@ -21,6 +21,7 @@ from dataclasses import replace
 from tubecert.certificate.result import Result
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
+from tubecert.executor import Executor
 from tubecert.findings import Severity
 from tubecert.model import domain_findings
 from tubecert.pipeline.advice import Ledger, advised
@@ -60,30 +61,31 @@ def certify(
     deadline: Deadline | None = None,
     advise: bool = False,
     told: Callable[[Result], None] | None = None,
+    workers: Executor | None = None,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
     With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
     a metric that is looked for is by then the best that was found. With `advise`, what would certify is looked for
-    where the verdict is another; `told` hears the verdict before.
+    where the verdict is another; `told` hears the verdict before. `workers` search parts of long suprema: what comes
+    out does not depend on them.
     """
     ledger = Ledger(progress)
-    end = _end(spec, options, ledger, memory, deadline)
+    question = replace(question_of(spec, options, ledger, memory), workers=workers)
+    end = _end(question, deadline)
     found = result(end)
     return advised(found, end, ledger, question_of, told) if advise else found
 
 
-def _end(
-    spec: Spec, options: Options, progress: Progress, memory: Memory | None, deadline: Deadline | None
-) -> Stage | Stopped:
+def _end(question: Question, deadline: Deadline | None) -> Stage | Stopped:
     """How the certification ends."""
-    question = question_of(spec, options, progress, memory)
-    if question.spec.metric is not None or spec.synthesis is None:
+    spec = question.spec
+    if spec.metric is not None or spec.synthesis is None:
         return answer(counted(question))
-    found = synthesise(spec, spec.synthesis, options, progress, deadline=deadline)
+    found = synthesise(spec, spec.synthesis, question.options, question.progress, deadline=deadline)
     if found.cut == "interrupted":
         raise KeyboardInterrupt
-    question = replace(question, spec=found.spec or question.spec, synthesis=found.data())
+    question = replace(question, spec=found.spec or spec, synthesis=found.data())
     return answer(counted(question)) if found.reason is None else Stopped(at=question, reason=found.reason)
 
 

@@ -15,6 +15,7 @@ from tubecert.claims.family import Claim, Reason, Relax
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import Range
+from tubecert.executor import Executor
 from tubecert.model import ControlAffineModel, build
 from tubecert.progress import Progress
 from tubecert.records import Json
@@ -42,7 +43,7 @@ class Question:
     """What is to be certified: a specification with its radii, the options, the range of time that matters for h.
 
     `synthesis` is what the certificate says of a metric that was synthesised for this question. `memory` may be shared
-    between questions; nothing that comes out depends on it.
+    between questions, and `workers` search parts of long suprema; nothing that comes out depends on either.
     """
 
     spec: Spec
@@ -51,6 +52,7 @@ class Question:
     synthesis: SynthesisData | None = None
     progress: Progress | None = field(default=None, repr=False, compare=False)
     memory: Memory = field(default_factory=Memory, repr=False, compare=False)
+    workers: Executor | None = field(default=None, repr=False, compare=False)
 
     @property
     def question(self) -> Question:
@@ -88,7 +90,7 @@ class Question:
     @cached_property
     def effort(self) -> Effort:
         """The gap and the budget of every search."""
-        return Effort(gap=float(self.options.gap), budget=self.options.budget)
+        return Effort(gap=float(self.options.gap), budget=self.options.budget, workers=self.workers)
 
     @cached_property
     def declared_metric(self) -> tuple[Constant, Constant] | None:
