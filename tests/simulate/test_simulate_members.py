@@ -23,6 +23,7 @@ from tubecert.simulate.campaign import follow
 from tubecert.simulate.certified import adopted
 from tubecert.simulate.compare import Comparison, Use, merged
 from tubecert.simulate.members import drawing_of, member, members_of
+from tubecert.simulate.replanning import joined
 from tubecert.simulate.setting import setting_of
 from tubecert.simulate.summary import members_data
 from tubecert.simulate.tuning import Choice, loop_of
@@ -47,14 +48,15 @@ conditions: {decides: B}
 """
 
 
-def followed(count, each, choice=None, seconds=1):
+def followed(count, each, choice=None, *, seconds=1, replan=None, plans=None):
     """Members that the adaptive loop follows, and what the setting of the first one is."""
     result = Certificate.from_json(proven(FAMILY)).result
     spec = adopted(load_text(FAMILY), result)
-    drawing = drawing_of(spec, build(spec), float(seconds))
+    drawing = drawing_of(spec, build(spec), float(seconds), replan)
     setting = setting_of(spec, result, Fraction(seconds), member(drawing, 3, 0))
     loop = loop_of(setting, "l1", choice or Choice())
-    return setting, follow(setting, [loop], members_of(drawing, 3, count), asked=count - 1, each=each, seed=3)
+    plans = members_of(drawing, 3, count) if plans is None else plans(drawing)
+    return setting, follow(setting, [loop], plans, asked=count - 1, each=each, seed=3)
 
 
 @pytest.mark.slow
@@ -128,7 +130,67 @@ def test_runs_along_several_plans_are_numbered_through():
     assert merged([own, replace(own, settled=None)]).settled is None
 
 
-@pytest.mark.parametrize("option", ["--members", "--plan"])
+# -- a planner that replans
+
+
+def test_a_new_plan_starts_where_the_old_one_is():
+    """x* goes on, u* jumps, f(x*) + B u* = x*' on both sides; what is not reached of a plan is no part of it."""
+    spec = load_text(FAMILY.replace("defect: 0.01", "defect: 0"))
+    plan = member(drawing_of(spec, build(spec), 1.0, Fraction(2, 5)), 3, 1)
+    assert plan.since == (0, Fraction(2, 5), Fraction(4, 5))
+    assert [part.horizon for part in plan.parts] == [Fraction(2, 5), Fraction(2, 5), Fraction(1, 5)]
+    assert plan.horizon == 1
+    switch = np.array([0.4, 0.8])
+    before, after = (plan.enclose(switch, switch, np.array(side)) for side in ([0, 1], [1, 2]))
+    assert before[0].mid == pytest.approx(after[0].mid, abs=1e-12)
+    assert np.abs(before[1].mid - after[1].mid).max() > 0.05
+    times = np.linspace(0, 1, 41)
+    x, u = (part.mid for part in plan.enclose(times, times))
+    assert (np.abs(x) <= [1, 0.5]).all()
+    assert (np.abs(u) <= 1).all()
+    knots = plan.knots
+    assert list(knots.t) == sorted(set(knots.t))
+    assert knots.t[-1] >= 1
+
+
+@pytest.mark.slow
+def test_every_plan_of_a_planner_is_proven_to_be_of_the_family():
+    spec = load_text(FAMILY)
+    plan = member(drawing_of(spec, build(spec), 0.5, Fraction(1, 4)), 7, 2)
+    knots = plan.parts[1].data
+    assert knots.x[0] == plan.parts[0].data.x[len(plan.parts[0].data.t) // 2]
+    table = Table(file="drawn.csv", sha256="", knots=knots)
+    trajectory = replace(spec.trajectory, kind="csv", bundle=None, table=table, horizon=knots.t[-1])
+    (finding,) = membership(replace(spec, trajectory=trajectory), spec, "drawn")
+    assert finding.severity is Severity.NOTE, finding.message
+
+
+@pytest.mark.slow
+def test_the_certified_loop_keeps_to_plans_that_are_given_up_for_others():
+    setting, found = followed(4, 2, replan=Fraction(1, 4))
+    (loop,) = found.followed
+    assert loop.comparison.count == 6
+    assert not loop.comparison.outside
+    assert not loop.comparison.violations
+    assert loop.comparison.uses["distance"].bound <= setting.reach
+    assert found.defect <= 0.01
+
+
+@pytest.mark.slow
+def test_a_plan_that_starts_elsewhere_is_not_covered():
+    """That a new plan starts where the old one is matters: jumps of x* across its box leave the tube."""
+
+    def jumping(drawing):
+        drawn = sorted(
+            (member(drawing, 3, number).parts for number in range(1, 9)), key=lambda parts: parts[1].data.x[0]
+        )
+        yield joined([drawn[0][0], drawn[-1][1], drawn[0][2], drawn[-1][3]]), 0.0
+
+    _, found = followed(2, 3, replan=Fraction(1, 4), plans=jumping)
+    assert found.followed[0].comparison.outside
+
+
+@pytest.mark.parametrize("option", ["--members", "--plan", "--replan"])
 def test_one_plan_has_no_members(option, tmp_path):
     text = FAMILY.split("trajectory:", maxsplit=1)[0] + (
         "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}\ntube: {epsilon: 0.6, rho_a: 0.1}\n"

@@ -80,6 +80,13 @@ def simulate(
         str | None,
         number_option("--members", "Of a family: so many random plans of it share the runs.  [20]"),
     ] = None,
+    replan: Annotated[
+        str | None,
+        number_option(
+            "--replan",
+            "Of a family: a plan is given up every so many s, for one that starts where it is then.",
+        ),
+    ] = None,
     plan: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Of a family: this plan (CSV or specification), if it is one."),
@@ -129,8 +136,9 @@ def simulate(
         raise typer.BadParameter(
             "compiled code drives on this machine: --controller or --scheduler", ctx=context
         )
-    if members is not None and plan is not None:
-        raise typer.BadParameter("a plan of your own, or random ones: --plan or --members", ctx=context)
+    if plan is not None and (members is not None or replan is not None):
+        words = "a plan of your own, or random ones: --plan, or --members and --replan"
+        raise typer.BadParameter(words, ctx=context)
     if controller is not None and certificate is None:
         raise typer.BadParameter("a controller is that of a certificate: --certificate FILE", ctx=context)
     with guarded(how):
@@ -161,6 +169,7 @@ def simulate(
                     "seed": seed,
                     "replay": replay,
                     "members": members,
+                    "replan": replan,
                 },
                 folder=output,
                 scheduler=scheduler,

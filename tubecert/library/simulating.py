@@ -156,6 +156,7 @@ def simulate(
     adaptation_rate: Number | None = None,
     sample_time: Number | None = None,
     members: int | None = None,
+    replan: Number | None = None,
     plan: File | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
@@ -176,6 +177,7 @@ def simulate(
         seed=seed,
         replay=replay,
         members=members,
+        replan=replan,
     )
     numbers = simulation_numbers(texts, str)
     chosen = controllers_of(controllers, str)
@@ -218,6 +220,7 @@ class Wishes:
     adaptation_rate: Fraction | None
     sample_time: Fraction | None
     members: int | None
+    replan: Fraction | None
     plan: str | None
 
 
@@ -245,6 +248,7 @@ class SimulationNumbers:
     seed: int | None
     replay: int | None
     members: int | None
+    replan: Fraction | None
 
 
 def simulation_numbers(given: Mapping[str, str | None], named: Named) -> SimulationNumbers:
@@ -272,6 +276,7 @@ def simulation_numbers(given: Mapping[str, str | None], named: Named) -> Simulat
         seed=whole("seed"),
         replay=whole("replay"),
         members=numbers.count(named("members"), given["members"]),
+        replan=positive("replan"),
     )
     numbers.check()
     return found
@@ -295,8 +300,8 @@ def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
     """Raises TC708 where a plan of a family is asked for, and there is no family."""
     from tubecert.simulate.certified import require_family
 
-    asked = ("members", wishes.members is not None), ("plan", wishes.plan is not None)
-    require_family(system, [named(name) for name, wanted in asked if wanted])
+    asked = ("members", wishes.members), ("replan", wishes.replan), ("plan", wishes.plan)
+    require_family(system, [named(name) for name, value in asked if value is not None])
 
 
 def wishes_of(
@@ -326,6 +331,7 @@ def wishes_of(
         adaptation_rate=numbers.adaptation_rate,
         sample_time=numbers.sample_time,
         members=numbers.members,
+        replan=numbers.replan,
         plan=None if plan is None else os.fspath(plan),
     )
 
@@ -376,6 +382,7 @@ def campaign_of(
             return own
         plans = members_of(drawing, wishes.seed, asked)
         found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
+        found = found and replace(found, replan=wishes.replan)
         return replace(own, members=found, interrupted=found is None or found.plans < further)
 
 
@@ -391,7 +398,10 @@ def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Dra
     if wishes.plan is not None:
         own = _member(system, wishes.plan)
         return setting_of(own, result, wishes.duration, plan_of(own, model)), None
-    drawing = drawing_of(system, model, horizon_of(system, wishes.duration))
+    if wishes.replan is not None and model.time is not None:
+        message = "f depends on t: plans that are given up for others are not drawn for it"
+        raise SpecError([Finding(code="TC708", message=message, help="leave --replan out")])
+    drawing = drawing_of(system, model, horizon_of(system, wishes.duration), wishes.replan)
     return setting_of(system, result, wishes.duration, member(drawing, wishes.seed, 0)), drawing
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Final
 
 import numpy as np
@@ -78,7 +79,8 @@ class Followed:
 class Members:
     """Further random plans of a family: `each` runs of every loop along each; `asked` is how many there were to be.
 
-    `defect` is the largest |x*' - f - B u*| of them that was seen.
+    `defect` is the largest |x*' - f - B u*| of them that was seen; `replan`: after so many s each is given up for
+    another.
     """
 
     asked: int
@@ -86,6 +88,7 @@ class Members:
     each: int
     defect: float
     followed: tuple[Followed, ...]
+    replan: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,8 +17,10 @@ from tubecert.simulate.layout import layout
 from tubecert.simulate.machine import EVENTS, Machine
 from tubecert.simulate.problem import LoopProblem, unbounded
 from tubecert.simulate.program import Index
+from tubecert.simulate.replanning import Replanned
 from tubecert.simulate.stepping import Grid
 from tubecert.spec import Knots
+from tubecert.trajectory import Plan
 
 _SAME = 1e-11  # of the horizon: times that differ by less are one
 _FEWEST_STEPS = 64
@@ -29,7 +31,7 @@ def corners(problem: LoopProblem) -> tuple[Array, Index]:
     """Times (C,) that must be ends of steps, and what happens at them: numbers of `EVENTS` (4, C), or -1."""
     end = problem.horizon
     kinds = instants(problem)
-    kinks = _kinks(problem.plan.knots)
+    kinks = _kinks(problem.plan)
     every = np.concatenate([[0.0, end], problem.times, kinks[kinks < end], *kinds])
     every = np.unique(np.minimum(every, end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
@@ -70,10 +72,16 @@ def _ticks(problem: LoopProblem, period: float | None, delay: float) -> Array:
     return np.asarray(ticks[ticks <= end * (1 + 1e-12)])
 
 
-def _kinks(knots: Knots | None) -> Array:
-    """Times that no step may straddle: the ends of pieces on which u* is held, the corners of a linear u*."""
-    if knots is None:
+def _kinks(plan: Plan) -> Array:
+    """Times that no step may straddle: corners of u*, ends of pieces on which it is held, switches of plans."""
+    if plan.knots is None:
         return np.zeros(0)
+    corners = _corners_of(plan.knots)
+    return np.concatenate([corners, plan.spans.hi]) if isinstance(plan, Replanned) else corners
+
+
+def _corners_of(knots: Knots) -> Array:
+    """Where u* has corners, or until when it is held; (K,)."""
     values = knots.u
     if knots.interpolation == "hermite-simpson":
         return np.array([float(t) for t in knots.t[2::2]])

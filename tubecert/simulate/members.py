@@ -4,14 +4,15 @@ A plan is drawn segment by segment: from corner to corner u* is linear, x* follo
 defect that is allowed, and a segment counts only if x* keeps to its box. Of several the one is taken from which
 the box can be kept for longest; where none is left, the last segments are drawn again. Untrusted: that the plan keeps
 to boxes and defect is looked at in many points, not proven (`pipeline.membership` does that).
+Where a planner is played that replans, a plan is given up half-way for one that starts where it is then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -21,10 +22,13 @@ from tubecert.enclosure.tape import Tape
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.model import TIME, ControlAffineModel
+from tubecert.simulate.replanning import Replanned, joined
 from tubecert.spec import Knots, Spec
 from tubecert.spec.types import Bundle
+from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 
+P = TypeVar("P")
 _SEGMENTS: Final = (4, 40)  # of a plan, from corner to corner of u*
 _KNOTS: Final = 400  # of a plan, about
 _CANDIDATES: Final = 12  # corners that are tried at once
@@ -39,7 +43,10 @@ _ROUNDING: Final = 1e-5  # of |x*'|: what a cubic may miss of the dynamics where
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
-    """What plans are drawn for: the dynamics, the boxes as arrays (2, n) and (2, m), the horizon in s."""
+    """What plans are drawn for: the dynamics, the boxes as arrays (2, n) and (2, m), how long they last in s.
+
+    `replan`: after so many s a plan is given up for a new one; None: never (f is free of t).
+    """
 
     model: ControlAffineModel
     bundle: Bundle
@@ -47,6 +54,7 @@ class Drawing:
     P: Array
     U: Array
     drift: Tape
+    replan: Fraction | None = None
 
     def speed(self, t: float | Array, x: Array, u: Array) -> Array:
         """f(t, x) + B(x) u for points (N, n) and (N, m), at one time or at N."""
@@ -75,7 +83,9 @@ class Drawing:
         return np.asarray(np.where(kept.all(axis=1), kept.shape[1], np.argmin(kept, axis=1)))
 
 
-def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing:
+def drawing_of(
+    spec: Spec, model: ControlAffineModel, horizon: float, replan: Fraction | None = None
+) -> Drawing:
     """What plans of a family are drawn for."""
     bundle = spec.trajectory.bundle
     if bundle is None:
@@ -86,49 +96,98 @@ def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing
         horizon=Fraction(repr(horizon)),
         P=_inner(bundle.x),
         U=_inner(bundle.u, 0.0),
+        replan=replan,
         drift=Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME)),
     )
 
 
-def member(drawing: Drawing, seed: int, number: int) -> PiecewisePlan:
+def member(drawing: Drawing, seed: int, number: int) -> PiecewisePlan | Replanned:
     """Plan `number` of a seed; raises `TubecertError` if none is found that keeps to the boxes."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**30, number)))
-    for _ in range(_STARTS):
-        segments = int(rng.integers(*_SEGMENTS, endpoint=True))
-        found = _corners(drawing, segments, rng)
-        if found is None:
-            continue
-        plan = piecewise_plan(drawing.model, _knots(drawing, segments, *found), drawing.horizon)
-        if _belongs(drawing, plan):
-            return plan
-    raise TubecertError([_none(drawing, number)])
+    every = drawing.replan
+    plan: PiecewisePlan | Replanned | None
+    if every is not None and every < drawing.horizon:
+        plan = _replanned(drawing, every, rng)
+    else:
+        plan = _some(lambda: _drawn(drawing, int(rng.integers(*_SEGMENTS, endpoint=True)), rng))
+    if plan is None:
+        raise TubecertError([_none(drawing, number)])
+    return plan
 
 
-def members_of(drawing: Drawing, seed: int, count: int) -> Iterator[tuple[PiecewisePlan, float]]:
+def members_of(drawing: Drawing, seed: int, count: int) -> Iterator[tuple[Plan, float]]:
     """Plans 1, 2, ... count - 1 of a seed, with the defects that were seen."""
     for number in range(1, count):
         plan = member(drawing, seed, number)
         yield plan, defect_of(drawing, plan)
 
 
-def defect_of(drawing: Drawing, plan: PiecewisePlan) -> float:
+def defect_of(drawing: Drawing, plan: PiecewisePlan | Replanned) -> float:
     """The largest |x*' - f - B u*| in many points."""
-    (found, _), _ = _sampled(drawing, plan)
-    return float(found.max())
+    parts = plan.parts if isinstance(plan, Replanned) else (plan,)
+    return max(float(_sampled(drawing, part)[0][0].max()) for part in parts)
+
+
+def _some(draw: Callable[[], P | None]) -> P | None:
+    """The first of a few draws that leads somewhere."""
+    return next((plan for _ in range(_STARTS) if (plan := draw()) is not None), None)
+
+
+def _drawn(
+    drawing: Drawing, segments: int, rng: np.random.Generator, start: Array | None = None
+) -> PiecewisePlan | None:
+    """A plan, from a state (n,) or from anywhere; None if this one leads nowhere."""
+    found = _corners(drawing, segments, rng, start)
+    if found is None:
+        return None
+    plan = piecewise_plan(drawing.model, _knots(drawing, segments, *found), drawing.horizon)
+    return plan if _belongs(drawing, plan) else None
+
+
+def _replanned(drawing: Drawing, every: Fraction, rng: np.random.Generator) -> Replanned | None:
+    """Plans that follow each other, by some of several tries."""
+
+    def draw() -> Replanned | None:
+        parts: list[PiecewisePlan] = []
+        left = drawing.horizon
+        while left > 0:
+            plan = _continued(replace(drawing, horizon=2 * every), rng, parts)
+            if plan is None:
+                return None
+            parts.append(piecewise_plan(drawing.model, plan.data, min(every, left)))
+            left -= every
+        return joined(parts)
+
+    return _some(draw)
+
+
+def _continued(
+    drawing: Drawing, rng: np.random.Generator, parts: Sequence[PiecewisePlan]
+) -> PiecewisePlan | None:
+    """A plan that starts at the knot in the middle of the one before, and has a knot in its own."""
+    start = None
+    if parts:
+        before = parts[-1].data
+        start = np.array([float(value) for value in before.x[len(before.t) // 2]])
+    return _some(lambda: _drawn(drawing, 2 * int(rng.integers(1, _SEGMENTS[0], endpoint=True)), rng, start))
 
 
 def _corners(
-    drawing: Drawing, segments: int, rng: np.random.Generator
+    drawing: Drawing, segments: int, rng: np.random.Generator, start: Array | None = None
 ) -> tuple[list[Array], list[Array]] | None:
     """u* (m,) at the corners, and x* (K, n) on the segments; None if it leads nowhere."""
     length = float(drawing.horizon) / segments
     steps = max(2, _KNOTS // segments)
-    u, paths = [_input(drawing, rng, 1)[0]], [_point(drawing, rng)[None]]
+    u = [_input(drawing, rng, 1)[0]]
+    paths = [(_point(drawing, rng) if start is None else start)[None]]
     again = 0
     while len(paths) <= segments:
         x = np.repeat(paths[-1][-1:], _CANDIDATES, axis=0)
         corners, p = _input(drawing, rng, _CANDIDATES), _missed(drawing, rng, _CANDIDATES)
-        now, begin = np.repeat(u[-1][None], _CANDIDATES, axis=0), (len(paths) - 1) * length
+        now, begin = (
+            np.repeat(u[-1][None], _CANDIDATES, axis=0),
+            (len(paths) - 1) * length,
+        )
         rough = drawing.walk(begin, x, (now, corners), p, length, _COARSE)
         kept = np.flatnonzero(drawing.inside(rough) == _COARSE + 1)
         ahead = _ahead(drawing, (begin + length, rough[kept, -1]), corners[kept], length, rng)

@@ -181,13 +181,17 @@ class FollowedData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MembersData:
-    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one."""
+    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one.
+
+    `replan`: after so many s a plan is given up for another; None: never.
+    """
 
     asked: int
     plans: int
     runs_each: int
     largest_defect: float
     loops: tuple[FollowedData, ...]
+    replan: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,6 +283,7 @@ def members_data(found: Members) -> MembersData:
         plans=found.plans,
         runs_each=found.each,
         largest_defect=found.defect,
+        replan=None if found.replan is None else float(found.replan),
         loops=tuple(
             FollowedData(loop=_loop(item.loop), comparison=_comparison(item.comparison))
             for item in found.followed
