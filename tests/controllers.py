@@ -44,6 +44,17 @@ trajectory: {kind: equilibrium, at: [0, 0]}
 metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
 tube: {epsilon: 0.1, rho_a: 0.1}
 """
+# at rest, so that nothing but functions, constants and the size of the tube make its rounding
+STEEP = """
+tubecert: 1
+name: steep
+system: {states: [p, v], inputs: [u], f: [v, "40*sin(p) + 30*exp(v) - 30 - v/3"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], v: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.1, rho_a: 0.1}
+"""
 KNOTS = Knots(
     t=tuple(map(Fraction, ("0", "0.013", "0.02", "0.3", "0.31"))),
     x=tuple(
@@ -123,6 +134,11 @@ GIVEN = {
     # the same, with a prediction in which u* moves
     "predicting_path": _path(prediction=Fraction("0.01")),
 }
+# of no other tests: a slow machine with a wide clip
+SLOW = machine(
+    STEEP,
+    recipe=recipe(sample_time=Fraction(1, 2), feedback_time=Fraction(1, 2), clip_radius=Fraction(300)),
+)
 CONTROLLERS = {name: partial(assembled, given) for name, given in GIVEN.items()}
 orbit, turning = CONTROLLERS["orbit"], CONTROLLERS["turning"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from types import SimpleNamespace
 
 import controllers
 import numpy as np
@@ -12,6 +11,7 @@ import proven
 import pytest
 from controllers import CONTROLLERS
 from flint import ctx
+from followed import TEXTS, in_recheck
 from typer.testing import CliRunner
 
 from tubecert import certificate
@@ -25,47 +25,10 @@ from tubecert.export.vectors import vectors
 from tubecert.library.certification import certification_of
 from tubecert.recheck.balls import exact
 from tubecert.recheck.controller import Machine
-from tubecert.recheck.curve import Knots, hermite
-from tubecert.recheck.document import read
-from tubecert.recheck.specification import read_specification
-from tubecert.recheck.system import curve_of, system_of
-from tubecert.spec import load_text
-from tubecert.spec.canonical import canonical
 
 needs_cc = pytest.mark.skipif(
     compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"
 )
-TEXTS = {
-    "orbit": (controllers.CONFIGS / "hardware_orbit.yaml").read_text("utf-8"),
-    "turning": controllers.TURNING,
-    "path": controllers.PATH,
-}
-
-
-def in_recheck(name: str) -> Machine:
-    """The machine of a hand-made controller, as recheck reads it."""
-    controller, kind = CONTROLLERS[name](), name.removeprefix("held_").removeprefix("predicting_")
-    given = controllers.GIVEN[name]
-    data = {"format": certificate.FORMAT, "spec": canonical(load_text(TEXTS[kind]))}
-    read_again = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
-    system = system_of(read_again)
-    knots = None
-    if kind == "path":
-        own = controllers.KNOTS
-        knots = Knots(t=own.t, x=own.x, u=own.u, held=False)
-        curve = hermite(knots, [row[0] for row in system.drift], system.states, system.inputs, own.t[-1])
-    else:
-        curve = curve_of(read_again, SimpleNamespace(knots=None), system)
-    rows = given.coordinates
-    S = None if rows is None else tuple(tuple(map(Fraction, row)) for row in rows)
-    case = SimpleNamespace(
-        system=system,
-        curve=curve,
-        tube=SimpleNamespace(coordinates=S),
-        result=SimpleNamespace(plan=SimpleNamespace(knots=knots)),
-    )
-    section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
-    return Machine(case, section, given.recipe, held=given.held)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from tubecert.recheck.kinds.hardware import HardwareSection, OfMachines
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import names
 
-_BITS = 200
+BITS = 200
 _PANELS = 16  # of a sample, for the mean of u*
 _STEPS = 64  # of a delay, for the prediction
 _NO_MACHINE = "its certificate H has no machine with one clock"
@@ -38,6 +38,12 @@ def answers(text: str, file: str, measured: Sequence[Sequence[Fraction]]) -> lis
 
     Raises `CertificateError` for what is no certificate, `ValueError` where there is no machine to be examined.
     """
+    with ctx.workprec(BITS):
+        return list(machine_of(text, file).answers([[exact(q) for q in row] for row in measured]))
+
+
+def machine_of(text: str, file: str) -> Machine:
+    """The machine of a certificate; raises as `answers` does."""
     case = Case(read_certificate(read(text, file)).result, 1)
     if case.result.sections is None:
         raise ValueError(_NO_MACHINE)
@@ -48,9 +54,7 @@ def answers(text: str, file: str, measured: Sequence[Sequence[Fraction]]) -> lis
     hardware = case.result.specification.hardware
     if hardware is None or recipe.feedback_time != recipe.sample_time:
         raise ValueError(_NO_MACHINE)
-    with ctx.workprec(_BITS):
-        machine = Machine(case, section, recipe, held=hardware.held)
-        return list(machine.answers([[exact(q) for q in row] for row in measured]))
+    return Machine(case, section, recipe, held=hardware.held)
 
 
 @dataclass(frozen=True)
@@ -177,13 +181,17 @@ class Machine:
         return [found[i * m : (i + 1) * m] for i in range(len(x))]
 
     @cached_property
+    def dual(self) -> list[Column]:
+        """W."""
+        W = self.case.system.W
+        values = Program([e for row in W for e in row], ()).run([])
+        return [values[i * len(W) : (i + 1) * len(W)] for i in range(len(W))]
+
+    @cached_property
     def metric(self) -> list[Column]:
         """M = W^-1."""
-        W = self.case.system.W
-        n = range(len(W))
-        values = Program([e for row in W for e in row], ()).run([])
-        inverse = arb_mat([[values[i * len(W) + j] for j in n] for i in n]).inv()
-        return [[inverse[i, j] for j in n] for i in n]
+        rows: list[Column] = arb_mat(self.dual).inv().tolist()
+        return rows
 
     @cached_property
     def weights(self) -> list[Column]:

@@ -1,0 +1,100 @@
+"""What recheck says of the text of hand-made controllers: its bounds of their rounding, and their formulas."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any
+
+import controllers
+from controllers import GIVEN, SLOW
+from flint import arb_mat, ctx
+
+from tubecert import certificate
+from tubecert.conditions.hardware import Rounding
+from tubecert.export.controller import Controller, assembled
+from tubecert.export.folder import exported
+from tubecert.recheck.balls import exact, root
+from tubecert.recheck.code.losses import About, lost_by
+from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.controller import Machine
+from tubecert.recheck.curve import Knots, hermite
+from tubecert.recheck.document import read
+from tubecert.recheck.specification import read_specification
+from tubecert.recheck.system import curve_of, system_of
+from tubecert.spec import load_text
+from tubecert.spec.canonical import canonical
+
+ANY = Rounding(feedback=Fraction(1), input=Fraction(1), estimate=Fraction(1), prediction=Fraction(1))
+DU = Fraction("6.302")  # of the orbit's metric, from above
+
+TEXTS = {
+    "orbit": (controllers.CONFIGS / "hardware_orbit.yaml").read_text("utf-8"),
+    "turning": controllers.TURNING,
+    "path": controllers.PATH,
+    "steep": controllers.STEEP,
+}
+
+
+def in_recheck(name: str) -> Machine:
+    """The machine of a hand-made controller, as recheck reads it."""
+    kind = name.removeprefix("held_").removeprefix("predicting_")
+    given = controllers.SLOW if name == "steep" else controllers.GIVEN[name]
+    controller = controllers.assembled(given)
+    data = {"format": certificate.FORMAT, "spec": canonical(load_text(TEXTS[kind]))}
+    read_again = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
+    system = system_of(read_again)
+    knots = None
+    if kind == "path":
+        own = controllers.KNOTS
+        knots = Knots(t=own.t, x=own.x, u=own.u, held=False)
+        curve = hermite(knots, [row[0] for row in system.drift], system.states, system.inputs, own.t[-1])
+    else:
+        curve = curve_of(read_again, SimpleNamespace(knots=None), system)
+    rows = given.coordinates
+    S = None if rows is None else tuple(tuple(map(Fraction, row)) for row in rows)
+    case = SimpleNamespace(
+        system=system,
+        curve=curve,
+        tube=SimpleNamespace(coordinates=S),
+        result=SimpleNamespace(plan=SimpleNamespace(knots=knots)),
+    )
+    section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
+    return Machine(case, section, given.recipe, held=given.held)
+
+
+def covered(name: str = "held_orbit", **values: Any) -> Controller:
+    """A controller that is about rounding, and may lose whatever it loses."""
+    given = SLOW if name == "steep" else GIVEN[name]
+    return assembled(
+        replace(given, recipe=replace(given.recipe, rounding=(ANY,)), feedback_gain=DU, **values)
+    )
+
+
+def texts(c: Controller, precision: str) -> tuple[str, str]:
+    """Header and source."""
+    files = exported(c, precision=precision).files
+    return files[f"{c.name}.h"], files[f"{c.name}.c"]
+
+
+def bounds(c: Controller, formulas: Any, files: tuple[str, str]) -> dict[str, float]:
+    """Recheck's, by their names; `formulas` is the machine as recheck reads it."""
+    with ctx.workprec(128):
+        W = arb_mat(formulas.metric).inv()
+        about = About(
+            curve=formulas.case.curve,
+            inputs=len(c.inputs),
+            metric=formulas.metric,
+            widths=[root(W[i, i]) for i in range(len(c.states))],
+            reach=exact(c.reach),
+            gain=exact(c.feedback_gain),
+            estimate=exact(c.estimate),
+            radius=exact(formulas.recipe.clip_radius),
+            share=exact(c.share),
+            sample_time=c.sample_time,
+            held=formulas.held,
+        )
+        found = lost_by(read_code(*files), about)
+        return {name: float(getattr(found, name).upper()) for name in ("feedback", "input", "estimate")}

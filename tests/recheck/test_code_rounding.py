@@ -1,0 +1,259 @@
+"""Recheck's own bounds of what exported C rounds: mistakes of the exporter's, other texts, and code that loses more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+from controllers import CONTROLLERS
+from flint import ctx
+from followed import bounds, covered, in_recheck, texts
+
+from tubecert.enclosure.interval import Interval
+from tubecert.export import rounding as own
+from tubecert.export.rounding import rounding_of
+from tubecert.export.vectors import run, vectors
+from tubecert.recheck.balls import exact
+from tubecert.recheck.code.examination import agreement
+from tubecert.recheck.code.losses import lost_by
+from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.code.words import UnreadError
+
+NAMES = ("feedback", "input", "estimate")
+
+
+@cache
+def followed(name, precision):
+    """A controller about rounding, and recheck's bounds of its code."""
+    c = covered(name)
+    return c, bounds(c, in_recheck(name), texts(c, precision))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("name", ["orbit", "steep"])
+def test_both_bounds_are_near_to_each_other(name, precision):
+    """They share nothing but the text: another analysis, other constants of (H.38), another cover of the plan."""
+    c, found = followed(name, precision)
+    theirs = rounding_of(c, precision)
+    shares = [found[each] / float(getattr(theirs, each)) for each in NAMES]
+    assert all(0.05 < share < 1 for share in shares), shares
+
+
+def without(operation):
+    """The exporter's step that forgets to round one kind of operations."""
+    whole = own._Analysis._step
+
+    def step(self, program, step, memory, given):
+        found = whole(self, program, step, memory, given)
+        if step.operation != operation:
+            return found
+        _, error = own._combined(operation, *(memory[place] for place in step.places))
+        return replace(found, error=np.asarray(error.hi))
+
+    return own._Analysis, "_step", step
+
+
+def blind(operation, side):
+    """The exporter's errors that do not know one of the operands."""
+    whole = own._combined
+
+    def combined(kind, *args):
+        given = list(args)
+        if kind == operation:
+            given[side] = replace(given[side], error=0 * given[side].error)
+        return whole(kind, *given)
+
+    return own, "_combined", combined
+
+
+def exact_program(name):
+    """The exporter that takes one program for exact."""
+    whole = own._Analysis._run
+
+    def run_(self, program, given, apart=None):
+        found = whole(self, program, given, apart)
+        if program.name != name:
+            return found
+        return {key: [replace(x, error=0 * x.error) for x in row] for key, row in found.items()}
+
+    return own._Analysis, "_run", run_
+
+
+def narrow():
+    """A tube that is too small."""
+    whole = own._Analysis.__init__
+
+    def init(self, *args):
+        whole(self, *args)
+        self.widths = [width * Interval.of(Fraction(1, 2)) for width in self.widths]
+
+    return own._Analysis, "__init__", init
+
+
+def undivided():
+    """R_q without its division by th."""
+    whole = own._Analysis._estimated
+    return own._Analysis, "_estimated", lambda self, *args: whole(self, *args) * Interval.of(self.c.share)
+
+
+BUGS = {
+    "the unit of the other type": (
+        "steep",
+        "single",
+        lambda: (own, "FLOATS", dict.fromkeys(own.FLOATS, own.DOUBLE)),
+    ),
+    "functions of math.h are exact": ("steep", "double", lambda: (own, "_LIBRARY", 0)),
+    "a slope of 0": ("held_orbit", "double", lambda: (own, "_steepest", lambda name, x: 0 * x.hi)),
+    "additions are exact": ("steep", "double", lambda: without("add")),
+    "subtractions are exact": ("held_orbit", "double", lambda: without("sub")),
+    "products are exact": ("steep", "double", lambda: without("mul")),
+    "the second factor is exact": ("steep", "double", lambda: blind("mul", 1)),
+    "the first summand is exact": ("steep", "double", lambda: blind("add", 0)),
+    "the second summand is exact": ("steep", "double", lambda: blind("add", 1)),
+    "what is subtracted from is exact": ("steep", "double", lambda: blind("sub", 0)),
+    "what is subtracted is exact": ("held_orbit", "double", lambda: blind("sub", 1)),
+    "a tube of half the width": ("steep", "double", narrow),
+    "time is exact": ("held_orbit", "double", lambda: (own._Analysis, "_late", lambda self: Interval.of(0))),
+    "the plan is exact": ("held_orbit", "double", lambda: exact_program("plan")),
+    "f is exact": ("steep", "double", lambda: exact_program("drift")),
+    "f + B u is exact": ("steep", "double", lambda: exact_program("flow")),
+    "the feedback is exact": ("held_orbit", "double", lambda: exact_program("law")),
+    "the estimator is exact": ("steep", "double", lambda: exact_program("estimator")),
+    "not over th": ("held_orbit", "double", undivided),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bug", sorted(BUGS))
+def test_a_mistake_in_the_exporters_analysis_is_noticed(bug, monkeypatch):
+    """Its bounds, as what a certificate allows for, are not those that recheck can confirm."""
+    name, precision, made = BUGS[bug]
+    c, found = followed(name, precision)
+    monkeypatch.setattr(*made())
+    theirs = rounding_of(c, precision)
+    assert any(found[each] > float(getattr(theirs, each)) for each in NAMES)
+
+
+@pytest.mark.slow
+def test_another_order_of_operations_has_another_bound():
+    """(y - last)/Ts as y/Ts - last/Ts: what the exporter followed is not what stands there."""
+    c, found = followed("held_orbit", "double")
+    header, source = texts(c, "double")
+    changed = source.replace("500.0 * (y[0] - last_y[0])", "(500.0 * y[0]) - (500.0 * last_y[0])")
+    assert changed != source
+    other = bounds(c, in_recheck("held_orbit"), (header, changed))
+    assert other["estimate"] > 1.02 * found["estimate"]
+
+
+@pytest.mark.slow
+def test_single_loses_more_than_double_may():
+    c, found = followed("held_orbit", "single")
+    theirs = rounding_of(c, "double")
+    assert all(found[each] > 1e6 * float(getattr(theirs, each)) for each in NAMES)
+
+
+@pytest.mark.slow
+def test_a_held_plan_through_knots_is_followed_piece_by_piece():
+    c = covered("path", held=True)
+    found = bounds(c, replace(in_recheck("path"), held=True), texts(c, "double"))
+    theirs = rounding_of(c, "double")
+    # a certificate allows for twice the exporter's
+    assert all(0.02 < found[each] / float(getattr(theirs, each)) < 2 for each in NAMES)
+
+
+def measured(c, count, precision):
+    y = np.array(vectors(c, single=precision == "single").y[:count])
+    return y.astype(np.float32).astype(float) if precision == "single" else y
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_what_a_computer_answers_is_within_the_bounds_at_every_sample(name, precision):
+    """The reference of the exporter in this very type, and the text in balls, against the formulas."""
+    c = CONTROLLERS[name]()
+    y = measured(c, 14, precision)
+    answered = run(c, y, np.float32 if precision == "single" else float).tolist()
+    with ctx.workprec(200):
+        rows = [[exact(Fraction(value)) for value in row] for row in y.tolist()]
+        difference, share = agreement(read_code(*texts(c, precision)), in_recheck(name), rows, answered)
+    assert difference > 0
+    assert 1e-5 < share <= 1
+
+
+# of the text of the orbit: what is changed, and into what
+CHANGES = {
+    "sign": ("out_kappa[0] = -", "out_kappa[0] = "),
+    "digit": ("0.24834955778683296", "0.24834955778783296"),
+    "gain": ("0.14094299744758143", "0.14094299744769143"),
+    "index": ("y[1] - xs[1]", "y[0] - xs[1]"),
+    "clip": ("r3 < 1.9 ? r3 : 1.9", "r3 < 1.9000001 ? r3 : 1.9000001"),
+    "no value": ("u[i] = kappa[i];", "kappa[i] = u[i];"),
+    "delay": ("(0.75 * held[0]) + (0.25 * before[0])", "(0.75 * before[0]) + (0.25 * held[0])"),
+    "memory": ("c->before[i] = c->held[i];", "c->before[i] = c->feedback[i];"),
+    "node": ("0.00022540333075851663", "0.00032540333075851663"),
+    "loop": ("c->q[i] = q[i];", "c->q[i] = estimate[i];"),
+    "time": (
+        "(real)c->sample * HARDWARE_ORBIT_SAMPLE_TIME;\n",
+        "(real)(c->sample - 1) * HARDWARE_ORBIT_SAMPLE_TIME;\n",
+    ),
+    "order": ("c->sample++;", "c->sample += 2;"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", sorted(CHANGES))
+def test_a_text_that_computes_something_else_is_noticed(change):
+    """Without a compiler: far below what compiled code could be compared to."""
+    c = CONTROLLERS["orbit"]()
+    header, source = texts(c, "double")
+    assert source.count(CHANGES[change][0]) >= 1
+    y = measured(c, 40, "double")
+    y = y[np.r_[0:4, 24:34]]  # near the plan, then where the clip acts
+    with ctx.workprec(200):
+        rows = [[exact(Fraction(value)) for value in row] for row in y.tolist()]
+        code = read_code(header, source.replace(*CHANGES[change], 1))
+        try:
+            _, share = agreement(code, in_recheck("orbit"), rows)
+        except UnreadError:
+            return
+    assert share > 1
+
+
+UNKNOWN = {
+    "another loop": ("for (i = 0; i < M; i++) {", "while (i < M) {"),
+    "a pointer": ("real x[N];", "real *x;"),
+    "a number of another type": ("0.75 * held[0]", "0.75f * held[0]"),
+    "a whole number": ("0.75 * held[0]", "3 * held[0]"),
+    "a function": ("sin(t[0])", "lgamma(t[0])"),
+    "no contraction": ("#pragma STDC FP_CONTRACT OFF\n", ""),
+    "a macro": ("typedef hardware_orbit_real real;", "#define real float"),
+    "an entry beyond": ("y[1] - xs[1]", "y[2] - xs[1]"),
+    "another feedback": ("(r11 < r10 ? r11 : r10)", "r11"),
+    "another norm": ("sqrt(r8 >", "sqrt(r4 >"),
+    "no end": ("i < M; i++", "0 < M; i++"),
+}
+
+
+@pytest.mark.parametrize("change", sorted(UNKNOWN))
+def test_what_is_not_understood_is_refused(change):
+    c = covered("orbit")
+    header, source = texts(c, "double")
+    changed = source.replace(*UNKNOWN[change])
+    assert changed != source
+    with pytest.raises(UnreadError):
+        bounds(c, in_recheck("orbit"), (header, changed))
+
+
+def test_a_prediction_and_a_plan_without_end_are_not_followed():
+    c = CONTROLLERS["turning"]()
+    with pytest.raises(UnreadError, match="prediction"):
+        lost_by(read_code(*texts(c, "double")), None)
+    orbit, formulas = covered("held_orbit"), in_recheck("held_orbit")
+    formulas.case.curve = replace(formulas.case.curve, horizon=None)
+    with pytest.raises(UnreadError, match="without end"):
+        bounds(orbit, formulas, texts(orbit, "double"))

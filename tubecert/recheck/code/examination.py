@@ -1,0 +1,164 @@
+"""The text of exported C against the certificate: what it computes, and what its rounding loses.
+
+The text is run on measurements in balls with bounds of what rounding does at every operation, where a decimal stands
+for any number that it is the nearest one to, and compared with the formulas of section 8 (`controller`): a sign, an
+index or a digit is seen. That examines, and proves nothing; the bounds of `losses` are over all that can go in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from flint import arb, ctx
+
+from tubecert.recheck.balls import Ball, exact, larger, magnitude, root
+from tubecert.recheck.code.losses import About, lost_by
+from tubecert.recheck.code.reader import Code, read_code
+from tubecert.recheck.code.run import Machine, Value, Vector, numbers
+from tubecert.recheck.code.seen import KINDS, Rounded, known
+from tubecert.recheck.code.words import UnreadError
+from tubecert.recheck.controller import BITS, Column, machine_of
+from tubecert.recheck.controller import Machine as Formulas
+
+_SLACK = 16  # units of rounding of the largest input, for integrals that are computed by fine steps
+_FEWEST = 8  # samples
+_PREDICTED = 2**12  # the same, where the code integrates by steps that are less fine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowed:
+    """A loss to rounding: what it is at most, and what the certificate allows for."""
+
+    name: str
+    most: Fraction
+    allowed: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """How far the text is from the formulas, at most and of what it may be; `losses`, empty where none are covered."""
+
+    difference: float
+    share: float
+    losses: tuple[Allowed, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the text computes the formulas, as far as was looked at."""
+        return self.share <= 1
+
+    @property
+    def too_large(self) -> tuple[Allowed, ...]:
+        """Losses that are not within what is allowed for."""
+        return tuple(own for own in self.losses if not own.most <= own.allowed)
+
+
+def examine(
+    text: str,
+    file: str,
+    files: tuple[str, str],
+    measured: Sequence[Sequence[Fraction]],
+    answered: Sequence[Sequence[float]] | None = None,
+) -> Agreement:
+    """The code of a certificate, header and source; raises `CertificateError`, and `UnreadError` for other code.
+
+    `answered` is what compiled code made of what was measured, if there is a compiler.
+    """
+    formulas = machine_of(text, file)
+    with ctx.workprec(BITS):
+        code = read_code(*files)
+        rows = [[exact(q) for q in row] for row in measured]
+        difference, share = agreement(code, formulas, rows, answered)
+        return Agreement(difference=difference, share=share, losses=tuple(_losses(code, formulas)))
+
+
+def agreement(
+    code: Code,
+    formulas: Formulas,
+    measured: Sequence[Column],
+    answered: Sequence[Sequence[float]] | None = None,
+) -> tuple[float, float]:
+    """The largest difference of an input, and of what it may be; `answered` is what compiled code made of the same."""
+    expected = list(formulas.answers(measured))
+    largest = arb(0)
+    for row in expected:
+        for each in row:
+            largest = larger(largest, magnitude(each))
+    slack = largest * KINDS[code.real].unit * (_PREDICTED if formulas.section.predict else _SLACK)
+    worst, share = arb(0), arb(0)
+    for k, (found, own) in enumerate(zip(_answers(code, formulas, measured), expected, strict=True)):
+        for j, (a, b) in enumerate(zip(numbers(found), own, strict=True)):
+            if k > _FEWEST and not a.error.is_finite():
+                return float(worst), float(share.upper())  # errors of a prediction feed themselves
+            apart = magnitude(a.value.mid() - b)
+            if answered is not None:
+                apart = larger(apart, magnitude(arb(answered[k][j]) - b))
+            worst, share = larger(worst, apart), larger(share, apart / (a.error + slack))
+    return float(worst), float(share.upper())
+
+
+def _answers(code: Code, formulas: Formulas, measured: Sequence[Column]) -> Iterator[Vector]:
+    """Of the text: start, and a step for every sample."""
+    parts = formulas.case.curve.parts
+
+    def piece(t: Value) -> int:
+        (own,) = numbers([t])
+        begun = [k for k, part in enumerate(parts) if not own.value.mid() + _CLOSE < part.start]
+        return max(begun, default=0)
+
+    own = Rounded(KINDS[code.real], decides=True)
+    machine = Machine(code, own, {"piece": piece})
+    m, state = len(formulas.case.system.inputs), machine.state()
+    for k, row in enumerate((measured[0], *measured)):
+        u: Vector = [None] * m
+        y: Vector = [known(each) for each in row]
+        machine.call(f"{code.name}_{'step' if k else 'start'}", state, y, u)
+        yield u
+
+
+_CLOSE = arb(10) ** -10  # s, of a knot
+
+
+def _losses(code: Code, formulas: Formulas) -> Iterator[Allowed]:
+    """Where the certificate is about rounding."""
+    allowed = formulas.recipe.losses
+    if allowed is None:
+        return
+    if formulas.recipe.windows:
+        raise UnreadError("windows have no bound of rounding here")
+    found = lost_by(code, about(formulas))
+    for name in ("feedback", "input", "estimate"):
+        most: Ball = getattr(found, name)
+        if not most.is_finite():
+            raise UnreadError(f"what rounding costs the {name} has no bound")
+        yield Allowed(name=name, most=_fraction(most.upper()), allowed=getattr(allowed, name))
+
+
+def _fraction(x: Ball) -> Fraction:
+    """Of a number that is one of the form m 2^e."""
+    mantissa, exponent = x.man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def about(formulas: Formulas) -> About:
+    """What the certificate says of the loop."""
+    case, recipe = formulas.case, formulas.recipe
+    noise = case.machine
+    if noise is None:
+        raise UnreadError("there is no machine")
+    decay = None if recipe.bandwidth is None else exact(recipe.bandwidth * recipe.sample_time)
+    return About(
+        curve=case.curve,
+        inputs=len(case.system.inputs),
+        metric=formulas.metric,
+        widths=[root(row[i]) for i, row in enumerate(formulas.dual)],
+        reach=exact(recipe.level) + noise.noise_metric * exact(recipe.noise),
+        gain=exact(case.bound("feedback_gain")),
+        estimate=exact(recipe.clip_radius + max(recipe.clip_radius, recipe.bias) + recipe.ripple),
+        radius=exact(recipe.clip_radius),
+        share=arb(1) if decay is None else -(-decay).expm1(),
+        sample_time=recipe.sample_time,
+        held=formulas.held,
+    )

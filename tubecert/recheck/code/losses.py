@@ -1,0 +1,426 @@
+"""What exported code can lose to its rounding: bounds of recheck's own for the numbers of theorem H-R.
+
+Implements: theory 8.11 (H.36), for a constant metric, one clock and no prediction. In: the text of the code, read, and
+what the certificate says of the machine. Every function of the text is run on balls that contain all that goes in, at
+stations along the plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+
+from flint import arb
+
+from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root
+from tubecert.recheck.code.reader import Code
+from tubecert.recheck.code.run import Counter, Machine, Own, State, Value, Vector, numbers
+from tubecert.recheck.code.seen import KINDS, Rounded, Seen, known
+from tubecert.recheck.code.shape import ball_of, box_of, law_of
+from tubecert.recheck.code.stations import Station, stations
+from tubecert.recheck.code.words import UnreadError
+from tubecert.recheck.curve import CLOCK, Curve, Part
+from tubecert.recheck.program import Program
+from tubecert.recheck.terms import Term, slopes
+
+_GAUSS = 2016000  # of the error of Gauss's rule with three nodes
+_NODES = 3
+_MOST_SAMPLES = 2**32 - 1
+
+Numbers = list[Seen]
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """What a certificate says of the loop.
+
+    `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
+    `share` is th; `held`: u* is held from sample to sample.
+    """
+
+    curve: Curve
+    inputs: int
+    metric: list[list[Ball]]
+    widths: list[Ball]
+    reach: Ball
+    gain: Ball
+    estimate: Ball
+    radius: Ball
+    share: Ball
+    sample_time: Fraction
+    held: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost:
+    """Upper bounds of r_a, r_u and r_q."""
+
+    feedback: Ball
+    input: Ball
+    estimate: Ball
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fed:
+    """r_a; how far the feedback is above du d; and a bound of its length."""
+
+    lost: Ball
+    above: Ball
+    size: Ball
+
+
+def lost_by(code: Code, about: About) -> Lost:
+    """The bounds; raises `UnreadError` for code of which none are derived."""
+    if "predicted" in code.functions:
+        raise UnreadError("the integration of a prediction has no bound here")
+    return _Analysis(code, about).lost()
+
+
+class _Analysis:
+    """The functions of a code on all that can go in."""
+
+    def __init__(self, code: Code, about: About) -> None:
+        self.code, self.of, self.m = code, about, about.inputs
+        self.kind = KINDS[code.real]
+        self.n = len(about.widths)
+        self.box = [width * about.reach for width in about.widths]
+        sides = dict(enumerate(self.box))
+        self.rounded = Rounded(self.kind, apart=("y", "xs"), widths=sides)
+        self.law = law_of(code.functions["law"], self.m)
+        self.stations = stations(about.curve, about.sample_time)
+        self.tables = self._tables()
+        if about.curve.horizon is not None and about.curve.horizon / about.sample_time >= _MOST_SAMPLES:
+            raise UnreadError("a plan of more samples than the code counts has no bound here")
+
+    def lost(self) -> Lost:
+        """The worst of all stations."""
+        fed = [self._fed(station) for station in self.stations]
+        above, size = (_greatest([own.above for own in fed]), _greatest([own.size for own in fed]))
+        input, estimate = arb(0), arb(0)
+        for station in self.stations:
+            own, q = self._stepped(station, size)
+            input, estimate = larger(input, own), larger(estimate, q)
+        return Lost(
+            feedback=_greatest([own.lost for own in fed]),
+            input=above + input,
+            estimate=estimate / self.of.share,
+        )
+
+    def _machine(self, **instead: Own) -> Machine:
+        return Machine(self.code, self.rounded, instead, self.tables)
+
+    # -- the plan
+
+    @cached_property
+    def plans(self) -> list[tuple[Numbers, Numbers]]:
+        """x* and u* at the samples of every station."""
+        return [self._plan(station) for station in self.stations]
+
+    def _tables(self) -> dict[str, Vector]:
+        """The numbers that those of a plan through knots stand for, with what these are off."""
+        if "START" not in self.code.tables:
+            return {}
+        parts, plain = self.of.curve.parts, Machine(self.code, Rounded(self.kind, stands=False, rounds=False))
+        own = {name: plain.within_tables(name) for name in self.code.tables}
+        # which piece is found depends on nothing but the knots that are not later
+        if [plain.call("piece", begin) for begin in own["START"]] != list(range(len(own["START"]))):
+            raise UnreadError("the pieces of the plan are not those of their times")
+        if set(own) != {"START", "X", "U"} or any(len(table) < len(parts) for table in own.values()):
+            raise UnreadError("the tables of the plan are of another one")
+        begun = [_meant(v, part.start) for v, part in zip(own["START"], parts, strict=False)]
+        return {
+            "START": list[Value](begun),
+            "X": _coefficients(own["X"], "x", parts),
+            "U": _coefficients(own["U"], "u", parts),
+        }
+
+    def _time(self, station: Station) -> Counter:
+        """The number of a sample in a station, and of those before."""
+        Ts = exact(self.of.sample_time)
+
+        def count(before: int) -> Seen:
+            low = larger(station.begin / Ts - before, arb(0))
+            value = between(low, larger(station.end / Ts - before, arb(0)))
+            return self.rounded.rounded(value, arb(0)) if self.code.real == "float" else known(value)
+
+        return Counter(count)
+
+    def _sampled(self, station: Station) -> Seen:
+        """The time of a sample, as the code has it."""
+        Ts = self._machine().number(f"{self.code.name.upper()}_SAMPLE_TIME")
+        return self.rounded.both("*", self._time(station).converted(), Ts)
+
+    def _plan(self, station: Station) -> tuple[Numbers, Numbers]:
+        """x* and u* at the samples of a station."""
+        machine, x, u = self._machine(piece=lambda _: station.piece), _empty(self.n), _empty(self.m)
+        machine.call("on_plan", self._sampled(station), x, u)
+        if "START" not in self.code.tables:
+            return numbers(x), numbers(u)
+        # a time near a knot may be taken for one of the next piece: x* and u* go on continuously
+        off = numbers([machine.left["on_plan"]["s"]])[0].error
+        off = off + _greatest([own.error for own in numbers(self.tables["START"])])
+        if not off < station.beside:
+            raise UnreadError("times have no digit that is right")
+        slack = [2 * off * steep + jump for steep, jump in zip(self._steepest, self._jumps, strict=True)]
+        return _slackened(x, slack[: self.n]), _slackened(u, slack[self.n :])
+
+    @cached_property
+    def _steepest(self) -> list[Ball]:
+        """|x*'| and |u*'| on all parts, and a little beyond their ends."""
+        curve, beside = self.of.curve, self.stations[0].beside
+        terms = slopes([*curve.x, *curve.u], CLOCK)
+        found = [arb(0)] * len(terms)
+        for part in curve.parts:
+            own = Program(terms, (CLOCK, *part.values))
+            values = own.run([between(-beside, part.length + beside), *part.values.values()])
+            found = [larger(a, magnitude(b)) for a, b in zip(found, values, strict=True)]
+        return found
+
+    @cached_property
+    def _jumps(self) -> list[Ball]:
+        """How far x* and u* jump at a knot."""
+        curve = self.of.curve
+        terms = [*curve.x, *curve.u]
+        found = [arb(0)] * len(terms)
+        for last, part in pairwise(curve.parts):
+            ends = Program(terms, (CLOCK, *last.values)).run([last.length, *last.values.values()])
+            begins = Program(terms, (CLOCK, *part.values)).run([arb(0), *part.values.values()])
+            found = [larger(a, magnitude(p - q)) for a, p, q in zip(found, ends, begins, strict=True)]
+        return found
+
+    def _known(self, station: Station) -> dict[str, Own]:
+        """What is known of a station: its piece, and where times near knots matter what is on the plan."""
+
+        def on_plan(*given: Value) -> None:
+            for found, own in zip(given[1:], self.plans[station.own], strict=True):
+                _list(found)[:] = own
+
+        looked: dict[str, Own] = {"piece": lambda _: station.piece}
+        return looked | ({"on_plan": on_plan} if self.tables else {})
+
+    # -- the feedback
+
+    def _fed(self, station: Station) -> _Fed:
+        """T = alpha/2 + c'kappa and |kappa|, of what (H.37) computes at any y of the tube."""
+        x, seen = self.plans[station.own][0], list[Seen]()
+
+        def law(*given: Value) -> None:
+            y, f, xs, *rest = given
+            own: list[Vector] = [
+                [replace(each, origin=(name, i)) for i, each in enumerate(numbers(row))]
+                for name, row in (("y", y), ("xs", xs))
+            ]
+            machine.own("law", own[0], f, own[1], *rest)
+            seen[:] = numbers([machine.within("law", each) for each in (*self.law.c, self.law.excess)])
+            _list(rest[-2])[:] = [known(arb(0))] * self.m
+
+        machine = self._machine(**self._known(station), law=law)
+        y: Vector = [_near([own], side) for own, side in zip(x, self.box, strict=True)]
+        machine.call("feedback", y, self._sampled(station), _empty(self.m))
+        *c, excess = seen
+        off = [own.error for own in x]
+        form = [
+            magnitude(e) * p * q
+            for row, p in zip(self.of.metric, off, strict=True)
+            for e, q in zip(row, off, strict=True)
+        ]
+        e_x = root(sum(form, start=arb(0)))
+        return self._bounded(c, excess, e_x)
+
+    @cached_property
+    def _form(self) -> tuple[Ball, Ball]:
+        """How far d^2 is off as computed: a share of it, and what underflow adds. It is a form of degree 2 in z."""
+
+        def off(*, underflows: bool) -> Ball:
+            own = Rounded(self.kind, underflows=underflows, apart=("y", "xs"))
+            y: Vector = [Seen(_around(side), arb(0), origin=("y", i)) for i, side in enumerate(self.box)]
+            xs: Vector = [Seen(arb(0), arb(0), origin=("xs", i)) for i in range(self.n)]
+            rest = [[known(arb(0)) for _ in range(k)] for k in (self.n, self.n, self.m)]
+            told = _empty(3)
+            f, vs, us = (list[Value](each) for each in rest)
+            Machine(self.code, own).call("law", y, f, xs, vs, us, _empty(self.m), told)
+            square = numbers(told[:1])[0]
+            if square.degree != 2:
+                raise UnreadError("the square of the distance is no form of degree 2")
+            return square.error
+
+        share = off(underflows=False)
+        return share / (self.of.reach * self.of.reach), off(underflows=True) - share
+
+    def _bounded(self, c: Numbers, excess: Seen, e_x: Ball) -> _Fed:
+        """See docs/theory.md, 8.11: the same three cases, with constants of its own."""
+        u, eta, m = self.kind.unit, self.kind.least, self.m
+        nu, lowest = self._form
+        e_c, C = length([own.error for own in c]), length([own.most for own in c])
+        gain, du, D = self.kind.nearest(self.law.gain), self.of.gain, self.of.reach
+        grown = gain * (1 + u) ** 2 * root(1 + nu) - du
+        shrunk = du - gain * (1 - u) ** 2 * root(1 - nu)
+        e_l = larger(magnitude(grown), magnitude(shrunk)) * (D + e_x) + du * e_x
+        e_l = e_l + gain * (1 + u) ** 2 * root(lowest.max(0)) + eta
+        L = du * D + e_l
+        least = self.kind.nearest(self.law.least)
+        more, less = (1 + u) ** m + m * eta / least, (1 - u) ** m - m * eta / least
+        theta = larger((1 + u) * root(more) - 1, 1 - (1 - u) * root(less))
+        rho = (1 + u) / (1 - theta) - 1
+        tiny, low = eta * (C + m), root(least)
+        above = e_l + L * ((1 + rho) * (1 + u) - 1) + tiny
+        sigma = L * (1 + rho) + eta * C
+        rest = sigma * e_c + (C + e_c) * (u * sigma + m * eta) + eta * (C + C * C)
+        wanted = excess.error + 2 * rho * (L + eta) * C / (1 - rho)
+        limited = e_l * (C + e_c) + L * e_c + rho * L * C
+        faint = L * (low + e_c)
+        lost = larger(larger(wanted, limited), faint) + rest + (C + e_c) * above
+        sizes = (C * C, excess.most / low, L / low, D * D * (1 + nu))
+        if not (nu < 1 and all(size < self.kind.most for size in sizes)):
+            raise UnreadError("the feedback may overflow in this type, or has no digit that is right")
+        return _Fed(lost=lost, above=above, size=L + above)
+
+    # -- a sample
+
+    def _stepped(self, station: Station, feedback: Ball) -> tuple[Ball, Ball]:
+        """How far the input is off, beside the feedback; and q."""
+        q, played = list[Value](), [] if self._whole else self._played(station)
+
+        def law(*given: Value) -> None:
+            kappa, told = given[-2:]
+            _list(kappa)[:] = [known(_around(feedback))] * self.m
+            _list(told)[:] = [known(between(0, self.kind.most))] * 3
+
+        def estimator(*given: Value) -> None:
+            machine.own("estimator", *given)
+            new, clipped = given[-2:]
+            q[:] = _list(new)
+            _list(clipped)[:] = [Seen(_around(self.of.radius), self._clipped())] * self.m
+
+        def mean(*given: Value) -> None:
+            machine.own("mean_of_plan", *given)
+            found = _list(given[-1])
+            off = [a + b for a, b in zip(self._bent(station), played, strict=True)]
+            found[:] = [replace(a, error=a.error + b) for a, b in zip(numbers(found), off, strict=True)]
+
+        machine = self._machine(**self._known(station), law=law, estimator=estimator, mean_of_plan=mean)
+        u = _empty(self.m)
+        y: Vector = [_near([x], side) for x, side in zip(self.plans[station.own][0], self.box, strict=True)]
+        machine.call(f"{self.code.name}_step", self._state(station, feedback), y, u)
+        lost = [own.error for own in numbers(u)]
+        if self._whole:
+            return length(lost), length([own.error for own in numbers(q)])
+        # whoever adds the feedforward rounds once more
+        whole = length([a + b for a, b in zip(played, lost, strict=True)])
+        more = self.kind.unit * (self._largest_input + feedback + self.of.radius)
+        return whole + more, length([own.error for own in numbers(q)])
+
+    def _state(self, station: Station, feedback: Ball) -> State:
+        """What is kept from a sample before."""
+        before = zip(*(self.plans[k][0] for k in station.since), strict=True)
+        y: Vector = [_near(own, side) for own, side in zip(before, self.box, strict=True)]
+        f = _empty(self.n)
+        machine = self._machine()
+        machine.call("drift", y, f)
+        acted = feedback + self._largest_input + self.of.radius * (1 + 8 * self.kind.unit)
+        rows: State = {"y": y, "f": f, "q": [known(_around(self.of.estimate))] * self.m}
+        rows |= {name: [known(_around(acted))] * self.m for name in ("feedback", "held", "before")}
+        state = machine.state()
+        for name, old in state.items():
+            state[name] = rows[name] if name in rows else self._time(station) if old is None else old
+        return state
+
+    @property
+    def _whole(self) -> bool:
+        """Whether u* is in what a step gives."""
+        return self.of.held or not self.of.curve.moves
+
+    @cached_property
+    def _largest_input(self) -> Ball:
+        """|u*|."""
+        return _greatest([length([own.most for own in u]) for _, u in self.plans])
+
+    def _played(self, station: Station) -> list[Ball]:
+        """How far each input of `feedforward` is off, over the sample that ends in a station."""
+        t = between(larger(station.begin - exact(self.of.sample_time), arb(0)), station.end)
+        found, machine = _empty(self.m), self._machine()
+        machine.call(f"{self.code.name}_feedforward", self.rounded.rounded(t, arb(0)), found)
+        return [own.error for own in numbers(found)]
+
+    def _bent(self, station: Station) -> list[Ball]:
+        """The error of Gauss's rule, by the sixth derivative of u*."""
+        if "gauss" not in self.code.functions:
+            raise UnreadError("the mean of a feedforward through knots has no bound here")
+        Ts = self.of.sample_time
+        (part,) = self.of.curve.parts
+        own = Program(self._sixth, (CLOCK, *part.values))
+        t = between(larger(station.begin - exact(Ts), arb(0)), station.end)
+        return [exact(Ts**6 / _GAUSS) * magnitude(value) for value in own.run([t, *part.values.values()])]
+
+    @cached_property
+    def _sixth(self) -> list[Term]:
+        found = list(self.of.curve.u)
+        for _ in range(2 * _NODES):
+            found = slopes(found, CLOCK)
+        return found
+
+    def _clipped(self) -> Ball:
+        """Of a box its ends stand for others; of a ball the length, the share and the product are rounded."""
+        u, eta, m, R = self.kind.unit, self.kind.least, self.m, self.of.radius
+        own = self.code.functions["estimator"]
+        if box_of(own, m) is not None:
+            return u * R + eta
+        ball_of(own, m)
+        theta = (1 + u) * root((1 + u) ** m) - 1
+        unseen = 2 * root((m + 2) * eta)  # of a length of which the square underflows
+        return R * ((1 + theta) ** 2 * (1 + u) ** 4 - 1) + unseen + 4 * m * eta
+
+
+def _greatest(balls: Sequence[Ball]) -> Ball:
+    found = arb(0)
+    for own in balls:
+        found = larger(found, own)
+    return found
+
+
+def _around(size: Ball) -> Ball:
+    return between(-size, size)
+
+
+def _slackened(found: Vector, slack: Sequence[Ball]) -> Numbers:
+    return [replace(x, error=x.error + own) for x, own in zip(numbers(found), slack, strict=True)]
+
+
+def _near(found: Sequence[Seen], side: Ball) -> Seen:
+    """What is measured near any of these, exactly."""
+    whole = found[0].value
+    for own in found[1:]:
+        whole = whole.union(own.value)
+    return known(whole + _around(side))
+
+
+def _meant(found: Value, own: Ball) -> Seen:
+    (number,) = numbers([found])
+    return Seen(own, magnitude(number.value - own))
+
+
+def _coefficients(table: Vector, letter: str, parts: Sequence[Part]) -> Vector:
+    """Those of every part, each with what its number in the table is off."""
+    found: Vector = []
+    for rows, part in zip(table, parts, strict=False):
+        own: Vector = []
+        for i, row in enumerate(_list(rows)):
+            names = [f"{letter}{i}#{k}" for k in range(len(_list(row)) + 1)]
+            if names.pop() in part.values or not part.values.keys() >= set(names):
+                raise UnreadError("the pieces of the plan have other powers")
+            own.append([_meant(c, part.values[name]) for c, name in zip(_list(row), names, strict=True)])
+        found.append(own)
+    return found
+
+
+def _list(value: Value) -> Vector:
+    if not isinstance(value, list):
+        raise UnreadError("a number stands where there has to be a row")
+    return value
+
+
+def _empty(k: int) -> Vector:
+    return [None] * k
