@@ -30,7 +30,8 @@ def theorem(g: Given) -> dict[str, Any]:
     e_fb, n_fb = (g.np, max(n_M, mp.sqrt(g.A) * g.np)) if predicts else (nbar, n_M)
     acts, more = 1 + g.D_b, 1 / (1 - g.D_b)
     kb = more * g.du * (g.dhat + n_fb)
-    ups = g.r_u + (min(2 * g.Dus, g.Lus * (max(Ts, Tf) + tau)) if g.held else mp.mpf(0))
+    r_g, r_k = geodesics(g, g.dhat + n_fb) if g.nodes else (mp.mpf(0), mp.mpf(0))
+    ups = g.r_u + r_k + (min(2 * g.Dus, g.Lus * (max(Ts, Tf) + tau)) if g.held else mp.mpf(0))
     s1 = g.Dht + g.Dhx * g.Y
     b0 = min(g.DBp * g.DBx, g.DBpx * g.DB)
     step = g.Y * Ts / 2 + nbar
@@ -55,7 +56,9 @@ def theorem(g: Given) -> dict[str, Any]:
         grown = mp.exp(Dp * tau)
         q["prediction"] = (
             nbar * grown
-            + (g.DB * (acts * X + g.D_b * (kb + ups) + g.r_u) + g.D_E * g.wbar + g.D_r) * (grown - 1) / Dp
+            + (g.DB * (acts * X + g.D_b * (kb + ups) + g.r_u + r_k) + g.D_E * g.wbar + g.D_r)
+            * (grown - 1)
+            / Dp
             + g.r_p
         )
     # (H.8), (H.9)
@@ -88,6 +91,11 @@ def theorem(g: Given) -> dict[str, Any]:
         c1 = K * (V_0 + Qc / 2) + g.D_nF / 2 * wide * (Y_M + Qc / 8) + du * g.D_nb * Y_M * g.dhat
         if chi_c > 0:
             ell0, ell1 = min(ell0, c0), min(ell1, c1)
+    ell0 += r_g
+    if g.nodes:
+        q["length"] = r_k / g.du
+        bend = g.G * (g.dhat + n_fb) / mp.sqrt(g.a)
+        q["within"] = min(2 - 5 * bend, 1 - bend * mp.sqrt(g.A / g.a))
     q |= {
         "chi": chi,
         "ell0": ell0,
@@ -133,6 +141,19 @@ def theorem(g: Given) -> dict[str, Any]:
     if omega_of(g) is not None:
         q["omega"] = omega_of(g)
     return q
+
+
+def geodesics(g: Given, D: Any) -> tuple[Any, Any]:
+    """r_g and r_k of (H.41), (H.42)."""
+    r, h, J = D / mp.sqrt(g.a), mp.mpf(1) / g.nodes, g.sweeps
+    q = g.L_G * r**2 / 8 + g.G * r * (2 + g.G * r) / 2
+    b = (1 + h**2) * h / 4 * (g.L_G + 2 * g.G**2) * r**3
+    e = q**J * g.G * r**2 + b * mp.fsum(q**i for i in range(J + 1))
+    Phi = mp.sqrt(g.A) * (g.phi + g.D_r)
+    if g.covariant:
+        Phi = min(Phi, g.phi_M, mp.sqrt(g.A) * (g.Ystar + g.delta_p) + g.D_nX * D)
+    w = mp.sqrt(g.A) * e
+    return w / D * (Phi + g.lam * (D + w / 4) + g.beta * g.du * (2 * D + w / 2)), g.du * w / 2
 
 
 def needed(g: Given) -> Any:
@@ -246,6 +267,8 @@ def given(problem: Any, recipe: Any) -> Given:
         "N": exact(recipe.ripple),
         "np": exact(recipe.prediction),
     }
+    if machine.asked.geodesic is not None:
+        values |= {"nodes": machine.asked.geodesic.nodes, "sweeps": machine.asked.geodesic.sweeps}
     for lost in recipe.rounding:
         values |= {"r_a": exact(lost.feedback), "r_u": exact(lost.input)}
         values |= {"r_q": exact(lost.estimate), "r_p": exact(lost.prediction)}

@@ -21,6 +21,7 @@ from tubecert.conditions.obstacles import reach
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Proof, check, judge
+from tubecert.spec import Picard
 
 F = Fraction
 
@@ -124,6 +125,12 @@ def rounded(problem):
     return replace(problem, machine=replace(problem.machine, asked=asked))
 
 
+def computed(problem, nodes=5, sweeps=2):
+    """The same, for a controller that computes geodesics."""
+    asked = replace(problem.machine.asked, geodesic=Picard(nodes=nodes, sweeps=sweeps))
+    return replace(problem, machine=replace(problem.machine, asked=asked))
+
+
 def with_gain(problem, error=0.03):
     return replace(problem, gain=GainConstants(error=Constant(below=0.0, above=error), matched=True))
 
@@ -140,9 +147,19 @@ for _name in (
     "u* played in time",
 ):
     FORMS[f"rounding, {_name}"] = rounded(FORMS[_name][0]), FORMS[_name][1] | {"rounding": (LOST,)}
+for _name in (
+    "plain",
+    "no filter",
+    "prediction",
+    "a slow feedback out of step",
+    "u* played in time",
+    "parameters",
+):
+    FORMS[f"computed geodesics, {_name}"] = computed(FORMS[_name][0]), FORMS[_name][1]
 FORMS["covariant with an uncertain gain"] = with_covariant(with_gain(alive_machine())), {}
 FORMS["covariant"] = with_covariant(alive_machine()), {}
 FORMS["covariant in wind"] = with_covariant(windy(alive_machine(), F("0.03"))), FORMS["wind"][1]
+FORMS["covariant with computed geodesics"] = computed(with_covariant(alive_machine())), {}
 FORMS["covariant with prediction"] = with_covariant(alive_machine(predict=True)), {"prediction": F("0.004")}
 
 
@@ -155,6 +172,8 @@ def numbers(problem, own):
         "ripple": e.ripple,
         "speed": e.speed,
         "prediction": e.prediction,
+        "within": None if e.geodesics is None else e.geodesics.within,
+        "length": None if e.geodesics is None else e.geodesics.length,
         "kb": e.kb,
         "ups": e.ups,
         "s1": e.s1,

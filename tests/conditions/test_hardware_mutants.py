@@ -20,19 +20,20 @@ from hardware_oracle import given, needed, theorem
 from machines import alive_machine, windy
 from problems import ALIVE as TUBE
 from problems import constants as tube_constants
-from test_hardware import BOX, FORMS, SETTLED, numbers, recipe, with_covariant
+from test_hardware import BOX, FORMS, SETTLED, computed, numbers, recipe, with_covariant
 
 from tubecert.bounds.constants import ResidualConstants
-from tubecert.conditions.hardware import course, estimation, feedback, gains
+from tubecert.conditions.hardware import course, estimation, feedback, gains, geodesics
 from tubecert.enclosure.constant import Constant
 
 FORMULAS = {
     estimation: (
         "estimate noise_in_feedback feedforward_error lag_of_filter gain_of_filter error_of_estimate"
-        " wind_in_estimate noise_felt noise_in_estimate prediction_error"
+        " wind_in_estimate noise_felt noise_in_estimate prediction_error input_error"
     ),
     feedback: "loss covariant_loss metric_gust",
     gains: "acting raised steepness applied mistaken unpredicted forgetting",
+    geodesics: "inexact error_of_speed drift_along",
     course: "ages_of_feedback course resumed base_of mean_wait",
 }
 F = Fraction
@@ -90,6 +91,14 @@ def instead(function: FunctionType, code: CodeType) -> Iterator[None]:
 WIND = {"wind": F("0.03"), "bias": F("0.12"), "speed": F(5)}
 BY_STATE = {"noise": (F("0.001"), F("0.002")), "values": BOX}
 EVERYTHING = alive_machine(predict=True, **BY_STATE)
+# a metric that is nearly the identity, and bends a lot
+NARROW = computed(
+    replace(
+        alive_machine({"symbols": 0.34}), constants=tube_constants(**(TUBE | {"lower": 1.0, "upper": 1.2}))
+    ),
+    nodes=1,
+    sweeps=1,
+)
 REST = ResidualConstants(push=Constant(below=0.0, above=0.02), size=Constant(below=0.0, above=0.03))
 MORE = [  # what only comes together where no form of test_hardware has it
     (
@@ -99,6 +108,10 @@ MORE = [  # what only comes together where no form of test_hardware has it
     (replace(alive_machine(), constants=tube_constants(**(TUBE | {"B_x": 0.02}))), {}),
     (with_covariant(windy(alive_machine(), F("0.03"), size=9.0)), WIND),
     (with_covariant(windy(alive_machine(), F("0.03"), size=9.0), input_gain=0.1), WIND),
+    (computed(with_covariant(alive_machine(), drift_metric=0.01)), {}),
+    (NARROW, {"level": F("0.8"), "floor": F("0.2")}),
+    (computed(with_covariant(alive_machine(), drift_slope=0.01), nodes=2, sweeps=1), {}),
+    (computed(with_covariant(alive_machine({"plan_speed": 9.0, "symbols": 0.3}), drift_metric=50.0)), {}),
 ]
 POINTS = [(problem, recipe(**changes)) for problem, changes in [*FORMS.values(), *MORE]]
 POINTS += [(FORMS[name][0], SETTLED[name]) for name in FORMS if "covariant" in name]
@@ -130,7 +143,11 @@ TOLD = {
     "mistaken 2: 1",  # of a known gain, which is not added
     "resumed 8: cost.ell0 / (1 + later)",
     "resumed 9: 1 - later",
-    "resumed 12: 2",
+    "resumed 10: e.geodesics.feedback / (1 + later)",
+    "resumed 13: 2",
+    "resumed 14: 1",
+    "resumed 15: 1 - later",
+    "resumed 18: 2",
 }
 
 

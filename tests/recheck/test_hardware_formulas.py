@@ -31,6 +31,8 @@ from tubecert.recheck.digital import (
     loop,
     proposed,
 )
+from tubecert.recheck.specified.hardware import Arcs
+from tubecert.spec import Picard
 
 LOST = theorem.Rounding(
     feedback=Fraction(1, 300), input=Fraction(1, 70), estimate=Fraction(1, 50), prediction=Fraction(1, 900)
@@ -79,6 +81,7 @@ def problems(draw):
         held=held,
         predict=predicts,
         noise_rate=drift,
+        geodesic=draw(st.sampled_from([None, Picard(nodes=1, sweeps=1), Picard(nodes=7, sweeps=3)])),
     )
     values = some(item.name for item in fields(Numbers)) | {"lower": 0.8, "upper": 1.5}
     horizon = draw(st.sampled_from([None, Fraction(1, 3), Fraction(5)]))
@@ -97,7 +100,7 @@ def problems(draw):
             bound=Fraction(1, 20), constants=WindConstants(**{name: point(draw(sizes)) for name in WIND})
         ),
     )
-    if draw(st.booleans()):
+    if problem.machine.asked.geodesic is None and draw(st.booleans()):
         problem = replace(problem, gain=GainConstants(error=point(draw(st.floats(0.001, 0.9))), matched=True))
     level = Fraction(draw(st.integers(1, 60)), 100)
     bandwidth = draw(st.sampled_from([None, Fraction(2), Fraction(130, 100), Fraction(90)]))
@@ -143,7 +146,13 @@ def own_reading(problem, recipe) -> tuple[Setting, MachineNumbers, Promise, Digi
     if m.covariant is not None:
         bent = Bent(**{name: ball(getattr(m.covariant, name)) for name in BENT})
     numbers = MachineNumbers(**(absent | known), bent=bent)
-    promise = Promise(held=m.asked.held, predicts=m.asked.predict, drift=m.drift)
+    own = m.asked.geodesic
+    promise = Promise(
+        held=m.asked.held,
+        predicts=m.asked.predict,
+        drift=m.drift,
+        arcs=None if own is None else Arcs(panels=own.nodes, passes=own.sweeps),
+    )
     return (
         setting,
         numbers,
@@ -189,6 +198,12 @@ def test_both_readings_of_theorem_h_agree(case):
         same(value, other)
     if x.estimate.prediction is not None:
         same(needed[3], x.estimate.prediction)
+    if x.estimate.geodesics is not None:
+        assert (own.bent is not None) == bool(x.estimate.geodesics.within.lo > 0)
+        if own.bent is None:
+            return
+        same(own.bent.loss, x.estimate.geodesics.feedback)
+        same(own.bent.beyond, x.estimate.geodesics.input)
     if not x.loss.chi.lo > 0:
         return
     same(found.error, x.estimate.X)

@@ -45,7 +45,7 @@ from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Spec, canonical
+from tubecert.spec import Hardware, Spec, canonical
 from tubecert.spec.types import Bundle, Disturbance
 from tubecert.trajectory import Plan
 
@@ -215,7 +215,7 @@ def assumptions(
     """
     flat = all(e.is_constant for row in model.W for e in row)
     smooth, horizon, wind = spec.adaptation.smooth, spec.trajectory.horizon, spec.disturbance
-    machine = () if spec.hardware is None else (MachineAsGiven(arithmetic=spec.hardware.arithmetic),)
+    machine = () if spec.hardware is None else (_machine(spec.hardware),)
     return (
         LeastFeedback(),
         StraightGeodesics() if flat else _geodesic_assumption(geodesics),
@@ -230,6 +230,15 @@ def assumptions(
         *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
         *(() if not spec.ranges else (ParametersWithin(),)),
         *machine,
+    )
+
+
+def _machine(asked: Hardware) -> MachineAsGiven:
+    own = asked.geodesic
+    return MachineAsGiven(
+        arithmetic=asked.arithmetic,
+        nodes=None if own is None else own.nodes,
+        sweeps=None if own is None else own.sweeps,
     )
 
 

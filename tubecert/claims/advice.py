@@ -51,6 +51,7 @@ HardwareCause = Literal[
     "noise_feedback",
     "sampling",
     "gain",
+    "geodesic",
 ]
 
 

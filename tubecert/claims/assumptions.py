@@ -107,10 +107,13 @@ class MachineAsGiven(Assumption):
     """The computer, its sensors and its inputs are what the section `hardware` says; for certificate H.
 
     `arithmetic` that the controller computes in, losing no more than `rounding` of the proof says; None: it is exact.
+    With `nodes` and `sweeps` it computes geodesics as theory 8.12 says; else it has exact ones.
     """
 
     tag: ClassVar[str] = "machine_as_given"
     arithmetic: Literal["single", "double"] | None = None
+    nodes: int | None = None
+    sweeps: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

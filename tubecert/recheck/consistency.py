@@ -201,10 +201,10 @@ def assumptions(result: Result, s: System) -> Outcome:
     wanted = _assumed(s, geodesics)
     machine = result.specification.hardware
     if machine is not None:
-        arithmetic: dict[str, object] = (
-            {} if machine.arithmetic is None else {"arithmetic": machine.arithmetic}
-        )
-        wanted.append(Assumption("machine_as_given", arithmetic))
+        computes: dict[str, object] = {} if machine.arithmetic is None else {"arithmetic": machine.arithmetic}
+        if machine.arcs is not None:
+            computes |= {"nodes": machine.arcs.panels, "sweeps": machine.arcs.passes}
+        wanted.append(Assumption("machine_as_given", computes))
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:
             return stated(

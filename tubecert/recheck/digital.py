@@ -13,10 +13,12 @@ from math import exp, inf, isfinite, log
 
 from flint import arb, ctx
 
+from tubecert.recheck.arcs import Along, Cost, cost, push
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.filtering import Distance
 from tubecert.recheck.gains import factors
+from tubecert.recheck.specified.hardware import Arcs
 
 _ROUGH = 64  # bits, for proposals
 _RISES = 60
@@ -66,12 +68,13 @@ class Promise:
     """What the specification promises of the machine beside the numbers of a recipe.
 
     `held`: u* is held between samples; `predicts`: feedback from a predicted state; `drift`: a bound of
-    |n_k - n_(k-1)|/Ts in units of noise, if there is one.
+    |n_k - n_(k-1)|/Ts in units of noise, if there is one. `arcs`: how geodesics are computed; None: they are exact.
     """
 
     held: bool
     predicts: bool
     drift: Fraction | None
+    arcs: Arcs | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -297,13 +300,14 @@ class Evaluation:
         self.beta = self.most * self.n.metric_input_gain
         self.du = self.most * self.more * self.n.feedback_gain
         self.rate = self.n.h_t + self.n.h_x * self.Y  # s1
-        self.ups = self._feedforward()
         # what a state that the feedback sees is off by: in x, and in the metric
         if at.prediction is None:
             self.seen, self.n_M = self.nbar, machine.noise_metric * exact(at.noise)
         else:
             self.seen = exact(at.prediction)
             self.n_M = root(self.n.upper) * self.seen
+        self.bent = self._computed()
+        self.ups = self._feedforward()
         self.kb = self.more * self.n.feedback_gain * (self.level + self.n_M)
         self.H1 = smaller(self.n.h, self.n.h_initial + self.rate * self.t1)
         later = self.S + larger(self.n.h_initial - self.S, nothing) + self.N + self.rate * self.t1
@@ -315,13 +319,47 @@ class Evaluation:
         return self.most * (self.kb + self.ups + self.X)
 
     def _feedforward(self) -> Ball:
-        """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old, and how u is rounded."""
+        """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old, and how u is rounded.
+
+        What a computed geodesic makes of |kappa| belongs to it as well.
+        """
         if not self.promise.held:
-            return self.lost_input
+            return self.lost_input + self._beyond
         jump = 2 * self.n.u_star
         oldest = larger(self.Ts, self.Tf) + self.tau
         held = jump if self.m.input_rate is None else smaller(jump, self.m.input_rate * oldest)
-        return held + self.lost_input
+        return held + self.lost_input + self._beyond
+
+    def _computed(self) -> Cost | None:
+        """What geodesics cost; None where they are exact, or where what they cost has no bound (see `serves`)."""
+        if self.promise.arcs is None:
+            return None
+        n, m, far = self.n, self.m, self.level + self.n_M
+        own = m.bent
+        by_metric = None if own is None else (own.drift_metric, m.plan_speed + m.plan_defect, own.drift_slope)
+        at = Along(
+            far=far,
+            symbols=m.symbols,
+            slopes=m.symbols_slope,
+            least=n.lower,
+            most=n.upper,
+            push=push(n.drift_on_plan, by_metric, n.upper, far),
+            rate=self.lam,
+            beta=n.metric_input_gain,
+            du=n.feedback_gain,
+        )
+        return cost(self.promise.arcs, at)
+
+    @property
+    def _beyond(self) -> Ball:
+        return arb(0) if self.bent is None else self.bent.beyond
+
+    @property
+    def covers(self) -> bool:
+        """Whether theorems H-R and H-G speak of this loop, if it needs them: they are stated for a known B."""
+        plain = self.at.losses is None and self.promise.arcs is None
+        computed = self.promise.arcs is None or self.bent is not None
+        return computed and (plain or self.gain is None)
 
     def needed(self) -> tuple[Ball, Ball, Ball, Ball]:
         """What Y has to exceed (H.11), and what S, N and np have to reach."""
@@ -332,8 +370,8 @@ class Evaluation:
     def serves(self) -> bool:
         """Whether the side conditions hold."""
         Y, S, N, seen = self.needed()
-        if self.gain is not None and not (self.gain.sensible and self.at.losses is None):
-            return False  # theorem H-R is stated for a known B
+        if not self.covers or (self.gain is not None and not self.gain.sensible):
+            return False
         enough = Y < self.Y and S <= self.S and N <= self.N and seen <= exact(self.at.prediction or 0)
         return bool(enough and self.bending() > 0)
 
@@ -370,7 +408,7 @@ class Evaluation:
         slope = n.f_x + n.b_x * (n.u_star + self.ups + self.kb)
         growth = (slope * self.tau).expm1()
         mean = growth / slope if slope > 0 else self.tau * (growth + 1)  # at most tau e^(D_p tau)
-        unknown = self.most * self.X + self.g * (self.kb + self.ups) + self.lost_input
+        unknown = self.most * self.X + self.g * (self.kb + self.ups) + self.lost_input + self._beyond
         drift = (n.B * unknown + self.blown + self.setting.rest) * mean
         return self.nbar * (growth + 1) + drift + self.lost_prediction
 
@@ -411,6 +449,8 @@ class Evaluation:
             other = self._by_metric(m.bent, slope)
             if other is not None:
                 ell0, ell = smaller(ell0, other[0]), smaller(ell, other[1])
+        loss = arb(0) if self.bent is None else self.bent.loss
+        ell0 = ell0 + loss
         # from here on by the age of the feedback: it starts at its delay, or at the instant that was predicted
         youngest, oldest = (
             (nothing, self.Tf) if self.at.prediction is not None else (self.tau, self.Tf + self.tau)
@@ -423,7 +463,7 @@ class Evaluation:
         moved = (V_d * oldest + self.n_M) / self.floor
         delta_1 = larger(least, base + (ell0 + ell * first) * (1 + begun))
         delta = larger(least, base + ell0 + ell * youngest + (ell0 + ell * oldest) * moved)
-        return self._distance(delta_1, delta, ell, base, ell0 * (1 + moved))
+        return self._distance(delta_1, delta, ell, base, (ell0 * (1 + moved), loss * (1 + moved)))
 
     def _by_metric(self, m: Bent, slope: Ball) -> tuple[Ball, Ball] | None:
         """(H.8c), (H.9c): lengths are measured by the metric, along geodesics; None where chi' may not be positive."""
@@ -444,8 +484,10 @@ class Evaluation:
         tilt = self.du * m.input_slope * fastest * self.level
         return ell0, slope * apart + bend * (fastest + Q / 8) + tilt
 
-    def _distance(self, delta_1: Ball, delta: Ball, ell: Ball, base: Ball, noisy: Ball) -> Loop:
+    def _distance(self, delta_1: Ball, delta: Ball, ell: Ball, base: Ball, seen: tuple[Ball, Ball]) -> Loop:
         """(H.12), by the comparison equation with two saw-teeth: of the input, and of the feedback.
+
+        `seen`: what ell0 causes, and the part of it that computed geodesics do.
 
         The slower clock begins a tooth where the first phase ends. Where the other one does not, what it causes is only
         known to stay below its periodic course: that much is added at once.
@@ -479,14 +521,15 @@ class Evaluation:
         gust = self._gust()
         parts = {
             "plan": n.plan_defect_metric,
-            "feedforward": beta * self.ups,
+            "feedforward": beta * (self.ups - self._beyond),
             "wind": self.pushed,
             "wind_estimate": beta * gust,
             "bias": beta * (self.S - gust - self._mistaken()),
             "noise_estimate": beta * self.N,
             "lag": beta * self.rate * self.tau + lagging,
-            "noise_feedback": noisy,
-            "sampling": delta + waiting - base - noisy,
+            "noise_feedback": seen[0] - seen[1],
+            "sampling": delta + waiting - base - seen[0],
+            "geodesic": seen[1] + beta * self._beyond,
             "gain": beta * self._mistaken(),
         }
         return Loop(

@@ -272,7 +272,10 @@ _ASSUMPTIONS: Mapping[str, Form] = {
     "perfect_state": _NONE,
     "first_order_filter": _NONE,
     "for_all_time": _NONE,
-    "machine_as_given": ({}, {"arithmetic": _word("single", "double")}),
+    "machine_as_given": (
+        {},
+        {"arithmetic": _word("single", "double"), "nodes": Node.count, "sweeps": Node.count},
+    ),
     "up_to_horizon": ({"horizon": Node.decimal}, {}),
     "uncertainty_as_declared": _NONE,
     "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),

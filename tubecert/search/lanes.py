@@ -102,6 +102,7 @@ class Search:
             held=exact.held,
             drift=None if exact.drift is None else exact.drift.hi,
             gain=None if exact.gain is None else exact.gain.hi,
+            geodesic=exact.geodesic,
         )
         self.dbar = float(reach(self.plant.n))
         self.rate = float(self.plant.n.lam)

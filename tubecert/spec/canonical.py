@@ -220,6 +220,9 @@ def hardware_data(spec: Spec, machine: Hardware) -> dict[str, Any]:
     }
     if machine.arithmetic is not None:
         data["arithmetic"] = machine.arithmetic
+    if machine.geodesic is not None:
+        own = machine.geodesic
+        data["geodesic"] = {"nodes": str(own.nodes), "sweeps": str(own.sweeps)}
     if machine.feedback_time is not None:
         data["feedback_rate"] = number_text(1 / machine.feedback_time)
     return data

@@ -11,7 +11,16 @@ from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Arithmetic, Disturbance, Hardware, Largest, Term, TermMatrix, Vector
+from tubecert.spec.types import (
+    Arithmetic,
+    Disturbance,
+    Hardware,
+    Largest,
+    Picard,
+    Term,
+    TermMatrix,
+    Vector,
+)
 
 KEYS: Final = (
     "rate",
@@ -24,12 +33,15 @@ KEYS: Final = (
     "predict",
     "bandwidth",
     "arithmetic",
+    "geodesic",
     "limits",
 )
 LARGEST: Final = "largest"
 EXACT: Final = "exact"
 _ARITHMETICS: Final[Mapping[str, Arithmetic]] = {"single": "single", "double": "double"}
 ONE_SAMPLE: Final = "one sample"
+MAX_NODES: Final = 256
+MAX_SWEEPS: Final = 32
 MAX_COLUMNS: Final = 32
 
 
@@ -127,10 +139,17 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         entries["predict"].word(("true", "false")) if "predict" in entries else "false",
         None if _is(entries.get("bandwidth"), "auto") else _positive(entries, "bandwidth", names),
         entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT,
+        _geodesic(entries.get("geodesic"), names),
     )
     if len(field.reader.findings) > before:
         return None
-    noise, noise_rate, feedforward, predict, bandwidth, arithmetic = found
+    noise, noise_rate, feedforward, predict, bandwidth, arithmetic, geodesic = found
+    if geodesic is not None and arithmetic != EXACT:
+        entries["geodesic"].fail(
+            codes.RANGE,
+            "hardware.geodesic beside hardware.arithmetic: how geodesics are rounded is not covered",
+            "leave one of the two out",
+        )
     return Hardware(
         sample_time=sample_time,
         delay=delay,
@@ -142,6 +161,7 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         predict=predict == "true",
         bandwidth=bandwidth,
         arithmetic=_ARITHMETICS.get(arithmetic or EXACT),
+        geodesic=geodesic,
         largest=unknown[0] if unknown else None,
     )
 
@@ -197,6 +217,34 @@ def _noise(field: Field | None, names: Names) -> Fraction | Vector | None:
     sizes = {name: _size(entries, name, names, default=Fraction(0)) for name in names.states}
     found = tuple(size for size in sizes.values() if size is not None)
     return found if len(found) == len(sizes) else None
+
+
+def _geodesic(field: Field | None, names: Names) -> Picard | None:
+    """Nodes and sweeps; None if geodesics are exact, or unsound."""
+    if field is None or _is(field, EXACT):
+        return None
+    entries = field.mapping(required=("nodes", "sweeps"))
+    if entries is None or len(entries) < len(Picard.__slots__):
+        return None
+    nodes, sweeps = (
+        _whole(entries[key], names, most) for key, most in (("nodes", MAX_NODES), ("sweeps", MAX_SWEEPS))
+    )
+    return None if nodes is None or sweeps is None else Picard(nodes=nodes, sweeps=sweeps)
+
+
+def _whole(field: Field, names: Names, most: int) -> int | None:
+    """A whole number from 1 to `most`."""
+    value = field.number(names.values, least=1)
+    if value is None:
+        return None
+    if value.denominator != 1 or value > most:
+        field.fail(
+            codes.RANGE,
+            f"{field.path} is {number_text(value)}, not a whole number from 1 to {most}",
+            "write geodesic: {nodes: 16, sweeps: 3}",
+        )
+        return None
+    return int(value)
 
 
 def _size(

@@ -215,7 +215,14 @@ def _read_named(
     gained = dynamics is not None and is_uncertain(dynamics[1], names)
     if gained and B is not None and plan is not None and trajectory is not None:
         windows = tube is not None and tube.windows is not None
-        check_gains(B, plan.kind, has_hardware="hardware" in entries, has_windows=windows)
+        computed = hardware is not None and hardware.geodesic is not None
+        check_gains(
+            B,
+            plan.kind,
+            has_hardware="hardware" in entries,
+            has_windows=windows,
+            has_geodesic=computed,
+        )
     disturbance = read_disturbance(entries.get("disturbance"), names)
     if f is not None and dynamics is not None and plan is not None:
         h = () if uncertainty is None or uncertainty.h is None else uncertainty.h

@@ -71,7 +71,9 @@ def returns(terms: Sequence[Term]) -> bool:
     return found is not None and (found.period is None or found.period[0] < _LONG)
 
 
-def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: bool) -> None:
+def check_gains(
+    field: Field, kind: str, *, has_hardware: bool, has_windows: bool, has_geodesic: bool
+) -> None:
     """What is covered where parameters known by ranges stand in B."""
     if not has_hardware:
         field.fail(
@@ -84,6 +86,12 @@ def check_gains(field: Field, kind: str, *, has_hardware: bool, has_windows: boo
             codes.RANGE,
             "a parameter known by a range stands in B, beside tube.windows",
             "leave the windows out, or give the parameter one value",
+        )
+    elif has_geodesic:
+        field.fail(
+            codes.RANGE,
+            "a parameter known by a range stands in B, beside hardware.geodesic",
+            "leave hardware.geodesic out, or give the parameter one value",
         )
     elif kind not in WRITTEN:
         field.fail(

@@ -245,6 +245,14 @@ Arithmetic = Literal["single", "double"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Picard:
+    """How a controller computes geodesics: second derivatives at so many `nodes`, improved in so many `sweeps`."""
+
+    nodes: int
+    sweeps: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Hardware:
     """The computer, the sensors and their delay; times in s. What is None is searched for, or follows.
 
@@ -252,7 +260,7 @@ class Hardware:
     sample time); `noise`: |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|;
     `held`: u* is played from sample to sample; `feedback_time`: the sample time of the feedback where it has one of its
     own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s; `arithmetic`: what the
-    controller computes in, None where it computes exactly. `largest` is what is searched for, `wind` being the bound of
+    controller computes in, None where it computes exactly; `geodesic`: how, None where geodesics are exact. `largest` is what is searched for, `wind` being the bound of
     the disturbance.
     """
 
@@ -266,6 +274,7 @@ class Hardware:
     predict: bool = False
     bandwidth: Fraction | None = None
     arithmetic: Arithmetic | None = None
+    geodesic: Picard | None = None
     largest: Largest | None = None
 
     def __post_init__(self) -> None:

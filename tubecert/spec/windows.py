@@ -85,6 +85,12 @@ def check_windows(
             f"{at.path} beside hardware.arithmetic: rounding is covered in one window only",
             "leave one of the two out",
         )
+    elif machine is not None and machine.geodesic is not None:
+        at.fail(
+            codes.RANGE,
+            f"{at.path} beside hardware.geodesic: computed geodesics are covered in one window only",
+            "leave one of the two out",
+        )
     elif plan.horizon is None or plan.bundle is not None:
         at.fail(
             codes.RANGE,

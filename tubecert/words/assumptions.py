@@ -68,6 +68,8 @@ def _machine(item: MachineAsGiven) -> str:
             f"it computes in {item.arithmetic} precision, losing no more than `rounding` of the proof says (which "
             "tubecert export proves of the code that it writes)"
         )
+    if item.nodes is not None:
+        computes += f", geodesics at {item.nodes} nodes in {item.sweeps} sweeps (docs/theory, section 8.12)"
     return (
         "certificate H is about the machine of the section hardware: it samples on time, its inputs act after exactly "
         f"that delay and are held, its measurements are as good as stated, and {computes}, the estimate with B^+ (in "

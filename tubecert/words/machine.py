@@ -17,6 +17,7 @@ CAUSES: Mapping[HardwareCause | str, str] = {
     "noise_feedback": "noise in the feedback",
     "sampling": "feedback that is sampled and delayed",
     "gain": "the gain of the inputs, that the estimate takes for uncertainty",
+    "geodesic": "geodesics that are computed at a few nodes",
 }
 
 PARTS: Mapping[HardwarePart, str] = {

@@ -42,7 +42,8 @@ def ages_of_feedback(loop: Loop[T]) -> Ages[T]:
 class Course(Generic[T]):
     """D(t) of theorem H: at most `start` before t_a, then `bound`; `base` and what time and noise add to it.
 
-    `lag` is s1 (tau + mu), `noisy` the part of delta_H that noise in the feedback causes.
+    `lag` is s1 (tau + mu), `noisy` the part of delta_H that noise in the feedback causes, and what computed geodesics
+    do, which is `bent`.
     """
 
     start: T
@@ -52,6 +53,7 @@ class Course(Generic[T]):
     base: T
     lag: T
     noisy: T
+    bent: T
 
     def supremum(self) -> T:
         """max(d0, f0, d1, sup D)."""
@@ -108,6 +110,7 @@ def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) ->
         base=base,
         lag=lag,
         noisy=cost.ell0 * (1 + later),
+        bent=number(0, n.lam) if e.geodesics is None else e.geodesics.feedback * (1 + later),
     )
 
 

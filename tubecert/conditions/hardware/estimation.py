@@ -17,6 +17,7 @@ from tubecert.conditions.arithmetic import (
     sqrt,
 )
 from tubecert.conditions.hardware.gains import acting, applied, mistaken, raised, unpredicted
+from tubecert.conditions.hardware.geodesics import Inexact, inexact
 from tubecert.conditions.hardware.loop import Loop, Plant
 
 
@@ -67,7 +68,8 @@ class Estimate(Generic[T]):
     `n_fb`: what noise is to the feedback, |Theta n| at most; `e_fb` the same in |.|; kb bounds |kappa|, ups |u0 - u*|,
     s1 the rate of h along the loop, H1 and X |h - q^| at first and always, `added` what all this is behind B. `gust` is
     the part of S that wind causes, `mistaken` the one that an uncertain gain does.
-    After other windows kb, ups and X hold in the window before too; `acts` are those of its own.
+    After other windows kb, ups and X hold in the window before too; `acts` are those of its own. `geodesics`: what they
+    lose where they are computed, None where they are exact.
     """
 
     n_fb: T
@@ -86,6 +88,7 @@ class Estimate(Generic[T]):
     prediction: T | None
     acts: Acts[T]
     sensed: Sensed[T]
+    geodesics: Inexact[T] | None
 
 
 @quiet
@@ -98,7 +101,8 @@ def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimat
     H1 = minimum(n.Dh, n.H0 + s1 * t1)
     # S + (H0 - S)_+ = max(S, H0)
     X = minimum(n.Dh + n.R, maximum(H1, maximum(loop.S, n.H0) + loop.N + s1 * t1))
-    own = Acts(kb=raised(p, n.du) * (loop.dhat + n_fb), ups=feedforward_error(p, loop), X=X)
+    geodesics = inexact(p, loop, n_fb)
+    own = Acts(kb=raised(p, n.du) * (loop.dhat + n_fb), ups=input_error(p, loop, geodesics), X=X)
     acts = own if past is None else own.with_those(past.acts)
     known = n.Dus + acts.ups + acts.kb
     felt = noise_felt(p, loop)
@@ -121,10 +125,17 @@ def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimat
         bias=bias if p.gain is None else bias + wrong,
         ripple=noise_in_estimate(p, loop, sensed),
         speed=n.phi + n.DB * added + p.D_E * loop.wbar,
-        prediction=prediction_error(p, loop, known, unpredicted(p, acts.X, kb, ups)),
+        prediction=prediction_error(p, loop, known, unpredicted(p, acts.X, kb, ups), geodesics),
         acts=own,
         sensed=sensed,
+        geodesics=geodesics,
     )
+
+
+def input_error(p: Plant[T], loop: Loop[T], geodesics: Inexact[T] | None) -> T:
+    """ups, with what computed geodesics make of the input."""
+    ups = feedforward_error(p, loop)
+    return ups if geodesics is None else ups + geodesics.input
 
 
 def noise_in_feedback(p: Plant[T], loop: Loop[T]) -> tuple[T, T]:
@@ -188,7 +199,9 @@ def noise_in_estimate(p: Plant[T], loop: Loop[T], sensed: Sensed[T]) -> T:
     return summed if p.drift is None else minimum(summed, sensed.explained * p.drift)
 
 
-def prediction_error(p: Plant[T], loop: Loop[T], known: T, missed: T) -> T | None:
+def prediction_error(
+    p: Plant[T], loop: Loop[T], known: T, missed: T, geodesics: Inexact[T] | None = None
+) -> T | None:
     """What np has to reach, (H.17); `known` bounds |u0 + kappa|, `missed` what else acts behind B."""
     if loop.np is None:
         return None
@@ -198,6 +211,8 @@ def prediction_error(p: Plant[T], loop: Loop[T], known: T, missed: T) -> T | Non
     grown = exp(y)
     if loop.lost is not None:
         missed = missed + loop.lost.input
+    if geodesics is not None:
+        missed = missed + geodesics.input
     found = loop.nu * p.m.n_E * grown + (n.DB * missed + p.D_E * loop.wbar + p.rest) * (
         loop.tau * grown * decay_mean(y)
     )

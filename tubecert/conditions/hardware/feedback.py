@@ -38,7 +38,7 @@ class Loss(Generic[T]):
 
 @quiet
 def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
-    """(H.8), (H.9)."""
+    """(H.8), (H.9); what computed geodesics lose is part of ell0, (H.42)."""
     n, m = p.n, p.m
     G, L = 2 * m.G * n.rho, m.L_G * n.rho**2
     chi = 1 - G / 2 - L / 8
@@ -64,6 +64,8 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
     if m.bent is not None:
         other = covariant_loss(p, m.bent, loop, e)
         ell0, ell1 = minimum(ell0, other[0]), minimum(ell1, other[1])
+    if e.geodesics is not None:
+        ell0 = choose(e.geodesics.within, ell0 + e.geodesics.feedback, -nothing(chi))
     return Loss(ell0=ell0, ell1=ell1, V_d=V_d, chi=chi)
 
 

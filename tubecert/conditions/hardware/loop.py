@@ -14,6 +14,7 @@ from tubecert.conditions.arithmetic import (
 from tubecert.conditions.machine import Machine, MachineNumbers
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.enclosure.interval import Interval
+from tubecert.spec import Picard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +111,8 @@ class Plant(Generic[T]):
     """All that is known of the system over the tube, in one arithmetic.
 
     `beta_w`, `D_E`, `eps_w`: what a wind does per |w|; `rest`: |r| of unknown parameters; `held`: whether u* is played
-    from sample to sample; `drift`: the bound of |n_k - n_(k-1)|/Ts in units of noise; `gain`: D_b, None of a known B.
+    from sample to sample; `drift`: the bound of |n_k - n_(k-1)|/Ts in units of noise; `gain`: D_b, None of a known B;
+    `geodesic`: how geodesics are computed, None where they are exact.
     """
 
     n: Numbers[T]
@@ -122,6 +124,7 @@ class Plant(Generic[T]):
     held: bool = False
     drift: T | None = None
     gain: T | None = None
+    geodesic: Picard | None = None
 
 
 def in_step(first: Fraction, second: Fraction) -> bool:
@@ -144,6 +147,7 @@ def plant(problem: TubeProblem, R: Fraction) -> Plant[Interval]:
         held=machine.asked.held,
         drift=None if machine.drift is None else Interval.of(machine.drift),
         gain=None if problem.gain is None else Interval.exact(problem.gain.error.above),
+        geodesic=machine.asked.geodesic,
     )
 
 

@@ -36,9 +36,9 @@ def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Inte
         return nothing, nothing
     if not problem.machine.clips_within(problem.constants.h, recipe.clip_radius):
         return nothing, nothing
-    if recipe.rounding and (
-        problem.gain is not None or recipe.windows
-    ):  # theorem H-R is for one window, a known B
+    inexact = recipe.rounding or problem.machine.asked.geodesic is not None
+    # theorems H-R and H-G are for one window, a known B
+    if inexact and (problem.gain is not None or problem.machine.windows or recipe.windows):
         return nothing, nothing
     if problem.machine.windows or recipe.windows:
         if problem.gain is not None:  # theorem HW is stated for a known B
@@ -95,11 +95,13 @@ def _describes_a_loop(r: HardwareRecipe) -> bool:
 
 
 def _side_conditions(x: Evaluated[Interval]) -> bool:
-    """(5.1), (H.6), (H.7), (H.11) and (H.17)."""
+    """(5.1), (H.6), (H.7), (H.11), (H.17) and (H.41)."""
     e, loop = x.estimate, x.loop
     predicted = e.prediction is None or loop.np is None or bool(e.prediction.sanitised().hi <= loop.np.lo)
+    computed = e.geodesics is None or bool(e.geodesics.within.sanitised().lo > 0)
     return (
-        bool(x.loss.chi.sanitised().lo > 0)
+        computed
+        and bool(x.loss.chi.sanitised().lo > 0)
         and bool(e.bias.sanitised().hi <= loop.S.lo)
         and bool(e.ripple.sanitised().hi <= loop.N.lo)
         and bool(e.speed.sanitised().hi < loop.Y.lo)

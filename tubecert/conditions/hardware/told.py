@@ -26,7 +26,8 @@ class Budget:
 
     `plan` delta, `feedforward` beta ups, `wind` beta_w |w|, `wind_estimate` what it does to the estimate, `bias` the
     rest of beta S, `noise_estimate` beta N, `lag` beta s1 (tau + mu), `noise_feedback` ell0, `sampling` ell1 and the
-    floor; `gain` the part of beta S that an uncertain gain causes, and beta is beta (1 + D_b) then.
+    floor; `gain` the part of beta S that an uncertain gain causes, and beta is beta (1 + D_b) then; `geodesic` the
+    parts of ell0 and of beta ups that computed geodesics cause.
     """
 
     plan: float
@@ -39,6 +40,7 @@ class Budget:
     noise_feedback: float
     sampling: float
     gain: float = 0.0
+    geodesic: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +93,7 @@ def _widest(recipe: HardwareRecipe, found: Sequence[Told]) -> Told:
 def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
     n, e, loop, run = x.plant.n, x.estimate, x.loop, x.course
     whole = n.lam * dhat
-    beta, biased = acting(x.plant, n.beta), loop.S - e.gust
+    beta, biased, bent = acting(x.plant, n.beta), loop.S - e.gust, e.geodesics
 
     def share(part: Interval) -> float:
         most = float((part / whole).sanitised().hi)
@@ -99,13 +101,14 @@ def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
 
     return Budget(
         plan=share(n.delta),
-        feedforward=share(beta * e.ups),
+        feedforward=share(beta * (e.ups if bent is None else e.ups - bent.input)),
         wind=share(x.plant.beta_w * loop.wbar),
         wind_estimate=share(beta * e.gust),
         bias=share(beta * (biased if x.plant.gain is None else biased - e.mistaken)),
         noise_estimate=share(beta * loop.N),
         lag=share(beta * run.lag),
-        noise_feedback=share(run.noisy),
+        noise_feedback=share(run.noisy if bent is None else run.noisy - run.bent),
         sampling=share(run.bound.delta - run.base - run.noisy),
         gain=share(beta * e.mistaken),
+        geodesic=share(run.bent if bent is None else run.bent + beta * bent.input),
     )

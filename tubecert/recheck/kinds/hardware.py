@@ -49,7 +49,7 @@ SHARES = (
     "noise_feedback",
     "sampling",
 )
-OF_GAINS = ("gain",)  # a share of specifications with an uncertain B: left out where it is 0
+OF_GAINS = ("gain", "geodesic")  # of an uncertain B, and of computed geodesics: left out where they are 0
 _MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
 _PROOF = ("floor", "speed", "bias", "ripple")
 
@@ -370,7 +370,7 @@ def promise(asked: Hardware) -> Promise:
     if drift is not None and isinstance(asked.noise, tuple):
         # a vector of that length is within so many units of noise: its other entries are 0
         drift = drift / min((size for size in asked.noise if size), default=Fraction(1))
-    return Promise(held=asked.held, predicts=asked.predict, drift=drift)
+    return Promise(held=asked.held, predicts=asked.predict, drift=drift, arcs=asked.arcs)
 
 
 def _loop(recipe: Digital, ground: Ground) -> Loop | None:

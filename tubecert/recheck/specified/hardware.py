@@ -15,7 +15,16 @@ from tubecert.recheck.terms import Matrix
 MACHINE = ("hardware", "disturbance")
 _LARGEST, _ONE_SAMPLE, _AUTO = "largest", "one sample", "auto"
 _MOST_COLUMNS = 32
+_MOST_PANELS, _MOST_PASSES = 256, 32
 _MOST_STATES = 12  # with noise of their own: all corners of a box are examined
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arcs:
+    """Geodesics of so many panels with a constant second derivative each, improved in so many passes."""
+
+    panels: int
+    passes: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +34,8 @@ class Hardware:
     None where the largest is asked for: then the section states it. `one_sample`: the delay is the sample time. `noise`
     is a Euclidean length, or one size per state. `held`: u* is held like the other inputs; `feedback_time`: the sample
     time of the feedback, if it has one of its own; `predict`: the feedback is that of a predicted state. `bandwidth`
-    binds no claim but that it is the one used. `arithmetic` that the controller computes in; None: it is exact.
+    binds no claim but that it is the one used. `arithmetic` that the controller computes in; None: it is exact. `arcs`:
+    how geodesics are computed; None: they are exact.
     """
 
     sample_time: Fraction | None
@@ -38,6 +48,7 @@ class Hardware:
     predict: bool
     bandwidth: Fraction | None
     arithmetic: str | None
+    arcs: Arcs | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +72,7 @@ def read_machine(own: Members, states: Sequence[str]) -> tuple[Hardware | None, 
 
 def _hardware(node: Node, states: Sequence[str]) -> Hardware:
     keys = ("sample_time", "delay", "noise", "feedforward", "predict", "bandwidth")
-    own = node.closed(*keys, optional=("noise_rate", "feedback_rate", "arithmetic"))
+    own = node.closed(*keys, optional=("noise_rate", "feedback_rate", "arithmetic", "geodesic"))
     feedback = own.get("feedback_rate", positive)
     found = Hardware(
         sample_time=_unless(own["sample_time"], _LARGEST, positive),
@@ -74,10 +85,25 @@ def _hardware(node: Node, states: Sequence[str]) -> Hardware:
         predict=own["predict"].word("true", "false") == "true",
         bandwidth=_unless(own["bandwidth"], _AUTO, positive),
         arithmetic=own.get("arithmetic", lambda item: item.word("single", "double")),
+        arcs=own.get("geodesic", _arcs),
     )
     if found.delay is not None and found.sample_time is not None and found.delay > found.sample_time:
         raise own["delay"].refused("is longer than the sample time")
+    if found.arcs is not None and found.arithmetic is not None:
+        raise own["geodesic"].refused("is about exact arithmetic, and stands beside another one")
     return found
+
+
+def _arcs(node: Node) -> Arcs:
+    own = node.closed("nodes", "sweeps")
+    return Arcs(panels=_upto(own["nodes"], _MOST_PANELS), passes=_upto(own["sweeps"], _MOST_PASSES))
+
+
+def _upto(node: Node, most: int) -> int:
+    q = positive(node)
+    if q.denominator != 1 or q > most:
+        raise node.refused(f"is no whole number from 1 to {most}")
+    return int(q)
 
 
 def _unless(node: Node, word: str, read: Callable[[Node], Fraction]) -> Fraction | None:
