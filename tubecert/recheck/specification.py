@@ -105,7 +105,7 @@ def read_specification(node: Node) -> Specification:
     if plant.gained is not None and found.windows:
         raise own["tube"].refused("has windows beside an uncertain B")
     if hardware is not None and hardware.arcs is not None and (found.windows or plant.gained is not None):
-        raise own["hardware"].refused("has computed geodesics beside windows or an uncertain B")
+        raise own["system"].refused("has computed geodesics beside windows or an uncertain B")
     if plant.gained is not None and (hardware is None or not written):
         raise own["system"].refused("has an uncertain B, without hardware or a plan that is written down")
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:

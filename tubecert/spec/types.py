@@ -260,8 +260,8 @@ class Hardware:
     sample time); `noise`: |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|;
     `held`: u* is played from sample to sample; `feedback_time`: the sample time of the feedback where it has one of its
     own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s; `arithmetic`: what the
-    controller computes in, None where it computes exactly; `geodesic`: how, None where geodesics are exact. `largest` is what is searched for, `wind` being the bound of
-    the disturbance.
+    controller computes in, None where it computes exactly; `geodesic`: how, None where geodesics are exact. `largest`
+    is what is searched for, `wind` being the bound of the disturbance.
     """
 
     sample_time: Fraction | None

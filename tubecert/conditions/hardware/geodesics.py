@@ -11,6 +11,7 @@ from typing import Generic
 
 from tubecert.conditions.arithmetic import T, minimum, number, quiet, sqrt
 from tubecert.conditions.hardware.loop import Loop, Plant
+from tubecert.spec import Picard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,21 +36,19 @@ def inexact(p: Plant[T], loop: Loop[T], n_fb: T) -> Inexact[T] | None:
     n, D = p.n, loop.dhat + n_fb
     r = D / sqrt(n.a)
     within = minimum(2 - 5 * (p.m.G * r), 1 - p.m.G * r * sqrt(n.A / n.a))
-    off = sqrt(n.A) * error_of_speed(p, r)
+    off = sqrt(n.A) * error_of_speed(p.geodesic, p.m.G, p.m.L_G, r)
     alpha = off * (drift_along(p, D) + n.lam * (D + off / 4))
     law = n.beta * n.du * off * (2 * D + off / 2)
     return Inexact(feedback=(alpha + law) / D, input=n.du * off / 2, length=off / 2, within=within)
 
 
-def error_of_speed(p: Plant[T], r: T) -> T:
+def error_of_speed(geodesic: Picard, G: T, L: T, r: T) -> T:
     """e of (H.41): the computed geodesic's second derivative is off by that in the mean, its ends' speeds by half."""
-    assert p.geodesic is not None
-    G, L, nodes = p.m.G, p.m.L_G, p.geodesic.nodes
-    g = G * r
+    g, nodes = G * r, geodesic.nodes
     q = L * r**2 / 8 + g * (2 + g) / 2
     between = number((1 + Fraction(1, nodes**2)) / (4 * nodes), r) * (L + 2 * G**2) * r**3
     e = G * r**2
-    for _ in range(p.geodesic.sweeps):
+    for _ in range(geodesic.sweeps):
         e = q * (e + between)
     return e + between
 
