@@ -16,6 +16,8 @@ settings.load_profile("tests")
 # the rewritten assertions of all files and the modules of every `tubecert` that a test starts, compiled once
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# as the tool has it: some test imports numba before the tool does, and a third more of compilation would be for nothing
+os.environ.setdefault("NUMBA_OPT", "1")
 gc.disable()  # thousands of tests are collected, and none of them is garbage
 
 

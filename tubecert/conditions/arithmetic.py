@@ -7,8 +7,11 @@ hull of both.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextvars import ContextVar
 from fractions import Fraction
-from typing import TypeVar
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +22,29 @@ from tubecert.enclosure.interval import Interval
 Array = NDArray[np.float64]
 T = TypeVar("T", Interval, Array)
 
-quiet = np.errstate(all="ignore")
-"""Branches are evaluated before they are chosen: division by 0 in a branch not taken is not news."""
+_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def quiet(function: Callable[P, R]) -> Callable[P, R]:
+    """Branches are evaluated before they are chosen: division by 0 in a branch not taken is not news.
+
+    Formulas call each other: it is the outermost that silences numpy, which takes as long as ten additions.
+    """
+
+    @wraps(function)
+    def silenced(*args: P.args, **options: P.kwargs) -> R:
+        if _QUIET.get():
+            return function(*args, **options)
+        token = _QUIET.set(True)
+        try:
+            with np.errstate(all="ignore"):
+                return function(*args, **options)
+        finally:
+            _QUIET.reset(token)
+
+    return silenced
 
 
 def number(value: Fraction | int, like: T) -> T:

@@ -22,7 +22,6 @@ _INFLATIONS = (1e-13, 1e-10, 1e-7, 1e-4, 1e-2)
 
 def exact(q: Fraction | int) -> arb:
     """A rational number as a ball around it."""
-    q = Fraction(q)
     return arb(fmpq(q.numerator, q.denominator))
 
 

@@ -7,6 +7,7 @@ nothing is searched for here. What is no number serves nothing, because every co
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from math import exp, inf, isfinite, log
@@ -183,8 +184,9 @@ def proposed(
         at = _settled(setting, machine, promise, replace(like, bandwidth=omega))
         if at is None:
             return inf, None
-        share, top = _least(lambda x: _top(setting, machine, promise, _floored(at, x)), _FLOORS)
-        return top, _floored(at, share)
+        settled = Evaluation(setting, machine, promise, at)
+        share, top = _least(lambda x: _top(settled.with_floor(_floor(at, x))), _FLOORS)
+        return top, replace(at, floor=_floor(at, share))
 
     with ctx.workprec(_ROUGH):
         top, best = quality(like.bandwidth if fixed else None)
@@ -195,9 +197,9 @@ def proposed(
     return best if top < inf else None
 
 
-def _floored(at: Digital, x: float) -> Digital:
-    """With the floor as a share of the level."""
-    return replace(at, floor=at.level * Fraction(exp(x)))
+def _floor(at: Digital, x: float) -> Fraction:
+    """The floor that is a share of the level."""
+    return at.level * Fraction(exp(x))
 
 
 def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[float, float]:
@@ -260,9 +262,9 @@ def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Di
     )
 
 
-def _top(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> float:
+def _top(at: Evaluation) -> float:
     """max(d0, f0, d1, sup D) per level; infinite where that is no number."""
-    top = float(Evaluation(setting, machine, promise, at).course().top.upper() / exact(at.level))
+    top = float(at.course().top.upper() / at.level)
     return top if isfinite(top) else inf
 
 
@@ -312,6 +314,12 @@ class Evaluation:
         self.H1 = smaller(self.n.h, self.n.h_initial + self.rate * self.t1)
         later = self.S + larger(self.n.h_initial - self.S, nothing) + self.N + self.rate * self.t1
         self.X = smaller(self.n.h + self.R, larger(self.H1, later))
+
+    def with_floor(self, floor: Fraction) -> Evaluation:
+        """The same at another floor, on which nothing rests that is computed above."""
+        other = copy(self)
+        other.at, other.floor = replace(self.at, floor=floor), exact(floor)
+        return other
 
     @property
     def push(self) -> Ball:

@@ -52,7 +52,7 @@ class Registers(NamedTuple):
 def sample(
     fast: Fast, computer: Any, count: int, now: Moment, point: Point, y: Array, kept: Registers
 ) -> None:
-    """What happens at sample `count`; without a computer it is not even compiled."""
+    """What happens at sample `count`; beside a machine, where there is no computer, it is not even compiled."""
     if computer is not None:
         if computer.holds:
             _control(fast, computer, count, now, point, y, kept)

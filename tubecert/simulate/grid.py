@@ -111,6 +111,9 @@ def sample_period(problem: LoopProblem) -> float | None:
     return None
 
 
+IDLE = Computer(False, 0.0, 1, 1.0, 0.0, 1.0)  # loops with a computer and without one are compiled once
+
+
 def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     """The steps of a level, each level with twice as many as the one before, and their distinct lengths (Q,)."""
     t, events = corners(problem)
@@ -201,10 +204,13 @@ def machine(problem: LoopProblem) -> Machine | None:
 
 
 def computer(problem: LoopProblem) -> Computer | None:
-    """The computer of the loop, if there is one; ValueError if the sample time is no multiple of the control period."""
+    """The computer of the loop, or one that never samples; None beside a machine.
+
+    ValueError if the sample time is no multiple of the control period.
+    """
     gains, rate = problem.gains, problem.control_rate
     if sample_period(problem) is None:
-        return None
+        return IDLE if machine(problem) is None else None
     dt = 0.0 if rate is None else 1.0 / rate
     every, weight, growth = 1, 0.0, 1.0
     if gains is not None and problem.terms.samples:

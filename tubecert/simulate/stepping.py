@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.compiled import compiled, entry
+from tubecert.simulate.compiled import compiled, entry, inlined
 from tubecert.simulate.computer import Computer, Registers, sample
 from tubecert.simulate.fast import Fast, Inner, advance, inner
 from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, evaluate, point
@@ -184,7 +184,7 @@ def run(first: int, last: int, own: Lane, starts: Array, work: Work, out: Output
                 break
 
 
-@compiled
+@inlined  # a level of calls less: what is linked is optimised again at each of them
 def _step(own: Lane, lane: int, s: int, work: Work, out: Output) -> int:
     """One step of a lane, and what it leaves behind at the step's start; why it is stopped, if it is."""
     grid, fast, v = own.grid, own.fast, own.fast.at.v
@@ -223,7 +223,7 @@ def _step(own: Lane, lane: int, s: int, work: Work, out: Output) -> int:
     return FOUND
 
 
-@compiled
+@inlined
 def _begin(own: Lane, s: int, now: Moment, work: Work, out: Output) -> int:
     """What happens at the start of a step, and what the lane leaves behind there; why it is stopped, if it is."""
     fast, point, y, status = own.fast, work.point, work.y, FOUND
