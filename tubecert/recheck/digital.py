@@ -25,6 +25,10 @@ _ROUGH = 64  # bits, for proposals
 _RISES = 60
 _CLOSE, _INFLATED, _LITTLE = Fraction(1, 10**12), Fraction(1, 10**9), Fraction(1, 10**30)
 _GRID, _ZOOMS, _GOLDEN = 10, 28, 0.6180339887498949
+_LAST, _MISSING = (
+    3,
+    10,
+)  # points whose differences are compared with what is missing, and how often these fit there
 _ENOUGH = 1 - 1e-9  # of the level
 _FLOORS = (log(1e-5), 0.0)  # of the level
 _FASTEST = 40.0  # omega Ts
@@ -223,7 +227,7 @@ def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[
     inner = [high - (high - low) * _GOLDEN, low + (high - low) * _GOLDEN]
     found = [at(x) for x in inner]
     for _ in range(_ZOOMS):
-        if min(found) < _ENOUGH:
+        if min(found) < _ENOUGH or _is_hopeless([y for y, _ in best]):
             break
         if found[0] <= found[1]:
             high, inner[1], found[1] = inner[1], inner[0], found[0]
@@ -235,6 +239,12 @@ def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[
             found[1] = at(inner[1])
     y, x = min(best)
     return x, y
+
+
+def _is_hopeless(values: list[float]) -> bool:
+    """Whether what the last points of a zoom differ by is nothing beside what is missing."""
+    least = min(values)
+    return least - _ENOUGH > _MISSING * (max(values[-_LAST:]) - least)
 
 
 def _settled(setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> Digital | None:
