@@ -734,34 +734,10 @@ def test_a_budget_that_runs_out_is_undecided(folder):
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_the_specification_of_the_readme_certifies(folder):
-    [text] = (text for text in re.findall(r"```yaml\n(.*?)```", README, re.DOTALL) if "tubecert: 1" in text)
-    (folder / "example.yaml").write_text(text, encoding="utf-8")
-    assert run("check", "example.yaml").exit_code == 0
-    assert run("certify", "example.yaml").exit_code == 0
-
-
 def test_the_lines_of_the_readme_about_a_machine_are_those_of_its_example():
     [lines] = (text for text in re.findall(r"```yaml\n(.*?)```", README, re.DOTALL) if "hardware:" in text)
     example = (ROOT / "configs" / "hardware_orbit.yaml").read_text(encoding="utf-8").splitlines()
     assert set(lines.splitlines()) <= set(example)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("command", "shown"),
-    re.findall(r"tubecert (certify configs/\S+[^\n]*)\n```\n\n```text\n(.*?)```", README, re.DOTALL),
-)
-def test_the_output_of_the_readme_is_real(folder, command, shown):
-    _, spec, *options = command.split()
-    real = titles(run("certify", ROOT / spec, *options).stdout)
-    # numbers are those of the pinned versions, so only what does not depend on them is compared
-    assert titles(shown) == real[: len(titles(shown))]
-
-
-def titles(report):
-    return [line.split()[0] for line in report.splitlines() if line and not line.startswith(" ")]
 
 
 def test_ci_runs_what_the_readme_says():
