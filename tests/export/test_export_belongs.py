@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import struct
 from fractions import Fraction
+from pathlib import Path
+from unittest import mock
 
 import controllers
 import numpy as np
@@ -17,6 +20,7 @@ from typer.testing import CliRunner
 from tubecert import certificate
 from tubecert.cli.app import app
 from tubecert.errors import TubecertError
+from tubecert.export import compiled as compiled_code
 from tubecert.export.compiled import COMPILERS, compiled, compiler
 from tubecert.export.controller import controller_of
 from tubecert.export.examined import examined
@@ -24,7 +28,9 @@ from tubecert.export.folder import exported
 from tubecert.export.vectors import vectors
 from tubecert.library.certification import certification_of
 from tubecert.recheck.balls import exact
-from tubecert.recheck.controller import Machine
+from tubecert.recheck.code.constants import otherwise
+from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.controller import Machine, machine_of
 
 needs_cc = pytest.mark.skipif(
     compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"
@@ -56,6 +62,43 @@ def in_the_loop(target, folder):
     assert 1e-3 < found["distance"] < found["level"]
 
 
+def constants_are_read_back(folder, own, given):
+    """From the object that the compiler made; another number in it, or in the header, is noticed."""
+    assert "constants were read back" in str(examined(str(folder), own, *given))
+    header, source = ((folder / f"hardware_orbit.{end}").read_text("utf-8") for end in "hc")
+    formulas = machine_of(*given)
+    assert not list(otherwise(read_code(header, source), formulas))
+    for old, new, name in (
+        ("SAMPLE_TIME 0.002 ", "SAMPLE_TIME 0.0020000000000000005 ", "SAMPLE_TIME"),
+        ("DELAY 0.0005 ", "DELAY 0.00050000000000000012 ", "DELAY"),
+        ("HORIZON 6.3 ", "HORIZON 6.300000000000001 ", "HORIZON"),
+        ("1.91111315339", "1.9111131533900006", "the clip"),
+    ):
+        changed = [own_text.replace(old, new) for own_text in (header, source)]
+        assert changed != [header, source]
+        assert list(otherwise(read_code(*changed), formulas)) == [name]
+    whole = compiled_code.built
+    for number, other in ((0.14094299744758143, 0.14094299744768143), (0.24834955778683296, 0.248)):
+
+        def built(exported_code, target, number=number, other=other):
+            path = Path(whole(exported_code, target))
+            code = path.read_bytes()
+            assert struct.pack("=d", number) in code
+            path.write_bytes(code.replace(struct.pack("=d", number), struct.pack("=d", other)))
+            return str(path)
+
+        with (
+            mock.patch.object(compiled_code, "built", built),
+            pytest.raises(TubecertError, match="other numbers"),
+        ):
+            examined(str(folder), own, *given)
+    with mock.patch.object(compiled_code.shutil, "which", return_value=None):
+        alone = examined(str(folder), own, *given)
+    assert not alone.ran
+    assert "no constants were read back" in str(alone)
+    assert alone.difference < 1e-13
+
+
 @needs_cc
 @pytest.mark.slow
 def test_a_certificate_its_code_and_what_is_refused(tmp_path):
@@ -70,6 +113,7 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     found = examined(str(folder), own, text, target.name)
     assert found.difference < 1e-13
     assert "ball arithmetic" in str(found)
+    constants_are_read_back(folder, own, (text, target.name))
     other = exported(controller_of(own), "python")
     other.save(str(tmp_path / "python"))
     assert examined(str(tmp_path / "python"), own, text, target.name).difference < 1e-13

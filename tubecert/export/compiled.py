@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -22,6 +22,7 @@ from tubecert.printable import visible
 
 COMPILERS: Final = ("cc", "gcc", "clang")
 FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
+_PROBE: Final = "probe.c"
 _PATIENCE: Final = 120  # s
 _SHOWN: Final = 400  # characters of what a compiler says
 
@@ -40,6 +41,7 @@ class Compiled:
         self._states = [kind() for _ in range(lanes)]
         self._start = self._function(library, f"{controller.name}_start")
         self._step = self._function(library, f"{controller.name}_step")
+        self._library, self._name = library, controller.name
         self.seconds: list[float] = []
         self.status = np.zeros(lanes, dtype=np.intp)
 
@@ -53,6 +55,18 @@ class Compiled:
         found = self._run(self._step, y)
         self.seconds.append((time.perf_counter() - begin) / len(y))
         return found
+
+    def literals(self, texts: Sequence[str]) -> dict[str, float]:
+        """What the compiler made of the literals that it was asked for."""
+        found = (self._real * len(texts)).in_dll(self._library, f"{self._name}_literals")
+        return {text: float(value) for text, value in zip(texts, found, strict=True)}
+
+    def tables(self, sizes: Mapping[str, int]) -> dict[str, list[float]]:
+        """The tables that the code reads, as they lie in the object."""
+        pointer = ctypes.POINTER(self._real)
+        found = (pointer * (len(sizes) + 1)).in_dll(self._library, f"{self._name}_tables")
+        own = zip(sizes.items(), found, strict=False)
+        return {name: [float(start[k]) for k in range(size)] for (name, size), start in own}
 
     def _function(self, library: ctypes.CDLL, name: str) -> Callable[..., int]:
         function = getattr(library, name)
@@ -76,10 +90,16 @@ def compiler() -> str | None:
 
 
 @contextmanager
-def compiled(exported: Exported, lanes: int = 1) -> Iterator[Compiled]:
-    """The compiled code; raises TC712 where there is no compiler, the code does not compile, or its hash is another."""
+def compiled(
+    exported: Exported, lanes: int = 1, read: Sequence[str] = (), tables: Sequence[str] = ()
+) -> Iterator[Compiled]:
+    """The compiled code; raises TC712 where there is no compiler, the code does not compile, or its hash is another.
+
+    `read` are literals, and `tables` names of tables that are to be read back.
+    """
     with tempfile.TemporaryDirectory() as folder:
         exported.save(folder)
+        (Path(folder) / _PROBE).write_text(_probe(exported, read, tables), "utf-8")
         library = ctypes.CDLL(built(exported, folder))
         own = ctypes.string_at(
             ctypes.addressof(ctypes.c_char.in_dll(library, f"{exported.controller.name}_certificate"))
@@ -89,12 +109,29 @@ def compiled(exported: Exported, lanes: int = 1) -> Iterator[Compiled]:
         yield Compiled(library, exported.controller, single=exported.precision == "single", lanes=lanes)
 
 
+def _probe(exported: Exported, read: Sequence[str], tables: Sequence[str]) -> str:
+    """The source, and what is to be read back from the same object."""
+    name = exported.controller.name
+    starts = [f"(const {name}_real *){table}" for table in tables]
+    return "\n".join(
+        (
+            f'#include "{name}.c"',
+            f"extern const {name}_real {name}_literals[];",
+            f"const {name}_real {name}_literals[] = {{{', '.join((*read, '0'))}}};",
+            f"extern const {name}_real *const {name}_tables[];",
+            f"const {name}_real *const {name}_tables[] = {{{', '.join((*starts, '0'))}}};",
+            "",
+        )
+    )
+
+
 def built(exported: Exported, folder: str) -> str:
     """The shared object of the files in a folder; raises TC712."""
     found, target = compiler(), str(Path(folder) / "controller.so")
     if found is None:
         raise _failed(f"there is no C compiler on PATH ({', '.join(COMPILERS)})")
-    source = str(Path(folder) / f"{exported.controller.name}.c")
+    probe = Path(folder) / _PROBE
+    source = str(probe if probe.exists() else Path(folder) / f"{exported.controller.name}.c")
     command = [found, *FLAGS, "-shared", "-fPIC", source, "-o", target, "-lm"]
     try:
         done = subprocess.run(  # noqa: S603 - a compiler of PATH, and the bytes that export wrote

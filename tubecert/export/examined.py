@@ -21,7 +21,9 @@ from tubecert.export.compiled import compiled, compiler
 from tubecert.export.controller import controller_of, refused
 from tubecert.export.folder import Exported
 from tubecert.export.vectors import Vectors, vectors
+from tubecert.recheck.code.constants import entries, literals, miscompiled
 from tubecert.recheck.code.examination import Agreement, Allowed, examine
+from tubecert.recheck.code.reader import Code, read_code
 from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.controller import Column, answers
 
@@ -32,8 +34,9 @@ _PATIENCE: Final = 120  # s
 class Answers:
     """How far what code answers is from what recheck computes, at most, over `samples`.
 
-    `ran`: it was compiled and run; else its text was. `losses`: what rounding costs it, and what it may; empty where
-    the certificate is not about rounding, or the code is not C. `unread`: why the text was not followed.
+    `ran`: it was compiled and run; else its text was. `constants`: so many were read back from the object.
+    `losses`: what rounding costs it, and what it may; empty where the certificate is not about rounding, or the code is
+    not C. `unread`: why the text was not followed.
     """
 
     difference: float
@@ -41,6 +44,7 @@ class Answers:
     language: str
     precision: str
     ran: bool
+    constants: int = 0
     losses: tuple[Allowed, ...] = ()
     unread: str = ""
 
@@ -56,8 +60,10 @@ class Answers:
             yield f"by recheck's own bounds its rounding costs no more than is allowed for ({', '.join(parts)})"
         if self.unread:
             yield f"recheck did not follow its text: {self.unread}"
+        if self.constants:
+            yield f"{self.constants} constants were read back from the compiled object, to the bit"
         if not self.ran:
-            yield "it was not compiled, as there is no compiler here"
+            yield "there is no compiler here: it was not run, and no constants were read back from an object"
 
 
 def examined(folder: str, certificate: Certificate, text: str, name: str) -> Answers:
@@ -67,23 +73,21 @@ def examined(folder: str, certificate: Certificate, text: str, name: str) -> Ans
     y = np.array(own.y)
     y = y.astype(np.float32).astype(np.float64) if found.precision == "single" else y
     rows = [[Fraction(float(value)) for value in row] for row in y]
-    u = _answered(found, own, y)
-    read, unread = _read(found, text, name, rows, u)
+    code, unread = _code(found)
+    u, constants = _answered(found, own, y, code)
+    agreement = None
+    if code is not None:
+        try:
+            agreement = examine(text, name, code, rows, None if u is None else u.tolist())
+        except UnreadError as error:
+            unread = str(error)
     if u is not None:
         difference = _difference(u, answers(text, name, rows))
-    elif read is not None:
-        difference = read.difference
+    elif agreement is not None:
+        difference = agreement.difference
     else:
         raise undecided(f"the controller in {folder} was neither compiled nor followed: {unread}")
-    if not difference <= own.tolerance or (read is not None and not read.agrees):
-        raise contradicted(
-            f"the controller in {folder} differs by {difference:.3g} from what the certificate says it computes"
-        )
-    if read is not None and read.too_large:
-        raise undecided(
-            f"by recheck's bounds the controller in {folder} can lose more to rounding than the certificate "
-            f"allows for: {', '.join(own.name for own in read.too_large)}"
-        )
+    _require(difference <= own.tolerance, agreement, folder, difference)
     if unread and found.language == "c" and found.controller.lost is not None:
         raise undecided(f"recheck has no bound of what the controller in {folder} rounds: {unread}")
     return Answers(
@@ -92,33 +96,59 @@ def examined(folder: str, certificate: Certificate, text: str, name: str) -> Ans
         language=found.language,
         precision=found.precision,
         ran=u is not None,
-        losses=() if read is None else read.losses,
+        constants=constants,
+        losses=() if agreement is None else agreement.losses,
         unread=unread,
     )
 
 
-def _read(
-    found: Exported, text: str, name: str, rows: Sequence[Sequence[Fraction]], u: Array | None
-) -> tuple[Agreement | None, str]:
-    """What recheck says of the text of C, or why it says nothing."""
+def _require(near: bool, agreement: Agreement | None, folder: str, difference: float) -> None:
+    """Raises TC711 for another controller, or one that can lose more than is allowed for."""
+    if not near or (agreement is not None and not agreement.agrees):
+        raise contradicted(
+            f"the controller in {folder} differs by {difference:.3g} from what the certificate says it computes"
+        )
+    if agreement is None:
+        return
+    if agreement.otherwise:
+        raise contradicted(
+            f"the controller in {folder} has other numbers than the certificate: {', '.join(agreement.otherwise)}"
+        )
+    if agreement.too_large:
+        raise undecided(
+            f"by recheck's bounds the controller in {folder} can lose more to rounding than the certificate "
+            f"allows for: {', '.join(own.name for own in agreement.too_large)}"
+        )
+
+
+def _code(found: Exported) -> tuple[Code | None, str]:
+    """The text of C as recheck reads it, or why it does not."""
     if found.language == "python":
         return None, ""
     own = found.controller.name
-    files = found.files[f"{own}.h"], found.files[f"{own}.c"]
     try:
-        return examine(text, name, files, rows, None if u is None else u.tolist()), ""
+        return read_code(found.files[f"{own}.h"], found.files[f"{own}.c"]), ""
     except UnreadError as error:
         return None, str(error)
 
 
-def _answered(found: Exported, own: Vectors, y: Array) -> Array | None:
-    """What code answers to measurements; None where it would have to be compiled, and cannot."""
+def _answered(found: Exported, own: Vectors, y: Array, code: Code | None) -> tuple[Array | None, int]:
+    """What code answers to measurements, and how many constants were read back; None where it cannot be compiled."""
     if found.language == "python":
-        return _tested(found, own)
+        return _tested(found, own), 0
     if compiler() is None:
-        return None
-    with compiled(found) as code:
-        return np.concatenate([code.start(y[:1]), *(code.step(row[None]) for row in y)])
+        return None, 0
+    sizes = {} if code is None else {name: len(list(entries(table))) for name, table in code.tables.items()}
+    texts = () if code is None else literals(code)
+    with compiled(found, read=texts, tables=tuple(sizes)) as built:
+        if code is not None:
+            wrong = list(miscompiled(code, built.literals(texts), built.tables(sizes)))
+            if wrong:
+                raise contradicted(
+                    f"the compiled controller has other numbers than its source: {', '.join(wrong[:4])}"
+                )
+        u = np.concatenate([built.start(y[:1]), *(built.step(row[None]) for row in y)])
+    return u, len(texts) + sum(sizes.values())
 
 
 def _difference(u: Array, expected: Sequence[Column]) -> float:

@@ -14,8 +14,9 @@ from fractions import Fraction
 from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, exact, larger, magnitude, root
+from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.losses import About, lost_by
-from tubecert.recheck.code.reader import Code, read_code
+from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, known
 from tubecert.recheck.code.words import UnreadError
@@ -38,11 +39,15 @@ class Allowed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """How far the text is from the formulas, at most and of what it may be; `losses`, empty where none are covered."""
+    """How far the text is from the formulas, at most and of what it may be; `losses`, empty where none are covered.
+
+    `otherwise`: names of numbers that are not those of the certificate.
+    """
 
     difference: float
     share: float
     losses: tuple[Allowed, ...]
+    otherwise: tuple[str, ...] = ()
 
     @property
     def agrees(self) -> bool:
@@ -58,20 +63,24 @@ class Agreement:
 def examine(
     text: str,
     file: str,
-    files: tuple[str, str],
+    code: Code,
     measured: Sequence[Sequence[Fraction]],
     answered: Sequence[Sequence[float]] | None = None,
 ) -> Agreement:
-    """The code of a certificate, header and source; raises `CertificateError`, and `UnreadError` for other code.
+    """The code of a certificate; raises `CertificateError`, and `UnreadError` for what it does not follow.
 
     `answered` is what compiled code made of what was measured, if there is a compiler.
     """
     formulas = machine_of(text, file)
     with ctx.workprec(BITS):
-        code = read_code(*files)
         rows = [[exact(q) for q in row] for row in measured]
         difference, share = agreement(code, formulas, rows, answered)
-        return Agreement(difference=difference, share=share, losses=tuple(_losses(code, formulas)))
+        return Agreement(
+            difference=difference,
+            share=share,
+            losses=tuple(_losses(code, formulas)),
+            otherwise=tuple(otherwise(code, formulas)),
+        )
 
 
 def agreement(

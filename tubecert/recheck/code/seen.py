@@ -42,6 +42,16 @@ class Kind:
             raise UnreadError(f"{text} is too large for its type") from None
         return exact(Fraction(own))
 
+    def nearest_to(self, value: Fraction) -> Ball:
+        """The number nearest to an exact one."""
+        (near,) = struct.unpack(self.code, struct.pack(self.code, float(value)))
+        step = abs(Fraction(near)) * Fraction(1, 2**53 if self.code == "d" else 2**24)
+        around = (
+            struct.unpack(self.code, struct.pack(self.code, float(near + k * step)))[0]
+            for k in (-2, -1, 0, 1, 2)
+        )
+        return exact(min(map(Fraction, around), key=lambda own: abs(own - value)))
+
 
 KINDS = {
     "double": Kind(exact(Fraction(1, 2**53)), exact(Fraction(1, 2**1074)), arb(2) ** 1022, "d"),

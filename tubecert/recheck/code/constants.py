@@ -1,0 +1,115 @@
+"""The numbers of exported C: those that the certificate names, and what a compiler made of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+
+from tubecert.recheck.balls import exact
+from tubecert.recheck.code.reader import Code, Table
+from tubecert.recheck.code.seen import KINDS
+from tubecert.recheck.code.shape import ball_of, box_of, law_of
+from tubecert.recheck.code.tree import (
+    Assign,
+    Declare,
+    Do,
+    Expr,
+    Loop,
+    Number,
+    Return,
+    Statement,
+    Test,
+    parts,
+)
+from tubecert.recheck.controller import Machine
+
+
+def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
+    """Names of numbers that are not those of the certificate, to the bit."""
+    recipe, case, big = formulas.recipe, formulas.case, code.name.upper()
+    wanted = {"SAMPLE_TIME": recipe.sample_time, "DELAY": recipe.delay, "LEVEL": recipe.level}
+    if f"{big}_HORIZON" in code.macros and case.curve.horizon is not None:
+        wanted["HORIZON"] = case.curve.horizon
+    for name, value in wanted.items():
+        if not _is(code, code.macros.get(f"{big}_{name}"), value):
+            yield name
+    own, m = code.functions["estimator"], len(case.system.inputs)
+    box = box_of(own, m)
+    ends = [(Number(low), Number(high)) for low, high in box or ()]
+    if box is None:
+        if not _is(code, Number(ball_of(own, m)), recipe.clip_radius):
+            yield "the radius of the clip"
+    elif len(ends) != len(formulas.section.clip) or not all(
+        _is(code, low, a) and _is(code, high, b)
+        for (low, high), (a, b) in zip(ends, formulas.section.clip, strict=True)
+    ):
+        yield "the clip"
+    if recipe.losses is not None and not _is(
+        code, Number(law_of(code.functions["law"], m).gain), case.bound("feedback_gain")
+    ):
+        yield "the gain"
+
+
+def _is(code: Code, tree: Expr | None, value: Fraction) -> bool:
+    """Whether a number of the code is the one of its kind that is nearest to another one."""
+    if not isinstance(tree, Number):
+        return False
+    found, kind = KINDS[code.real].nearest(tree.text), KINDS[code.real]
+    return bool(found == kind.nearest_to(value))
+
+
+def literals(code: Code) -> tuple[str, ...]:
+    """Every number of the type that stands in a function or a macro, once, as it is written."""
+    found: dict[str, None] = {}
+    trees = list(code.macros.values())
+    for function in code.functions.values():
+        trees += _trees(function.body)
+    while trees:
+        tree = trees.pop()
+        if isinstance(tree, Number) and not tree.text.isdigit():
+            found[tree.text] = None
+        trees += parts(tree)
+    return tuple(sorted(found))
+
+
+def _trees(body: Sequence[Statement]) -> Iterator[Expr]:
+    for own in body:
+        match own:
+            case Declare(_, _, sizes, value):
+                yield from sizes
+                yield from () if value is None else (value,)
+            case Assign(target, value):
+                yield from (target, value)
+            case Loop(_, first, test, inner):
+                yield from (first, test, *_trees(inner))
+            case Test(test, yes, no):
+                yield from (test, *_trees(yes), *_trees(no))
+            case Return(value):
+                yield from () if value is None else (value,)
+            case Do(call):
+                yield call
+
+
+def entries(table: Table) -> Iterator[str]:
+    """The numbers of a table, in the order in which they lie in memory."""
+    if isinstance(table, str):
+        yield table
+    else:
+        for own in table:
+            yield from entries(own)
+
+
+def miscompiled(
+    code: Code, found: Mapping[str, float], tables: Mapping[str, Sequence[float]]
+) -> Iterator[str]:
+    """Numbers of which a compiler made others: literals, and entries of tables as they lie in the object."""
+    kind = KINDS[code.real]
+    for text in literals(code):
+        if text not in found or exact(Fraction(found[text])) != kind.nearest(text):
+            yield text
+    for name, table in code.tables.items():
+        wanted, own = list(entries(table)), tables.get(name, ())
+        if len(wanted) != len(own) or not all(
+            exact(Fraction(value)) == kind.nearest(text) for text, value in zip(wanted, own, strict=True)
+        ):
+            yield name
