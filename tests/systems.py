@@ -174,3 +174,20 @@ tube: {epsilon: 0.5, rho_a: 0.5}
 hardware: {rate: 200, noise: 0.001}
 conditions: {decides: H}
 """
+
+# any plan of the two-state system in a box
+FAMILY_TWO = """
+tubecert: 1
+name: any_plan
+system:
+  states: [x1, x2]
+  inputs: [u]
+  f: [-x1 + 2*x2, -0.25*x2**3 - 3*x1 + 4*x2]
+  B: [[0.5], [-2]]
+safe_set: {x1: [-6, 6], x2: [-6, 6]}
+uncertainty: {h: ["-2*sin(2*t) - 0.1*norm(x1, x2)"]}
+trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}
+initial_state: {within: 0.05}
+metric: {rate: 1.74, dual_metric: [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]}
+tube: {epsilon: 0.6, rho_a: 0.1}
+"""

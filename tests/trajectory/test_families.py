@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from proven import proven
 from rechecked import examine, failing, sealed
+from systems import FAMILY_TWO as FAMILY
 
 from tubecert import pipeline
 from tubecert.bounds.suprema import Suprema
@@ -25,21 +26,6 @@ from tubecert.trajectory.make import plan_of
 from tubecert.tube import Tube, containment
 from tubecert.verdict import Verdict
 
-FAMILY = """
-tubecert: 1
-name: any_plan
-system:
-  states: [x1, x2]
-  inputs: [u]
-  f: [-x1 + 2*x2, -0.25*x2**3 - 3*x1 + 4*x2]
-  B: [[0.5], [-2]]
-safe_set: {x1: [-6, 6], x2: [-6, 6]}
-uncertainty: {h: ["-2*sin(2*t) - 0.1*norm(x1, x2)"]}
-trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}
-initial_state: {within: 0.05}
-metric: {rate: 1.74, dual_metric: [["4.25828", "-0.93423"], ["-0.93423", "3.76692"]]}
-tube: {epsilon: 0.6, rho_a: 0.1}
-"""
 # a metric that moves, and two inputs: nothing is exact by luck
 BENT = """
 tubecert: 1

@@ -61,7 +61,7 @@ def _confusable(spec: Spec) -> Iterator[Finding]:
             what = {"t": "the time", "pi": "the number"}.get(word, "the function")
             yield _alike(spec, name, f"{name} is easily taken for {what} {word}")
     for first, second in combinations(names, 2):
-        if _folded(first) == _folded(second) and frozenset((first, second)) not in _CUSTOMARY:
+        if _folded(first) == _folded(second) and not _customary(first, second):
             yield _alike(spec, second, f"{second} is easily taken for {first}")
 
 
@@ -76,6 +76,11 @@ def _negative(spec: Spec) -> Iterator[Finding]:
                 location=spec.location(f"system.parameters.{name}"),
                 help="write its value, or another name if it is something else",
             )
+
+
+def _customary(first: str, second: str) -> bool:
+    """Whether two names are told apart by custom: m and M, l1 and I1."""
+    return first[1:] == second[1:] and frozenset((first[0], second[0])) in _CUSTOMARY
 
 
 def _folded(name: str) -> str:

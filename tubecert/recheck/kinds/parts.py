@@ -18,18 +18,17 @@ from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
 from tubecert.recheck.kinds.windows import (
     Windows,
     WindowSection,
+    above,
     claims_of_constants,
+    claims_of_inputs,
     claims_of_states,
     within_tube,
 )
 from tubecert.recheck.legs import Reached, Stay
 from tubecert.recheck.metric import stated
 from tubecert.recheck.specified.numbers import Range
-from tubecert.recheck.statements import NotNegative
-from tubecert.recheck.terms import number
 
 _MOST = 200
-_MORE = 1 + Fraction(1, 2**50)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +114,7 @@ class Parts(Windows):
         )
         for j, window in enumerate(self.windows, start=1):
             yield from claims_of_states(self, j, window)
-            yield from self._inputs(j, window, depends)
+            yield from claims_of_inputs(self, j, depends, lambda _, j=j: self._reach(j))  # type: ignore[misc]
 
     def _hold(self, margin: Enclosure | None) -> Outcome:
         if margin is None:
@@ -144,30 +143,10 @@ class Parts(Windows):
             )
             yield margin_at_least(1 - own.top / setting.reach, margin, "the distance")
 
-    def _inputs(self, j: int, window: WindowSection, depends: tuple[object, ...]) -> Iterator[Claim]:
-        ground = self.ground
-        inputs = ground.place.system.inputs
-        yield ground.claim(
-            f"{self.letter}: window {j}: every input has a range",
-            (window,),
-            lambda: stated(window.inputs.keys() == set(inputs), "they are of others"),
-        )
-        for i, name in enumerate(inputs):
-            own = window.inputs.get(name)
-            if own is not None:
-                yield ground.over_tube(
-                    f"{self.letter}: window {j}: {name} in [{float(own[0]):.6g}, {float(own[1]):.6g}]",
-                    (*depends, j, own, ground.depends),
-                    lambda i=i, own=own: self._in_range(j, i, own),  # type: ignore[misc]
-                )
-
-    def _in_range(self, j: int, i: int, own: Range) -> Outcome:
-        """u_i in [inf u*_i - du sup D - R_H, sup u*_i + du sup D + R_H] in a window."""
+    def _reach(self, j: int) -> tuple[Fraction, Fraction] | None:
+        """Du sup D + R_H, on either side."""
         found = self.reached()
         if found is None:
-            return stated(False, "the level is not proven")
-        added = Fraction(float(self._added(j - 1, found[j - 1]).upper())) * _MORE + self.radius
-        place = self.place(self.windows[j - 1])
-        u = place.curve.u[i]
-        rooms = (u - number(own[0] + added), number(own[1] - added) - u)
-        return all_of(place.along(lambda room=room: NotNegative(room, place.numbers)) for room in rooms)  # type: ignore[misc]
+            return None
+        added = above(self._added(j - 1, found[j - 1])) + self.radius
+        return added, added

@@ -262,7 +262,13 @@ def claims_of_levels(
     )
     for j, window in enumerate(windows, start=1):
         yield from claims_of_states(course, j, window)
-        yield from _inputs(course, j, recipe)
+        depends = (windows, course.clip, recipe)
+        yield from claims_of_inputs(
+            course,
+            j,
+            depends,
+            lambda i, j=j: _reach(course, j, recipe, i),  # type: ignore[misc]
+        )
 
 
 def _agrees(windows: Sequence[WindowSection], recipe: Digital) -> Outcome:
@@ -337,11 +343,16 @@ def _within(place: Place, state: int, width: Fraction, level: Fraction, lower: F
     return prove(NotNegative(square - place.system.W[state][state]), place.tube(), place.budget)
 
 
-def _inputs(course: Course, j: int, recipe: Digital) -> Iterator[Claim]:
+Reach = Callable[[int], tuple[Fraction, Fraction] | None]
+"""How far below and above u*_i input i may be in a window; None where the level is not proven."""
+
+
+def claims_of_inputs(course: Windows, j: int, depends: tuple[object, ...], reach: Reach) -> Iterator[Claim]:
+    """The ranges of the inputs in a window: u_i in [inf u*_i - below, sup u*_i + above]."""
     ground, window = course.ground, course.windows[j - 1]
     inputs = ground.place.system.inputs
     yield ground.claim(
-        f"H: window {j}: every input has a range",
+        f"{course.letter}: window {j}: every input has a range",
         (window,),
         lambda: stated(window.inputs.keys() == set(inputs), "they are of others"),
     )
@@ -349,24 +360,37 @@ def _inputs(course: Course, j: int, recipe: Digital) -> Iterator[Claim]:
         own = window.inputs.get(name)
         if own is not None:
             yield ground.over_tube(
-                f"H: window {j}: {name} in [{float(own[0]):.6g}, {float(own[1]):.6g}]",
-                (course.windows, course.clip, recipe, j, own, ground.depends),
-                lambda i=i, own=own: _in_range(course, j, i, own, recipe),  # type: ignore[misc]
+                f"{course.letter}: window {j}: {name} in [{float(own[0]):.6g}, {float(own[1]):.6g}]",
+                (*depends, j, own, ground.depends),
+                lambda i=i, own=own: _in_range(course, j, i, own, reach),  # type: ignore[misc]
             )
 
 
-def _in_range(course: Course, j: int, i: int, own: Range, recipe: Digital) -> Outcome:
-    """u_i in [inf u*_i - ups - kb - hi_i, sup u*_i + ups + kb - lo_i], by what acts in the window's pad."""
-    found = course.passed(recipe)
-    if found is None or i >= len(course.clip):
+def _in_range(course: Windows, j: int, i: int, own: Range, reach: Reach) -> Outcome:
+    found = reach(i)
+    if found is None:
         return stated(False, "the level is not proven")
-    low, high = course.clip[i]
-    loop = found[j - 1].loop
-    added = Fraction(float((loop.feedback + loop.feedforward).upper())) * _MORE
+    below, above = found
     place = course.place(course.windows[j - 1])
     u = place.curve.u[i]
-    rooms = (u - number(own[0] + added + high), number(own[1] - added + low) - u)
+    rooms = (u - number(own[0] + below), number(own[1] - above) - u)
     return all_of(place.along(lambda room=room: NotNegative(room, place.numbers)) for room in rooms)  # type: ignore[misc]
+
+
+def _reach(course: Course, j: int, recipe: Digital, i: int) -> tuple[Fraction, Fraction] | None:
+    """Ups + kb, and what h is clipped to, by what acts in the window's pad."""
+    found = course.passed(recipe)
+    if found is None or i >= len(course.clip):
+        return None
+    low, high = course.clip[i]
+    loop = found[j - 1].loop
+    added = above(loop.feedback + loop.feedforward)
+    return added + high, added - low
+
+
+def above(ball: Ball) -> Fraction:
+    """A number above a ball."""
+    return Fraction(float(ball.upper())) * _MORE
 
 
 def feedback(course: Course, recipe: Digital) -> Ball | None:
