@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -21,12 +22,13 @@ from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, suprem
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
-from tubecert.enclosure.objective import LeastInputGain, Lipschitz, Objective, SumOfNorms, size_of
+from tubecert.enclosure.objective import Kinks, LeastInputGain, Lipschitz, Objective, SumOfNorms, size_of
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
 from tubecert.expression import (
     ONE,
     ZERO,
     Expression,
+    constant,
     derivatives,
     free_symbols,
     rebuild,
@@ -34,6 +36,7 @@ from tubecert.expression import (
     symbol,
     topological,
 )
+from tubecert.expression import sqrt as sqrt_of
 from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.progress import Progress
@@ -46,6 +49,7 @@ _FEW = 20_000  # boxes
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
 _WORTH = 30_000  # boxes after which such a constant stays as it is
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
+_SIGNS = 4  # absolute values of which all branches are looked at
 _COARSE, _ROUGH = 0.1, 1e-2  # from that gap on the metric, too, need not be known sharply
 Spent = Callable[[str, int], None]
 
@@ -416,4 +420,28 @@ def _lipschitz(h: tuple[Expression, ...], fields: Fields) -> Lipschitz:
     for depth, entries in enumerate([*arguments, tuple(plain[e] for e in h)]):
         gains = [substituted(column(derivatives(entries, name)), back) for name in names[:depth]]
         levels.append((fields.by_state(substituted(jacobian(entries, states), back)), gains))
-    return Lipschitz(fields.by_state(jacobian(h, states)), levels)
+    return Lipschitz(fields.by_state(jacobian(h, states)), levels, _kinks(h, fields))
+
+
+def _kinks(h: tuple[Expression, ...], fields: Fields) -> Kinks | None:
+    """The branches of an h with a few absolute values; None where it has none, or many."""
+    signs: dict[str, Expression] = {}
+    plain: dict[Expression, Expression] = {}
+    for node in topological(h):
+        args = tuple(plain[arg] for arg in node.args)
+        if node.op == "norm" and len(args) == 1:
+            name = f"sign#{len(signs)}"
+            signs[name] = node.args[0]
+            plain[node] = symbol(name) * args[0]
+        elif node.op == "norm":  # as a root it may be differentiated more than once where it is not 0
+            plain[node] = sqrt_of(sum((arg * arg for arg in args), start=ZERO))
+        else:
+            plain[node] = node if args == node.args else rebuild(node, args)
+    if not 0 < len(signs) <= _SIGNS:
+        return None
+    slopes = fields.by_state(jacobian(tuple(plain[e] for e in h), fields.states))
+    every = {
+        chosen: substituted(slopes, dict(zip(signs, map(constant, map(Fraction, chosen)), strict=True)))
+        for chosen in product((1, -1), repeat=len(signs))
+    }
+    return Kinks(arguments=column(list(signs.values())), branches=every)

@@ -5,7 +5,7 @@ Everything here is rigorous except `Estimate.corner`, `caused` and `spread`, whi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -85,34 +85,106 @@ class SumOfNorms:
         return np.asarray(total * (1 - 1e-14))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kinks:
+    """Where an h with absolute values |a_k| has kinks: `arguments` a, (K, 1), and its Jacobian for choices of signs.
+
+    In `branches` every |a_k| is s_k a_k, s in {-1, 1}^K.
+    """
+
+    arguments: Matrix
+    branches: Mapping[tuple[int, ...], Matrix]
+
+
+class _Branches:
+    """|dh/dx| branch by branch: smooth, so that its bound is as close as the square of a box is small.
+
+    Only the branches that there are on a part of the box that is not flat count: a Lipschitz constant is that of almost
+    every point. (Where a_k vanishes on more than that, its slope does, too, and either sign is right.)
+    """
+
+    def __init__(self, kinks: Kinks) -> None:
+        self._arguments = MatrixFunction([kinks.arguments])
+        self._norms = [(signs, SumOfNorms([own])) for signs, own in kinks.branches.items()]
+        used = {*self._arguments.variables}.union(*(norm.variables for _, norm in self._norms))
+        self.variables = tuple(sorted(used))
+
+    def upper(self, variables: tuple[str, ...], lo: Array, hi: Array, target: float) -> Estimate:
+        """The largest branch of every box; corners are centres, as the Jacobian is not known on a kink."""
+        value, caused, spread = np.zeros(len(lo)), np.zeros(lo.shape), np.zeros(lo.shape)
+        columns = np.array([variables.index(v) for v in self._arguments.variables], dtype=np.intp)
+        (inside,) = self._arguments.at(lo[:, columns], hi[:, columns])
+        low, high = inside.lo[:, :, 0], inside.hi[:, :, 0]
+        known = ~(np.isnan(low) | np.isnan(high))
+        there = {
+            1: (high > 0) | (low >= 0) | ~known,
+            -1: (low < 0) | (high <= 0) | ~known,
+        }
+        for signs, norm in self._norms:
+            rows = np.flatnonzero(np.all([there[s][:, k] for k, s in enumerate(signs)], axis=0))
+            if not len(rows):
+                continue
+            columns = np.array([variables.index(v) for v in norm.variables], dtype=np.intp)
+            own = norm.upper(lo[rows][:, columns], hi[rows][:, columns], target)
+            larger = ~(own.upper <= value[rows])
+            value[rows[larger]] = own.upper[larger]
+            caused[np.ix_(rows[larger], columns)] = own.caused[larger]
+            spread[np.ix_(rows[larger], columns)] = own.spread[larger]
+        return Estimate(value, 0.5 * (lo + hi), caused, spread)
+
+
 class Lipschitz:
     """|dh/dx| for an h with norms in it: the norm of the generalised Jacobian.
 
     Beside the natural extension of the Jacobian, a structural bound is used that stays tight where a norm vanishes.
     Level k is (J_k, [G_k1, ...]): the Jacobian of the arguments of the k-th norm with the norms before it held fixed,
     and its derivatives by those norms; the last level is h itself. A norm is 1-Lipschitz in its arguments, so
-    L_k = |J_k| + sum_j |G_kj| L_j bounds the Lipschitz constant of level k.
+    L_k = |J_k| + sum_j |G_kj| L_j bounds the Lipschitz constant of level k. With `kinks` there is a third bound.
     """
 
-    def __init__(self, jacobian: Matrix, levels: Sequence[tuple[Matrix, Sequence[Matrix]]]) -> None:
+    def __init__(
+        self,
+        jacobian: Matrix,
+        levels: Sequence[tuple[Matrix, Sequence[Matrix]]],
+        kinks: Kinks | None = None,
+    ) -> None:
+        self._branches = None if kinks is None else _Branches(kinks)
         self._gains = [len(gains) for _, gains in levels]
         self._function = MatrixFunction([jacobian, *(m for own, gains in levels for m in (own, *gains))])
-        self.variables = self._function.variables
+        more = () if self._branches is None else self._branches.variables
+        self.variables = tuple(sorted({*self._function.variables, *more}))
+        self._columns = [self.variables.index(v) for v in self._function.variables]
 
     def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
-        """The smaller of the natural and the structural bound."""
-        natural, *rest = (spectral_norm(g).hi for g in self._function.at(lo, hi))
+        """The smallest of the natural bound, the structural one and that by branches."""
+        matrices = self._function.at(lo[:, self._columns], hi[:, self._columns])
+        natural, *rest = (spectral_norm(g).hi for g in matrices)
         bounds: list[Array] = []
         for count in self._gains:
             own, gains, rest = rest[0], rest[1 : 1 + count], rest[1 + count :]
             bounds.append(sum((g * b for g, b in zip(gains, bounds, strict=True)), start=own) * (1 + 1e-14))
         value = np.fmin(natural, bounds[-1])
         width = hi - lo
-        return Estimate(np.where(np.isnan(value), np.inf, value), 0.5 * (lo + hi), width, width)
+        whole = Estimate(np.where(np.isnan(value), np.inf, value), 0.5 * (lo + hi), width, width)
+        return whole if self._branches is None else self._closer(whole, self._branches, (lo, hi), target)
+
+    def _closer(
+        self, whole: Estimate, branches: _Branches, box: tuple[Array, Array], target: float
+    ) -> Estimate:
+        """The bound by branches, where it is the smaller one; there it is known what to split."""
+        own = branches.upper(self.variables, *box, target)
+        better = own.upper < whole.upper
+        by_branch = better[:, None] & (own.caused > 0).any(axis=1, keepdims=True)
+        return Estimate(
+            np.where(better, own.upper, whole.upper),
+            whole.corner,
+            np.where(by_branch, own.caused, whole.caused),
+            np.where(by_branch, own.spread, whole.spread),
+        )
 
     def lower(self, lo: Array, hi: Array) -> Array:
         """The norm of the Jacobian at points; where a norm vanishes its gradient is unknown, and so is the value."""
-        return spectral_norm(self._function.at(lo, hi)[0]).lo
+        return spectral_norm(self._function.at(lo[:, self._columns], hi[:, self._columns])[0]).lo
 
 
 class LeastInputGain:

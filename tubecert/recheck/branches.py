@@ -1,7 +1,7 @@
 """Norms of terms with absolute values: the terms are smooth for every choice of signs, abs(e) = s e.
 
 On a box the sign of e may be known, or both are examined. Where e changes its sign the one branch holds on the part of
-the box where s e >= 0: to prove it on the whole box is more than is needed. Almost everywhere the Jacobian is that of a
+the box where s e >= 0: to prove it on the whole box is more than is needed. If e is a variable, that part is a box. Almost everywhere the Jacobian is that of a
 branch, so a bound for all branches is a Lipschitz constant.
 """
 
@@ -44,6 +44,7 @@ class Signs:
         self.entries, signs = (list(roots), {}) if found is None else found
         self.names = tuple(signs)
         self._inner = Field(list(signs.values()))
+        self._bare = {name: str(e.value) for name, e in signs.items() if e.op == "symbol"}
         self.variables = self._inner.variables
 
     def values(self, chosen: Sequence[int]) -> Values:
@@ -54,6 +55,16 @@ class Signs:
         """Every choice that there is on a box in `variables`."""
         inside = self._inner.hull(box) if self.names else []
         return map(self.values, product(*map(_possible, inside)))
+
+    def part(self, variables: Sequence[str], box: Box, values: Values) -> Box:
+        """The part of a box in `variables` where the chosen signs are those of variables."""
+        found = list(box)
+        for name, variable_ in self._bare.items():
+            if variable_ in variables:
+                i = variables.index(variable_)
+                lo, hi = found[i]
+                found[i] = (max(lo, 0.0), hi) if values[name] > 0 else (lo, min(hi, 0.0))
+        return found
 
     def at(self, point: Sequence[Ball]) -> Values | None:
         """The one at a point; None if a sign is not known."""
@@ -104,7 +115,8 @@ class BranchesBelow:
         """Every branch that there is on the box."""
         own = [box[i] for i in self._columns]
         for values in self._signs.over([box[i] for i in self._signed]):
-            found = self._test.with_values(values).over(own)
+            part = self._signs.part(self._test.variables, own, values)
+            found = self._test.with_values(values).over(part)
             if not found.proven:
                 wide = [hi - lo for lo, hi in box]
                 caused, spread = list(wide), list(wide)

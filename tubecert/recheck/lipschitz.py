@@ -73,7 +73,8 @@ class LipschitzBelow:
         """Every branch that there is on the box: the smaller of the two bounds."""
         own = [box[i] for i in self._columns]
         for signs in self._signs.over([box[i] for i in self._signed]):
-            found = self._direct.with_values(signs).over(own)
+            part = self._signs.part(self._direct.variables, own, signs)
+            found = self._direct.with_values(signs).over(part)
             if not found.proven and not self._by_levels(box, signs):
                 return self._widened(found, box)
         return Found(True)
