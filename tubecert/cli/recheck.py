@@ -27,12 +27,14 @@ class Given:
     spec: str | None
     controller: str | None
     budget: str | None
+    deadline: str | None
 
 
 def run(given: Given, output: Output) -> ExitCode:
     """Recheck a certificate; with a specification, also whether it belongs to it, with a folder its controller."""
     numbers = Numbers()
     budget = numbers.count("--budget", given.budget)
+    seconds = numbers.positive("--deadline", given.deadline)
     numbers.check()
     name = given.certificate
     text = text_of(name)
@@ -44,7 +46,8 @@ def run(given: Given, output: Output) -> ExitCode:
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
         report = None if show is None else told(show)
-        found = recheck(text, name, BUDGET if budget is None else budget, report)
+        most, limit = BUDGET if budget is None else budget, None if seconds is None else float(seconds)
+        found = recheck(text, name, most, report, seconds=limit)
     notes = {"specification": note, "controller": code}
     shown = _as_json(found, name, notes) if output.json else _as_text(found, name, notes, output)
     write_stdout(shown)

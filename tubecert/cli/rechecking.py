@@ -48,12 +48,18 @@ def recheck(
         str | None,
         typer.Option(metavar="NUMBER", help="Boxes examined per claim before giving up.  [200000]"),
     ] = None,
+    deadline: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Seconds after which what is not proven is undecided."),
+    ] = None,
     how: Output,
 ) -> None:
     """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
     with guarded(how):
         from tubecert.cli.recheck import Given, run
 
-        given = Given(certificate=certificate, spec=spec, controller=controller, budget=budget)
+        given = Given(
+            certificate=certificate, spec=spec, controller=controller, budget=budget, deadline=deadline
+        )
         code = run(given, how)
     raise typer.Exit(code)

@@ -10,7 +10,7 @@ from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
-from tubecert.library.plain import number_texts
+from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import File
 from tubecert.progress import Phase, Progress, Step
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
@@ -63,14 +63,20 @@ class Rechecked:
 
 
 def recheck(
-    result: Certification | File, *, budget: int | None = None, progress: Progress | None = None
+    result: Certification | File,
+    *,
+    budget: int | None = None,
+    deadline: Number | None = None,
+    progress: Progress | None = None,
 ) -> Rechecked:
     """Examines every claim of a certificate, or of the file of one, in ball arithmetic and without a solver.
 
-    `budget`: boxes per claim before giving up. Raises `TubecertError` for what is no certificate.
+    `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided.
+    Raises `TubecertError` for what is no certificate.
     """
     numbers = Numbers()
-    most = numbers.count("budget", number_texts(budget=budget)["budget"])
+    given = number_texts(budget=budget, deadline=deadline)
+    most, seconds = numbers.count("budget", given["budget"]), numbers.positive("deadline", given["deadline"])
     numbers.check()
     if isinstance(result, Certification):
         text, name = result.text, result.name
@@ -79,7 +85,9 @@ def recheck(
         text = text_of(name)
     shown = timed(progress)
     report = None if shown is None else told(shown)
-    return Rechecked(found=examined(text, name, BUDGET if most is None else most, report), name=name)
+    limit = None if seconds is None else float(seconds)
+    found = examined(text, name, BUDGET if most is None else most, report, seconds=limit)
+    return Rechecked(found=found, name=name)
 
 
 def text_of(name: str) -> str:

@@ -1,8 +1,8 @@
 """Norms of terms with absolute values: the terms are smooth for every choice of signs, abs(e) = s e.
 
 On a box the sign of e may be known, or both are examined. Where e changes its sign the one branch holds on the part of
-the box where s e >= 0: to prove it on the whole box is more than is needed. If e is a variable, that part is a box. Almost everywhere the Jacobian is that of a
-branch, so a bound for all branches is a Lipschitz constant.
+the box where s e >= 0: if e is a variable, that part is a box; else to prove it on the whole box is more than needed.
+Almost everywhere the Jacobian is that of a branch, so a bound for all branches is a Lipschitz constant.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
 from tubecert.recheck.certificate import Certificate, read_certificate
 from tubecert.recheck.claims import Case, of_certified, of_every
+from tubecert.recheck.clock import time_is_up, within
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import read
 from tubecert.recheck.examination import Claim, Memory
@@ -18,6 +19,7 @@ from tubecert.recheck.orientation import NOT_EXAMINED
 BUDGET = 200_000
 Report = Callable[[str, int, int], None]  # the claim that is examined now, how many are done, of how many
 
+_TOO_LATE = Outcome(verdict="undecided", why="not examined: the time was up")
 _CODES = {
     "confirmed": ExitCode.CERTIFIED,
     "contradicted": ExitCode.NOT_CERTIFIED,
@@ -71,21 +73,25 @@ def recheck(
     report: Report | None = None,
     memory: Memory | None = None,
     *,
+    seconds: float | None = None,
     to_first_failure: bool = False,
 ) -> Recheck:
     """Examine every claim of the certificate `text`; raises `CertificateError` for what is no certificate.
 
-    `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed.
+    `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed. What
+    is not proven after so many `seconds` is undecided, and nothing of that is kept.
     """
     certificate = read_certificate(read(text, file))
     found: list[Examined] = []
-    claims = tuple(_claims(certificate, budget))
-    for claim in claims:
-        if report is not None:
-            report(claim.name, len(found), len(claims))
-        found.append(Examined(claim.name, claim.outcome(memory)))
-        if to_first_failure and not found[-1].outcome.holds:
-            break
+    kept = memory if seconds is None else None
+    with within(seconds):
+        claims = tuple(_claims(certificate, budget))
+        for claim in claims:
+            if report is not None:
+                report(claim.name, len(found), len(claims))
+            found.append(Examined(claim.name, _TOO_LATE if time_is_up() else claim.outcome(kept)))
+            if to_first_failure and not found[-1].outcome.holds:
+                break
     return Recheck(
         stated=certificate.result.verdict,
         hash=certificate.stated_hash,
