@@ -111,12 +111,13 @@ def _known(values: Array) -> Array:
 def _spread(points: Array, values: Array, region: Region, count: int, distance: float) -> list[int]:
     """Indices of the best points that keep a distance (in widths of the box, over all variables) from better ones."""
     width = np.where(region.hi > region.lo, region.hi - region.lo, 1.0)
-    scaled = points / width
     order = np.argsort(-values, kind="stable")[: 20 * count]
+    scaled = (points / width)[order]
     chosen: list[int] = []
-    for i in order:
-        if all(np.abs(scaled[i] - scaled[j]).max() > distance for j in chosen):
-            chosen.append(int(i))
-            if len(chosen) == count:
-                break
+    apart = np.ones(len(order), dtype=bool)
+    while len(chosen) < count and apart.any():
+        i = int(apart.argmax())
+        chosen.append(int(order[i]))
+        apart &= np.abs(scaled - scaled[i]).max(axis=1) > distance
+        apart[i] = False
     return chosen
