@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import types
 from functools import cache
 from pathlib import Path
 
@@ -211,6 +212,32 @@ def test_the_self_test_meets_a_mutation(what, tmp_path):
     done = built(tmp_path)
     assert done.returncode == 0, done.stderr
     assert self_tested(tmp_path).returncode == 1
+
+
+# the same of the module in Python
+IN_PYTHON = {
+    "sign": (r"        -\(\(r6 / r8", "        ((r6 / r8"),
+    "rate": (r"500\.0", "499.0"),
+    "index": (r"r0 = y\[0\] - xs\[0\]", "r0 = y[1] - xs[0]"),
+    "choice": (r"r3 if r3 < 1\.9", "r3 if r3 > 1.9"),
+    "clip": (r"else \(-2\.0\)", "else (-2.01)"),
+    "delay": (r"0\.75 \* held", "0.74 * held"),
+    "memory": (r"self\.before = self\.held\n        self\.held", "self.held"),
+    "filter": (r"0\.14094299744758143", "0.14"),
+    "plan": (r"0\.838501394978079 \* r1", "0.8385 * r1"),
+    "sample": (r"self\.sample \+= 1", "self.sample += 2"),
+}
+
+
+@pytest.mark.parametrize("what", sorted(IN_PYTHON))
+def test_the_self_test_in_python_meets_a_mutation(what):
+    text = exported(controllers.orbit(), "python").files["hardware_orbit.py"]
+    changed, count = re.subn(*IN_PYTHON[what], text, count=1)
+    assert count == 1
+    module = types.ModuleType("changed")
+    exec(changed, module.__dict__)
+    with pytest.raises(ValueError, match="self-test"):
+        module.self_test()
 
 
 def test_the_vectors_meet_every_branch(controller):

@@ -8,10 +8,11 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from controllers import GIVEN, KNOTS, PATH, machine, recipe
+from controllers import GIVEN, KNOTS, PATH, machine, recipe, wandering
 
 from tubecert.conditions.hardware import Rounding
 from tubecert.errors import TubecertError
+from tubecert.export.compiled import compiled, compiler
 from tubecert.export.controller import assembled
 from tubecert.export.folder import exported
 from tubecert.export.program import GREATEST, LEAST, Program
@@ -144,6 +145,50 @@ def test_the_estimate_loses_no_more_than_is_said(precision, real):
             th = 1 - mpmath.exp(-mpmath.mpf("75.96") / 500)
             worst = max(worst, abs(mpmath.mpf(float(new[0, 0])) - exact[0]) / th)
     assert 0.001 * float(bound.estimate) < worst <= float(bound.estimate)
+
+
+def set_to(code, **rows):
+    """What a compiled controller keeps, as it is wanted."""
+    for name, row in rows.items():
+        getattr(code._states[0], name)[:] = [float(value) for value in row]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on PATH")
+@pytest.mark.slow
+def test_the_float_build_stays_within_what_is_accounted_for_at_every_sample():
+    """Float and double, compiled, side by side from the same memory: what each sample loses against r_a, r_u, r_q."""
+    c = controller(held=True)
+    r, fine = rounding_of(c, "single"), rounding_of(c, "double")
+    lost = {name: float(getattr(r, name) + getattr(fine, name)) for name in ("feedback", "input", "estimate")}
+    measured = wandering(c, 40, 1, 7)[:, 0].astype(np.float32)
+    low, high = (float(end) for end in GIVEN["held_orbit"].clip[0])
+    worst = dict.fromkeys(lost, 0.0)
+    with compiled(exported(c, precision="single")) as single, compiled(exported(c)) as double:
+        single.start(measured[:1]), double.start(measured[:1])
+        for k, y in enumerate(measured):
+            one, two = single._states[0], double._states[0]
+            set_to(double, **{name: getattr(one, name) for name in ("q", "feedback", "held", "before")})
+            single.step(y[None]), double.step(y[None])
+            assert one.sample == two.sample == k + 1
+            q_off = abs(one.q[0] - two.q[0]) / float(c.share)
+            plan, own = exactly(c.plan, [mpmath.mpf(k) / 500]), [float(q) for q in y]
+            v = exactly(c.flow, plan["x"], plan["u"])["v"]
+            exact = exactly(c.law, own, exactly(c.drift, own)["f"], plan["x"], v, plan["u"])
+            square, half, _ = map(float, exact["told"])
+            kappa, limit = one.feedback[0] - float(plan["u"][0]), float(DU) * np.sqrt(square)
+            beyond = max(0.0, abs(kappa) - limit)
+            written = abs(one.held[0] - (one.feedback[0] - min(max(one.q[0], low), high) * (k > 0)))
+            size = abs(float(exact["c"][0]))
+            assert half + float(exact["c"][0]) * kappa <= lost["feedback"] + size * lost["input"]
+            assert beyond + written <= 2 * lost["input"]
+            assert q_off <= lost["estimate"]
+            worst = {
+                "feedback": max(worst["feedback"], half + float(exact["c"][0]) * kappa),
+                "input": max(worst["input"], beyond + written),
+                "estimate": max(worst["estimate"], q_off),
+            }
+    assert worst["estimate"] > 1e-4 * lost["estimate"]
+    assert worst["input"] > 1e-5 * lost["input"]
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])

@@ -11,18 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root
+from tubecert.recheck.code.pieces import jumps, steepest, tables_of
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Counter, Machine, Own, State, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, Seen, known
 from tubecert.recheck.code.shape import ball_of, box_of, law_of
 from tubecert.recheck.code.stations import Station, stations
 from tubecert.recheck.code.words import UnreadError
-from tubecert.recheck.curve import CLOCK, Curve, Part
+from tubecert.recheck.curve import CLOCK, Curve
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Term, slopes
 
@@ -91,7 +91,7 @@ class _Analysis:
         self.rounded = Rounded(self.kind, apart=("y", "xs"), widths=sides)
         self.law = law_of(code.functions["law"], self.m)
         self.stations = stations(about.curve, about.sample_time)
-        self.tables = self._tables()
+        self.tables = tables_of(code, about.curve)
         if about.curve.horizon is not None and about.curve.horizon / about.sample_time >= _MOST_SAMPLES:
             raise UnreadError("a plan of more samples than the code counts has no bound here")
 
@@ -118,24 +118,6 @@ class _Analysis:
     def plans(self) -> list[tuple[Numbers, Numbers]]:
         """x* and u* at the samples of every station."""
         return [self._plan(station) for station in self.stations]
-
-    def _tables(self) -> dict[str, Vector]:
-        """The numbers that those of a plan through knots stand for, with what these are off."""
-        if "START" not in self.code.tables:
-            return {}
-        parts, plain = self.of.curve.parts, Machine(self.code, Rounded(self.kind, stands=False, rounds=False))
-        own = {name: plain.within_tables(name) for name in self.code.tables}
-        # which piece is found depends on nothing but the knots that are not later
-        if [plain.call("piece", begin) for begin in own["START"]] != list(range(len(own["START"]))):
-            raise UnreadError("the pieces of the plan are not those of their times")
-        if set(own) != {"START", "X", "U"} or any(len(table) < len(parts) for table in own.values()):
-            raise UnreadError("the tables of the plan are of another one")
-        begun = [_meant(v, part.start) for v, part in zip(own["START"], parts, strict=False)]
-        return {
-            "START": list[Value](begun),
-            "X": _coefficients(own["X"], "x", parts),
-            "U": _coefficients(own["U"], "u", parts),
-        }
 
     def _time(self, station: Station) -> Counter:
         """The number of a sample in a station, and of those before."""
@@ -164,32 +146,13 @@ class _Analysis:
         off = off + _greatest([own.error for own in numbers(self.tables["START"])])
         if not off < station.beside:
             raise UnreadError("times have no digit that is right")
-        slack = [2 * off * steep + jump for steep, jump in zip(self._steepest, self._jumps, strict=True)]
+        slack = [2 * off * steep + jump for steep, jump in self._apart]
         return _slackened(x, slack[: self.n]), _slackened(u, slack[self.n :])
 
     @cached_property
-    def _steepest(self) -> list[Ball]:
-        """|x*'| and |u*'| on all parts, and a little beyond their ends."""
-        curve, beside = self.of.curve, self.stations[0].beside
-        terms = slopes([*curve.x, *curve.u], CLOCK)
-        found = [arb(0)] * len(terms)
-        for part in curve.parts:
-            own = Program(terms, (CLOCK, *part.values))
-            values = own.run([between(-beside, part.length + beside), *part.values.values()])
-            found = [larger(a, magnitude(b)) for a, b in zip(found, values, strict=True)]
-        return found
-
-    @cached_property
-    def _jumps(self) -> list[Ball]:
-        """How far x* and u* jump at a knot."""
+    def _apart(self) -> list[tuple[Ball, Ball]]:
         curve = self.of.curve
-        terms = [*curve.x, *curve.u]
-        found = [arb(0)] * len(terms)
-        for last, part in pairwise(curve.parts):
-            ends = Program(terms, (CLOCK, *last.values)).run([last.length, *last.values.values()])
-            begins = Program(terms, (CLOCK, *part.values)).run([arb(0), *part.values.values()])
-            found = [larger(a, magnitude(p - q)) for a, p, q in zip(found, ends, begins, strict=True)]
-        return found
+        return list(zip(steepest(curve, self.stations[0].beside), jumps(curve), strict=True))
 
     def _known(self, station: Station) -> dict[str, Own]:
         """What is known of a station: its piece, and where times near knots matter what is on the plan."""
@@ -395,25 +358,6 @@ def _near(found: Sequence[Seen], side: Ball) -> Seen:
     for own in found[1:]:
         whole = whole.union(own.value)
     return known(whole + _around(side))
-
-
-def _meant(found: Value, own: Ball) -> Seen:
-    (number,) = numbers([found])
-    return Seen(own, magnitude(number.value - own))
-
-
-def _coefficients(table: Vector, letter: str, parts: Sequence[Part]) -> Vector:
-    """Those of every part, each with what its number in the table is off."""
-    found: Vector = []
-    for rows, part in zip(table, parts, strict=False):
-        own: Vector = []
-        for i, row in enumerate(_list(rows)):
-            names = [f"{letter}{i}#{k}" for k in range(len(_list(row)) + 1)]
-            if names.pop() in part.values or not part.values.keys() >= set(names):
-                raise UnreadError("the pieces of the plan have other powers")
-            own.append([_meant(c, part.values[name]) for c, name in zip(_list(row), names, strict=True)])
-        found.append(own)
-    return found
 
 
 def _list(value: Value) -> Vector:
