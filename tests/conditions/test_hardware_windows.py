@@ -17,6 +17,7 @@ from tubecert.conditions.machine import Window
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import Proof, check
+from tubecert.search.along import propose_in_windows
 
 F = Fraction
 HORIZON = F(3)
@@ -332,6 +333,26 @@ def test_a_radius_of_its_own_limits_the_level():
     narrow = replace(c, radius=c.radius / 5)
     problem = replace(good, machine=replace(good.machine, windows=(a, b, narrow)))
     assert not isinstance(check(problem, recipe({}, {}, {})), Proof)
+
+
+def test_the_search_looks_below_the_level_of_the_whole_tube():
+    """Where the metric is larger in the windows levels could be higher there, but none is proven above dbar.
+
+    Costs grow faster than levels here: from the highest levels of the windows the search would find none that serve.
+    """
+    factors = [
+        {**each, "feedback_curvature": 370, "feedback_slope": 10 * each["feedback_slope"]} for each in FACTORS
+    ]
+    problem = cut(alive_machine(), *factors)
+    larger = Constant(below=100.0, above=100.0)
+    assert problem.constants.lower.above < 1
+    windows = tuple(
+        replace(own, constants=replace(own.constants, lower=larger)) for own in problem.machine.windows
+    )
+    problem = replace(problem, machine=replace(problem.machine, windows=windows))
+    found = propose_in_windows(problem, problem.machine).decisive
+    assert isinstance(check(problem, found), Proof)
+    assert float(found.level) < 0.5 < problem.constants.lower.below**0.5 * float(problem.rho) < 1
 
 
 def test_what_is_told_of_each_window():

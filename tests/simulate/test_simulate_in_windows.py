@@ -30,7 +30,7 @@ def test_no_run_leaves_the_level_of_its_window():
     loop = loop_of(setting, "hardware", Choice())
     sample = monte_carlo(setting, loop, 8, 1)
     assert sample is not None
-    met = by_window(loop, [sample.runs])
+    met = by_window(loop, sample.runs)
     assert len(met) == 3
     assert 0 < min(met) <= max(met) < 1
     found = compare(setting, sample.runs, loop.promise)

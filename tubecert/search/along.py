@@ -14,13 +14,14 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array, maximum, quiet
-from tubecert.conditions.decimals import round_up
+from tubecert.conditions.decimals import round_down, round_up
 from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, WindowProof
 from tubecert.conditions.hardware.course import ages_of_feedback, base_of, resumed
 from tubecert.conditions.hardware.estimation import Past, estimate
 from tubecert.conditions.hardware.evaluation import Evaluated
 from tubecert.conditions.hardware.windows import InWindow, Span, arrival, closed, entered, first, over
 from tubecert.conditions.machine import Machine
+from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.search.hardware import setting_at
@@ -56,6 +57,8 @@ class WindowSearch:
         self.searches = [
             Search(each, each.machine) for w in machine.windows if (each := over(problem, w)).machine
         ]
+        # what is told of the whole tube rests on d < dbar there, however large a is in a window
+        self.cap = float(reach(problem.proven()).lo)
         self.setting = setting_at(problem, machine, Fraction(1))
         pad = 2 * max(self.setting.sample_time, self.setting.feedback_time) + self.setting.delay
         self.spans = [
@@ -130,7 +133,7 @@ class WindowSearch:
         """The least levels that are found, lane by lane."""
         ends = np.array([s.dbar for s in self.searches])[:, None]
         noisy = np.stack([x.at.estimate.n_fb for x in self.evaluated(at, ends + 0 * at.Ts)])
-        dhat = np.maximum(np.minimum(ends, ends - noisy), 1e-9 * ends)
+        dhat = np.maximum(np.minimum(self.cap, ends - noisy), 1e-9 * ends)
         for _ in range(_ROUNDS):
             found = self.evaluated(at, dhat)
             needed = np.stack([x.supremum for x in found])
@@ -213,7 +216,8 @@ class WindowSearch:
     ) -> HardwareRecipe | None:
         at = self.setting.lanes()
         omega = 2 * DEADBEAT / at.Ts if bandwidth is None else np.array([float(bandwidth)])
-        exact = [round_up(float(x) * (1 + room), _DIGITS) for x in levels.dhat[:, lane]]
+        cap = round_down(self.cap * (1 - 1e-12), 13)
+        exact = [min(cap, round_up(float(x) * (1 + room), _DIGITS)) for x in levels.dhat[:, lane]]
         ends = [s.dbar for s in self.searches]
         dhat = np.minimum(np.array([float(x) for x in exact]), ends)[:, None]
         found = self.evaluated(replace(at, omega=omega), dhat)

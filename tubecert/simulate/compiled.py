@@ -43,6 +43,14 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
+def folded(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same, made a part of each kernel that calls it, which should be one or two.
+
+    A call passes every member of every tuple, hundreds of words, which costs more than most of these functions do.
+    """
+    return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+
+
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function compiled when first called from Python; it runs without the GIL."""
     return _kernel(function, nogil=True, no_cfunc_wrapper=True)

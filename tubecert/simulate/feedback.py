@@ -17,7 +17,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.expression import ZERO, Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel
-from tubecert.simulate.compiled import compiled
+from tubecert.simulate.compiled import compiled, folded
 from tubecert.simulate.geodesic import FOUND, Curve, Metric, connect, metric
 from tubecert.simulate.problem import Beside, Disturbance
 from tubecert.simulate.program import Program, assemble, execute
@@ -151,7 +151,7 @@ def _dense(part: Array) -> Array:
     return np.ascontiguousarray(part, dtype=float)
 
 
-@compiled
+@folded
 def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point) -> tuple[int, float]:
     """(status, d(x*, x)^2) at a moment; f, B, h, k and the wind go into `point`.
 
@@ -206,7 +206,7 @@ def model(program: Program, t: float, x: Array, memory: Array, found: Model) -> 
             found.B[i, j] = memory[program.outputs[n + i * m + j]]
 
 
-@compiled
+@folded
 def _feedback(decay: float, plan: Reference, model: Model, point: Point) -> int:
     """k of (0.5) at the end of the geodesic; `decay` is lambda E."""
     f, B, push, k = model.f, model.B, point.push, point.k
@@ -230,7 +230,7 @@ def _feedback(decay: float, plan: Reference, model: Model, point: Point) -> int:
     return INFEASIBLE if reach == 0.0 and phi_0 > _ROUNDING * size else FOUND
 
 
-@compiled
+@folded
 def _disturb(force: Force, now: Moment, point: Point) -> None:
     """Adds the lane's waves, push and signal to its base h, and keeps that in its set (`problem.Disturbance`)."""
     h, lane = point.h, now.lane
@@ -250,7 +250,7 @@ def _disturb(force: Force, now: Moment, point: Point) -> None:
     clip(h, force.radius[lane])
 
 
-@compiled
+@folded
 def _blow(force: Force, now: Moment, point: Point) -> None:
     """E w: a wave in time, of full size but for its changes of sign, in a direction that aims (`problem.Beside`)."""
     own, lane, w, wind, B = force.beside, now.lane, point.w, point.wind, point.plant.B

@@ -18,7 +18,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.expression import free_symbols
 from tubecert.expression.matrix import Matrix, differentiate
 from tubecert.model import ControlAffineModel
-from tubecert.simulate.compiled import compiled, entry
+from tubecert.simulate.compiled import compiled, entry, folded
 from tubecert.simulate.program import Index, Program, assemble, execute
 from tubecert.simulate.small import copy, dot, factor, solve
 
@@ -157,7 +157,7 @@ def _weight(metric: Any, curve: Any, steps: int, x: Any) -> bool:
     return bool(factor(L, L))
 
 
-@compiled
+@folded
 def _straight(metric: Any, curve: Any, p: Any, q: Any) -> float:
     """The energy of the segment; nan where W is not positive definite."""
     n, total = p.shape[0], 0.0

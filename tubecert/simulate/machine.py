@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.compiled import compiled
+from tubecert.simulate.compiled import compiled, folded
 from tubecert.simulate.computer import explain
 from tubecert.simulate.feedback import model, steer
 from tubecert.simulate.geodesic import FOUND
@@ -99,7 +99,7 @@ def begin(force: Force, lane: int, work: Work) -> None:
     point.signal[1] = 0.0
 
 
-@compiled
+@folded
 def attend(machine: Machine | None, own: Lane, s: int, now: Moment, work: Work) -> int:
     """What happens at the start of a step: the older sample acts first, what was just measured after that."""
     status = FOUND
@@ -129,7 +129,7 @@ def attend(machine: Machine | None, own: Lane, s: int, now: Moment, work: Work) 
     return int(status)
 
 
-@compiled
+@folded
 def _turn(beside: Beside, now: Moment, work: Work) -> None:
     """From here the signal of the adversary moves along c, or along its direction."""
     lane, point, c = now.lane, work.point, work.notes.push
@@ -157,7 +157,7 @@ def decide(decided: Array, count: int, place: int, value: float) -> float:
     return float(decided[count, place])
 
 
-@compiled
+@folded
 def _measure(own: Lane, now: Moment, looks: bool, work: Work) -> int:
     """y = x + n, n of the lane's table and within its rate of the noise before."""
     beside, kept, lane, status = own.force.beside, work.notes, now.lane, FOUND
@@ -232,7 +232,7 @@ def _act(fast: Fast, work: Work) -> None:
         now.sigma_hat[j], now.u_a[j] = work.notes.estimate[j], -work.notes.estimate[j]
 
 
-@compiled
+@folded
 def _estimate(machine: Machine, own: Lane, count: int, now: Moment, work: Work) -> None:
     """(H.5) at sample `count`."""
     kept, seen, n = work.notes, work.point.seen, own.fast.at.n
@@ -256,7 +256,7 @@ def _estimate(machine: Machine, own: Lane, count: int, now: Moment, work: Work) 
     kept.error[0] = np.sqrt(square)
 
 
-@compiled
+@folded
 def carry(machine: Machine | None, own: Lane, s: int, work: Work) -> None:
     """Over a step: the integral of the input, and the prediction, by RK4 with the steps of the plant."""
     if machine is not None:

@@ -153,8 +153,7 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
     """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     problem, kind = with_times(loop.problem, 2), setting.class_of(loop)
-    n = len(setting.x0) if setting.varied else 0
-    size = genes_of(kind) + n
+    size = genes_of_case(setting, kind)
     genes, worst = rng.random((_POPULATION, size)), np.full(_POPULATION, -np.inf)
     kept = np.zeros((0, size))
     scores = np.zeros(0)
@@ -162,26 +161,32 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
         if report is not None:
             name = f"{loop.controller}, adversary"
             report(Step(phase=Phase.SIMULATION, name=name, done=turn * _POPULATION, of=ATTACKS))
-        runs = _run(setting, kind, problem, [_bred(setting, kind, row) for row in genes])
+        runs = _run(setting, kind, problem, [bred(setting, kind, row) for row in genes])
         worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])
         order = np.argsort(-values, kind="stable")[:_ELITE]
         kept, scores = pool[order], values[order]
-        genes = _children(kept, 0.5 ** (turn + 1), rng)
-    return _bred(setting, kind, kept[0])
+        genes = children(kept, _POPULATION, 0.5 ** (turn + 1), rng)
+    return bred(setting, kind, kept[0])
 
 
-def _children(parents: Array, spread: float, rng: np.random.Generator) -> Array:
+def children(parents: Array, count: int, spread: float, rng: np.random.Generator) -> Array:
     """Mixtures of two parents each, moved a little; genes are mirrored at 0 and 1."""
-    chosen = rng.integers(len(parents), size=(2, _POPULATION))
-    take = rng.random((_POPULATION, parents.shape[1])) < 0.5
+    chosen = rng.integers(len(parents), size=(2, count))
+    take = rng.random((count, parents.shape[1])) < 0.5
     mixed = np.where(take, parents[chosen[0]], parents[chosen[1]])
     moved = mixed + 0.3 * spread * rng.normal(size=mixed.shape)
     folded = np.abs(np.remainder(moved + 1, 2) - 1)
     return np.asarray(folded)
 
 
-def _bred(setting: Setting, kind: Class, genes: Array) -> Case:
+def genes_of_case(setting: Setting, kind: Class) -> int:
+    """How many numbers describe an adversary and where its run starts."""
+    return genes_of(kind) + (len(setting.x0) if setting.varied else 0)
+
+
+def bred(setting: Setting, kind: Class, genes: Array) -> Case:
+    """The case that `genes` in [0, 1] describe."""
     own = genes_of(kind)
     start = setting.started(2 * genes[own:] - 1) if setting.varied else setting.x0
     member = adversary(kind, genes[:own], setting.S @ start, setting.S @ setting.centre, setting.layer)

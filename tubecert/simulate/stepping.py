@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.compiled import compiled, entry, inlined
+from tubecert.simulate.compiled import compiled, entry, folded, inlined
 from tubecert.simulate.computer import Computer, Registers, sample
 from tubecert.simulate.fast import Fast, Inner, advance, inner
 from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, evaluate, point
@@ -244,7 +244,7 @@ def _begin(own: Lane, s: int, now: Moment, work: Work, out: Output) -> int:
     return status
 
 
-@compiled
+@folded
 def _near(x: Array, plan: Reference, limit: float) -> bool:
     """Whether the state is anywhere near the plan: not if it is beyond the limit, or not finite."""
     near, square = True, 0.0
@@ -254,7 +254,7 @@ def _near(x: Array, plan: Reference, limit: float) -> bool:
     return near and square <= limit * limit
 
 
-@compiled
+@folded
 def _reach(x: Array, slope: Array, v: Array, stage: int, share: float, flows: bool, state: Array) -> None:
     """Where the stage is: x, the slope of the stage before, and v, what u_a has added meanwhile."""
     for i in range(x.shape[0]):
@@ -265,7 +265,7 @@ def _reach(x: Array, slope: Array, v: Array, stage: int, share: float, flows: bo
                 state[i] += v[i]
 
 
-@compiled
+@folded
 def _finish(x: Array, slope: Array, y: Array, end: Array, length: float, v: int, flows: bool) -> None:
     """The end of the step becomes the start of the next: x by RK4 and v, and y but for v."""
     for i in range(x.shape[0]):
@@ -275,7 +275,7 @@ def _finish(x: Array, slope: Array, y: Array, end: Array, length: float, v: int,
         y[i] = end[i]
 
 
-@compiled
+@folded
 def _keep(stage: int, point: Point, u: Array, known: Array, stages: Stages) -> None:
     """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows.
 
@@ -341,7 +341,7 @@ def _length(P: Array, a: Array, b: Array) -> float:
     return float(np.sqrt(max(square, 0.0)))
 
 
-@compiled
+@folded
 def _measure_sizes(own: Lane, now: Moment, work: Work) -> None:
     """What the peaks are taken of, but for distance and speed."""
     fast, sizes, k, h = own.fast, work.sizes, work.point.k, work.point.h
@@ -371,7 +371,7 @@ def _peaks(now: Moment, work: Work, out: Output) -> None:
         out.greatest[lane, j] = max(out.greatest[lane, j], work.u[j])
 
 
-@compiled
+@folded
 def _hurry(own: Lane, lane: int, t: float, work: Work, out: Output) -> None:
     """The peak of the speed |S x'|, from the slope at the start of a step."""
     fast, speed = own.fast, work.stages.slope[0]
@@ -384,7 +384,7 @@ def _hurry(own: Lane, lane: int, t: float, work: Work, out: Output) -> None:
         out.peak[lane, _SPEED], out.peak_time[lane, _SPEED] = np.sqrt(square), t
 
 
-@compiled
+@folded
 def _record(fast: Fast, now: Moment, place: int, work: Work, out: Output) -> None:
     """The values at an output time."""
     lane, own, point = now.lane, blocks(work.y, fast.at), work.point
