@@ -79,12 +79,15 @@ class Pieces:
         r = np.nextafter(np.maximum(right - middle, middle - left), np.inf)[:, None]
         c, swing = Interval.exact(middle[:, None]), Interval(-r, r)
         a, b = self.x[piece], self.u[piece]
+        a1, a2, a3 = (a[..., k] for k in range(1, 4))
+        c3 = c * a3
         # the cubic about the middle, exactly: q(c + d) = q(c) + q'(c) d + (a2 + 3 a3 c) d^2 + a3 d^3
-        value = a[..., 0] + c * (a[..., 1] + c * (a[..., 2] + c * a[..., 3]))
-        slope = a[..., 1] + c * (2 * a[..., 2] + 3 * (c * a[..., 3]))
-        bend = a[..., 2] + 3 * (c * a[..., 3])
+        value = a[..., 0] + c * (a1 + c * (a2 + c3))
+        c3 = 3 * c3
+        slope = a1 + c * (2 * a2 + c3)
+        bend = a2 + c3
         square = Interval(np.zeros_like(r), np.nextafter(r * r, np.inf))
-        x = value + slope * swing + bend * square + a[..., 3] * swing**3
+        x = value + slope * swing + bend * square + a3 * swing**3
         if b.lo.shape[-1] == 2:
             u = b[..., 0] + b[..., 1] * Interval(left[:, None], right[:, None])
         else:  # about the middle, exactly: q(c + d) = q(c) + q'(c) d + b2 d^2
