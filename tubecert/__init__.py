@@ -14,20 +14,26 @@ if TYPE_CHECKING:
     from tubecert.errors import SpecError, TargetError, TubecertError
     from tubecert.library.certification import Certification, Gains, read
     from tubecert.library.certifying import certify
+    from tubecert.library.comparing import Comparison, compare
+    from tubecert.library.designing import Design, Machines, TradeOff, design, machines, trade_off
     from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.rechecking import Rechecked, recheck
     from tubecert.library.simulating import Simulation, simulate
     from tubecert.library.specification import Specification, load, specification
+    from tubecert.library.sweeping import Swept, sweep
     from tubecert.progress import Phase, Step, Unit
     from tubecert.verdict import Verdict
 
 __version__ = "0.1.0"
 __all__ = [
     "Certification",
+    "Comparison",
+    "Design",
     "Exported",
     "Gains",
+    "Machines",
     "Phase",
     "Rechecked",
     "Report",
@@ -35,22 +41,29 @@ __all__ = [
     "SpecError",
     "Specification",
     "Step",
+    "Swept",
     "SynthesisedMetric",
     "TargetError",
+    "TradeOff",
     "TubecertError",
     "Unit",
     "Verdict",
     "VerifiedMetric",
     "__version__",
     "certify",
+    "compare",
+    "design",
     "export",
     "load",
+    "machines",
     "read",
     "recheck",
     "report",
     "simulate",
     "specification",
+    "sweep",
     "synthesise",
+    "trade_off",
     "verify",
 ]
 
@@ -59,6 +72,15 @@ _HOMES = {
     "Gains": "library.certification",
     "read": "library.certification",
     "certify": "library.certifying",
+    "Comparison": "library.comparing",
+    "compare": "library.comparing",
+    "Design": "library.designing",
+    "Machines": "library.designing",
+    "TradeOff": "library.designing",
+    "design": "library.designing",
+    "machines": "library.designing",
+    "trade_off": "library.designing",
+    "Swept": "library.sweeping",
     "Exported": "library.exporting",
     "SynthesisedMetric": "library.metrics",
     "VerifiedMetric": "library.metrics",
@@ -83,6 +105,7 @@ _ROOMS = {
     "recheck": "library.rechecking",
     "report": "library.pages",
     "simulate": "library.simulating",
+    "sweep": "library.sweeping",
 }
 
 

@@ -14,7 +14,7 @@ from tubecert.certificate.result import Certificate, Result
 from tubecert.printable import visible
 from tubecert.report import console, sections
 from tubecert.report.html import environment
-from tubecert.report.page import Cell, Table
+from tubecert.report.page import Cell, Page, Table
 from tubecert.report.page_origin import equations
 from tubecert.report.page_sections import gains_table, not_certified
 from tubecert.verdict import Verdict
@@ -92,3 +92,9 @@ def specification(effective: Effective) -> str:
             tables=[Table(columns=("",), rows=tuple(rows))],
         )
     )
+
+
+def of_page(page: Page) -> str:
+    """The card of a page: what it says, and its tables."""
+    tables = [block for section in page.sections for block in section.blocks if isinstance(block, Table)]
+    return render(Card(verdict="", name=page.name, summary=page.summary, meaning=page.meaning, tables=tables))

@@ -1,0 +1,127 @@
+"""Certificates side by side, from code and for the command: `tubecert compare`."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from types import MappingProxyType
+from typing import Final
+
+from tubecert import certificate
+from tubecert.certificate.effective import Tree
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
+from tubecert.library.asked import refuse
+from tubecert.library.certification import Certification, read
+from tubecert.library.specification import File
+from tubecert.printable import printable_json
+from tubecert.report import html, markdown
+from tubecert.report.comparison import Comparison as Sides
+from tubecert.report.comparison import page_of_comparison
+from tubecert.report.quantities import Value
+
+REMEDY: Final = "give a file FILE.html, FILE.md, FILE.csv or FILE.json in a folder that exists"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """What certificates say, side by side; every sequence is in the order in which they were given.
+
+    `quantities`: each number or word that one of them has, by its key (`rho`, `half_width.px`,
+    `distance.least_adaptation.bandwidth`); None where a certificate has none. `differences`: the keys, by path, in
+    which the specifications differ.
+    """
+
+    sides: Sides = field(repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the certificates are called."""
+        return tuple(self.sides.names)
+
+    @property
+    def quantities(self) -> Mapping[str, tuple[Value, ...]]:
+        """Every quantity by its key."""
+        return MappingProxyType({key: tuple(values) for key, values in self.sides.rows()})
+
+    @property
+    def differences(self) -> Mapping[str, tuple[Tree, ...]]:
+        """The values of keys of the specification that are not the same in all."""
+        return MappingProxyType(dict(self.sides.differences))
+
+    @property
+    def csv(self) -> str:
+        """As comma-separated values."""
+        return self.sides.csv()
+
+    @property
+    def json(self) -> str:
+        """As JSON."""
+        return printable_json(json.dumps(self.sides.json(), indent=1, ensure_ascii=False)) + "\n"
+
+    @property
+    def html(self) -> str:
+        """As a page with figures."""
+        return html.render_page(page_of_comparison(self.sides))
+
+    @property
+    def markdown(self) -> str:
+        """As Markdown, for a pull request."""
+        return markdown.render_page(page_of_comparison(self.sides, all_of_it=False))
+
+    def save(self, path: File) -> None:
+        """Write a page or a table, by the ending of the name: .html, .md, .csv or .json. Raises `TargetError`."""
+        target = os.fspath(path)
+        certificate.write_text(target, FORMATS[ending_of(target)](self), REMEDY)
+
+    def __str__(self) -> str:
+        page = page_of_comparison(self.sides, all_of_it=False)
+        return f"{page.name}: {page.summary}"
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        return notebook.of_page(page_of_comparison(self.sides, all_of_it=False))
+
+
+FORMATS: Final[Mapping[str, Callable[[Comparison], str]]] = {
+    ".html": lambda found: found.html,
+    ".htm": lambda found: found.html,
+    ".md": lambda found: found.markdown,
+    ".markdown": lambda found: found.markdown,
+    ".csv": lambda found: found.csv,
+    ".json": lambda found: found.json,
+}
+
+
+def compare(*certificates: Certification | File, names: Sequence[str] | None = None) -> Comparison:
+    """Put certificates side by side: values, or files of some. Nothing is examined; `recheck` does that.
+
+    `names` are what they are called; without, a file is called by its name, a value by that of its specification.
+    Raises `TargetError` for a file that cannot be read, `SpecError` for fewer than two.
+    """
+    if len(certificates) < 2:
+        refuse("certificates", str(len(certificates)), "two certificates or more are compared")
+    if names is not None and len(names) != len(certificates):
+        refuse("names", ", ".join(names), f"{len(names)} names for {len(certificates)} certificates")
+    read_ones = [each if isinstance(each, Certification) else read(each) for each in certificates]
+    own = [
+        found.name if isinstance(each, Certification) else os.fspath(each)
+        for each, found in zip(certificates, read_ones, strict=True)
+    ]
+    called = own if names is None else names
+    return Comparison(
+        sides=Sides.of([(name, each.certificate) for name, each in zip(called, read_ones, strict=True)])
+    )
+
+
+def ending_of(target: str) -> str:
+    """How the name of a file ends; raises `TargetError` for what a comparison cannot be written as."""
+    ending = PurePath(target).suffix.lower()
+    if ending not in FORMATS:
+        message = f"cannot write {target}: a comparison is a page or a table"
+        raise TargetError([Finding(code="TC120", message=message, help=REMEDY)])
+    return ending
