@@ -224,6 +224,19 @@ def test_a_text_that_computes_something_else_is_noticed(change):
     assert share > 1
 
 
+def test_a_text_whose_numbers_have_no_bound_is_not_said_to_differ():
+    c = CONTROLLERS["orbit"]()
+    header, source = texts(c, "double")
+    changed = source.replace("r2 > (-2.0)", "(r2 / (r2 - r2)) > (-2.0)").replace(
+        "? r2 : (-2.0)", "? (r2 / (r2 - r2)) : (-2.0)"
+    )
+    with ctx.workprec(200):
+        rows = [[exact(Fraction(value)) for value in row] for row in measured(c, 4, "double").tolist()]
+        code, formulas = read_code(header, changed), in_recheck("orbit")
+        with pytest.raises(UnreadError, match="no bound"):
+            agreement(code, formulas, rows)
+
+
 UNKNOWN = {
     "another loop": ("for (i = 0; i < M; i++) {", "while (i < M) {"),
     "a pointer": ("real x[N];", "real *x;"),

@@ -89,7 +89,10 @@ def agreement(
     measured: Sequence[Column],
     answered: Sequence[Sequence[float]] | None = None,
 ) -> tuple[float, float]:
-    """The largest difference of an input, and of what it may be; `answered` is what compiled code made of the same."""
+    """The largest difference of an input, and of what it may be; `answered` is what compiled code made of the same.
+
+    Raises `UnreadError` where what the numbers of the text are off has no bound.
+    """
     expected = list(formulas.answers(measured))
     largest = arb(0)
     for row in expected:
@@ -99,8 +102,10 @@ def agreement(
     worst, share = arb(0), arb(0)
     for k, (found, own) in enumerate(zip(_answers(code, formulas, measured), expected, strict=True)):
         for j, (a, b) in enumerate(zip(numbers(found), own, strict=True)):
-            if k > _FEWEST and not a.error.is_finite():
-                return float(worst), float(share.upper())  # errors of a prediction feed themselves
+            if not (a.error.is_finite() and a.value.is_finite()):
+                if k > _FEWEST:  # errors of a prediction feed themselves
+                    return float(worst), float(share.upper())
+                raise UnreadError("what its numbers are off has no bound from one sample to the next")
             apart = magnitude(a.value.mid() - b)
             if answered is not None:
                 apart = larger(apart, magnitude(arb(answered[k][j]) - b))
