@@ -714,4 +714,5 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("{m: 2, c: 0.5, k: 3}", "{m = 2, c: 0.5, k: 3}", "TC111", 7, 16, "write m: 2"),
     ("c: 0.5", "c: [1, 2, 3]", "TC107", 7, 25, "write one number, or [lower, upper]"),
     ("{m: 2, c: 0.5, k: 3}", "{c: m/4, m: 2, k: 3}", "TC110", 7, 19, "m is defined further down"),
+    ("{rate: 500, delay: 0.001, noise: 0.0001}", "{Ts: 0.002}", "TC103", 26, 12, "it is called sample_time"),
 ]

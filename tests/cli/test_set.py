@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
+from systems import SMALL
 from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
@@ -16,6 +17,9 @@ from tubecert.errors import ExitCode
 from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted
 from tubecert.spec import canonical, load
+from tubecert.spec.document import compose
+from tubecert.spec.override import Setting, put
+from tubecert.spec.source import Source
 
 pytestmark = pytest.mark.timeout(120)
 ROOT = Path(__file__).parents[2]
@@ -108,3 +112,10 @@ def test_every_command_names_the_option_as_the_place(command):
     done = run(command, SPEC, "--set", "tube.epsilom=1")
     assert (done.exit_code, "--set tube.epsilom: error TC103" in done.output) == (2, True)
     assert "did you mean epsilon?" in done.output
+
+
+@pytest.mark.parametrize(("key", "where"), [("k", "system.parameters"), ("a", "system.definitions")])
+def test_a_name_of_the_users_own_is_found_where_it_stands(key, where):
+    text = SMALL.replace("  f:", "  parameters: {k: 2}\n  definitions: {a: 2*k}\n  f:", 1)
+    _, (finding,) = put(compose(Source.of("spec.yaml", text))[0], [Setting.of(f"{key}=3")])
+    assert (finding.code, finding.help) == ("TC103", f"write --set {where}.{key}=...")

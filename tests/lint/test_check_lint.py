@@ -232,3 +232,7 @@ def test_customary_names_are_not_confusable():
     """U7: a cart M, a pendulum m of length l with an inertia I: every cart-pole."""
     names = changed(("{k: 2}", "{M: 1, m: 0.2, l: 0.5, I: 0.1, i_max: -1}"), ("-k*p", "-M*p*m*l*I*i_max**2"))
     assert found(names) == []
+    names = changed(("{k: 2}", "{l1: 1, I1: 0.2, l2: 0.5, I2: 0.1}"), ("-k*p", "-l1*p*I1*l2*I2"))
+    assert found(names) == []
+    names = changed(("{k: 2}", "{l1: 1, I_1: 0.2, ll: 2}"), ("-k*p", "-l1*p*I_1*ll"))
+    assert [item.code for item in found(names)] == ["TC131"]  # ll looks like l1

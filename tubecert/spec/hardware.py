@@ -9,6 +9,7 @@ from typing import Final
 from tubecert.expression import ONE, ZERO, number_text
 from tubecert.spec import codes
 from tubecert.spec.document import MappingNode, Scalar
+from tubecert.spec.instead import same_as
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.types import (
@@ -141,7 +142,7 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT,
         _geodesic(entries.get("geodesic"), names),
     )
-    if len(field.reader.findings) > before:
+    if len(field.reader.findings) > before or (sample_time is None and "sample_time" not in sought):
         return None
     noise, noise_rate, feedforward, predict, bandwidth, arithmetic, geodesic = found
     if geodesic is not None and arithmetic != EXACT:
@@ -194,6 +195,8 @@ def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fr
         rate = _positive(entries, "rate", names)
         return None if rate is None else 1 / rate
     if "sample_time" not in entries:
+        if _is_meant(field):  # one finding says what it is called
+            return None
         field.fail(
             codes.MISSING_KEY,
             "hardware lacks the rate",
@@ -201,6 +204,12 @@ def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fr
         )
         return None
     return None if _is(entries["sample_time"], LARGEST) else _positive(entries, "sample_time", names)
+
+
+def _is_meant(field: Field) -> bool:
+    """Whether an unknown key stands for the rate or the sample time."""
+    pairs = field.node.pairs if isinstance(field.node, MappingNode) else ()
+    return any(same_as(key.text, ("rate", "sample_time")) for key, _ in pairs)
 
 
 def _noise(field: Field | None, names: Names) -> Fraction | Vector | None:

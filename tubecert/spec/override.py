@@ -7,7 +7,7 @@ the option. A path names a key as findings do: `tube.epsilon`, `system.parameter
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -30,6 +30,7 @@ _OWN_NAMES: Final = (
     "system.tables",
     "system.units",
 )  # their keys are the user's words
+_MEANT: Final = _OWN_NAMES[:2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,12 +91,14 @@ class _Put:
     setting: Setting
     findings: list[Finding]
     source: Source = field(init=False)
+    _elsewhere: Mapping[str, str] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.source = _OptionText.of(self.setting.place, str(self.setting))
 
     def within(self, node: Node) -> Node:
         """The tree with the value in its place; as it was, with a finding, where there is no such place."""
+        self._elsewhere = _named(node)
         return self._put(node, 0)
 
     def _put(self, node: Node, start: int) -> Node:
@@ -122,6 +125,12 @@ class _Put:
             names = [own.text for own, _ in pairs]
             help = suggestion(key, names, what="names in the file") if names else "the file has none there"
             self._fail(match, f"unknown name {key} in {self._before(match)}", help)
+            return node
+        whole = not match.start() and match.end() == len(self.setting.path)
+        plain = self.setting.text[0] not in "[{"  # a section is no number
+        if whole and plain and key in self._elsewhere:
+            help = f"write --set {self._elsewhere[key]}.{key}=..."
+            self._fail(match, f"{key} is no key of a specification", help)
             return node
         rest = _PART.match(self.setting.path, match.end())
         if rest is not None and rest[2] is not None:
@@ -173,6 +182,19 @@ class _Put:
     def _fail(self, match: re.Match[str], message: str, help: str = "") -> None:
         place = self.source.location(Mark(line=0, column=match.start()), match.end() - match.start())
         self.findings.append(Finding(code=codes.UNKNOWN_KEY, message=message, location=place, help=help))
+
+
+def _named(root: Node) -> dict[str, str]:
+    """The user's own names in a file that a path may have been meant for, with where they stand."""
+    pairs = root.pairs if isinstance(root, MappingNode) else ()
+    top = {key.text for key, _ in pairs}
+    system = next((value for key, value in pairs if key.text == "system"), None)
+    found: dict[str, str] = {}
+    for section, value in system.pairs if isinstance(system, MappingNode) else ():
+        path = f"system.{section.text}"
+        if path in _MEANT and isinstance(value, MappingNode):
+            found |= {key.text: path for key, _ in value.pairs if key.text not in top}
+    return found
 
 
 def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, list[Finding]]:
