@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator
+from decimal import ROUND_CEILING, Context
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,7 @@ def published() -> str:
         "files lock.",
         "| metric | published | proven | supports, 1/s | condition number | refuted at |\n|---|---|---|---|---|---|\n"
         + "\n".join(_published_row(folder, each) for each in known),
+        *_beside(folder, known),
         "## Sources",
         "\n".join(f"- {source}" for source in _sources(folder, known)),
     ]
@@ -185,6 +187,53 @@ def _published_row(folder: Path, each: dict[str, Any]) -> str:
     ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
+
+def _beside(folder: Path, known: list[dict[str, Any]]) -> Iterator[str]:
+    """Beside each metric that is refuted the one that was found, from what `verify` said of that."""
+    found = json.loads((folder / "found" / "verified.json").read_text(encoding="utf-8"))
+    yield "## Beside each that is refuted"
+    yield (
+        "What `tubecert synth` finds for the same system, on the same set, at the published rate or just above it. "
+        "Each is a file in `configs/published/found/` with the verdict that `verify` gives it; the condition number "
+        "is a proven bound on the whole set, and the seconds are of one core, proof included."
+    )
+    command = "tubecert verify configs/published/found/*.yaml --json > configs/published/found/verified.json"
+    yield f"```console\n{command}\n```"
+    rows = [
+        "| published | its rate, 1/s | its condition number | found | rate, 1/s | condition number | verdict | s |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    refuted = {Path(each["file"]).stem: each for each in known if each["verdict"] == "refuted"}
+    notes: list[str] = []
+    for each in found:
+        own = _notes(folder / "found" / Path(each["file"]).name)
+        rows += [_beside_row(refuted[name], each, own) for name in own["for"].split(", ")]
+        notes += [f"- `{Path(each['file']).stem}`: {own['beside']}."] if "beside" in own else []
+    yield "\n".join(rows)
+    yield _QUADROTOR + "\n\n" + "\n".join(notes)
+
+
+def _beside_row(published: dict[str, Any], found: dict[str, Any], notes: dict[str, str]) -> str:
+    condition = published.get("condition_number")
+    cells = [
+        f"`{Path(published['file']).stem}`",
+        f"{published['rate']:.6g}",
+        "" if condition is None else f"{condition[1]:.4g}",
+        f"`found/{Path(found['file']).name}`",
+        f"{found['rate']:.6g}",
+        str(Context(prec=4, rounding=ROUND_CEILING).create_decimal(str(found["condition_number"][1]))),
+        found["verdict"] + (", not the same set" if "beside" in notes else ""),
+        notes["seconds"],
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+_QUADROTOR = (
+    "For the nine-state quadrotor **no metric was found on its set at its rate**. Thrust and angles are all moved by "
+    "inputs, so C3 in its strong form leaves W a function of position and velocity alone; a constant W was searched, "
+    "and at rates from 1.29 down to .001 the solver finds the conditions at points of the set infeasible (its word, "
+    "not a proof). What was found:"
+)
 
 _FAILS = {"metric_definite": "C1", "metric_contraction": "C2", "metric_killing": "C3 in its strong form"}
 

@@ -201,6 +201,54 @@ def test_every_witness_is_confirmed_at_fifty_digits(each):
             assert not violates(spec, reason["claim"], at, Fraction(str(each["largest_rate"][0])))
 
 
+FOUND = json.loads((GALLERY / "found" / "verified.json").read_text("utf-8"))
+
+
+def beside() -> dict[str, tuple[dict[str, Any], dict[str, Any], bool]]:
+    """For each published metric the file of the one found for it, what is proven of that, and if the set is its own."""
+    made = {}
+    for each in FOUND:
+        text = (GALLERY / "found" / Path(each["file"]).name).read_text("utf-8")
+        names = text.splitlines()[0].removeprefix("# for: ").split(", ")
+        spec = yaml.load(text, Loader=yaml.BaseLoader)
+        same = "\n# beside: " not in text
+        made |= {name: (spec, each, same) for name in names if same or name not in made}
+    return made
+
+
+def test_beside_each_that_is_refuted_stands_one_that_holds_on_its_set_at_its_rate():
+    found = beside()
+    assert sorted(found) == sorted(each["name"] for each in TABLE if each["verdict"] == "refuted")
+    assert {path.name for path in (GALLERY / "found").glob("*.yaml")} == {Path(e["file"]).name for e in FOUND}
+    for each in (each for each in TABLE if each["name"] in found):
+        spec, proven, same = found[each["name"]]
+        assert proven["verdict"] == spec["expect"]["verdict"] == "certified"
+        assert proven["largest_rate"][0] >= Fraction(spec["metric"]["rate"]) >= Fraction(str(each["rate"]))
+        assert same == (each["name"] != "rmp_quadrotor")
+        if same:
+            text = (GALLERY / Path(each["file"]).name).read_text("utf-8")
+            published = yaml.load(text, Loader=yaml.BaseLoader)
+            assert (spec["system"], spec["safe_set"]) == (published["system"], published["safe_set"])
+
+
+@pytest.mark.parametrize("each", REFUTED, ids=lambda each: each["name"])
+def test_the_one_beside_it_holds_where_it_fails(each):
+    spec, _, same = beside()[each["name"]]
+    if not same:
+        return
+    point = zip(spec["system"]["states"], each["reason"]["at"]["x"], strict=True)
+    at = {x: Fraction(str(value)) for x, value in point}
+    with flint.ctx.workdps(DIGITS):
+        for claim in ("metric_definite", "metric_contraction"):
+            assert not violates(spec, claim, at, Fraction(spec["metric"]["rate"]))
+
+
+@pytest.mark.slow
+def test_what_was_found_is_verified_again():
+    path = GALLERY / "found" / "rmp_quadrotor_accelerations.yaml"
+    assert CliRunner().invoke(app, ["verify", str(path), "--expect"]).exit_code == 0
+
+
 @pytest.mark.slow
 def test_verify_compares_with_what_is_locked(tmp_path):
     path = GALLERY / "lmi_pend.yaml"
