@@ -10,6 +10,7 @@ from typing import Final
 from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, Port, Program
+from tubecert.export.sweeps import in_c
 from tubecert.export.vectors import Vectors
 from tubecert.export.words import TIMING, heading, promise
 
@@ -180,6 +181,8 @@ def _source(c: Controller, language: C) -> Iterator[str]:
         yield from _function(program, language)
     yield from _plan(c, language)
     yield from _mean(c, language)
+    if c.swept is not None:
+        yield from in_c(c.swept)
     yield from _law(c, language)
     if c.predicts:
         yield from _predicted(c, language)
@@ -319,19 +322,23 @@ def _law(c: Controller, language: C) -> Iterator[str]:
     yield "/* The feedback at (x*(t), y), with u* where that is held; what step returns. */"
     yield "static int feedback(const real y[N], real t, real u[M])"
     yield "{"
-    yield "    real f[N], xs[N], us[M], vs[N], kappa[M], told[3];"
+    ends = "" if c.swept is None else ", first[N], last[N]"
+    yield f"    real f[N], xs[N], us[M], vs[N], kappa[M], told[3]{ends};"
     yield "    int status = 0, i;"
     yield "    on_plan(t, xs, us);"
     yield "    drift(y, f);"
     yield "    flow(xs, us, vs);"
-    yield "    law(y, f, xs, vs, us, kappa, told);"
+    if c.swept is not None:
+        yield "    geodesic(xs, y, first, last);"
+    yield f"    law(y, f, xs, vs, us, {'' if c.swept is None else 'first, last, '}kappa, told);"
     yield "    for (i = 0; i < M; i++) {"
     yield f"        u[i] = kappa[i]{' + us[i]' if c.adds_plan else ''};"
     yield "    }"
     if c.horizon is not None:
         yield f"    status += t > {big}_HORIZON ? {big}_OVER : 0;"
     yield f"    status += told[0] < {big}_REACH * {big}_REACH ? 0 : {big}_OUTSIDE;"
-    yield f"    status += told[1] > {zero} && !(told[2] > {zero}) ? {big}_NO_FEEDBACK : 0;"
+    if c.swept is None:  # else it is known up to what computed geodesics lose
+        yield f"    status += told[1] > {zero} && !(told[2] > {zero}) ? {big}_NO_FEEDBACK : 0;"
     yield "    return status;"
     yield "}"
 

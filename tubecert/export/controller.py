@@ -19,8 +19,11 @@ from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Certificate
 from tubecert.conditions.hardware import HardwareRecipe, Rounding
 from tubecert.coordinates import Coordinates, Fields, inverse
-from tubecert.enclosure.interval import Array
+from tubecert.conditions.hardware.geodesics import error_of_speed
+from tubecert.enclosure.interval import Array, Interval, sqrt
 from tubecert.errors import TubecertError
+from tubecert.export import geodesics
+from tubecert.export.geodesics import Swept
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
 from tubecert.expression import derivatives, free_symbols, topological
 from tubecert.expression.matrix import Matrix, multiply
@@ -28,7 +31,7 @@ from tubecert.findings import Finding
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
 from tubecert.model import TIME, ControlAffineModel, build
-from tubecert.spec import Spec, load_text
+from tubecert.spec import Picard, Spec, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.verdict import Verdict
@@ -41,6 +44,7 @@ _DIGITS: Final = Context(prec=60)
 LEAST_SIZE: Final = Fraction(1, 2**120)  # |c|^2 below which the feedback fades out
 _NOISE: Final = "noise_metric"  # n_M of one unit of noise
 _GAIN: Final = "feedback_gain"
+_BENT: Final = ("lower", "symbols", "symbols_slope")
 _LONGEST: Final = 32  # characters of a name
 
 
@@ -68,7 +72,7 @@ class Controller:
 
     `name` begins every name in the code; `hash` is that of the certificate. Times in s; `horizon` None
     without end; `level`: d(x*, x) stays below it, and `reach` what d(x*, .) is at most where the feedback
-    looks; `metric` is M; `ranges`: what is proven of every input; `share` is th; `estimate` bounds |q|, and
+    looks, as it is computed; `metric` is M, empty where it is not constant: then geodesics are `swept`; `ranges`: what is proven of every input; `share` is th; `estimate` bounds |q|, and
     `feedback_gain` is du. `lost`: what rounding may cost, where the certificate covers it. Of the plan, either the
     program `plan` or `pieces`.
     `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is covered.
@@ -104,11 +108,13 @@ class Controller:
     bend: Program | None
     predictor: Program | None
     estimator: Program
+    swept: Swept | None = None
 
     @property
     def programs(self) -> tuple[Program, ...]:
         """Every program, in the order in which they are written."""
-        found = (self.plan, self.drift, self.flow, self.law, self.applied, self.gauss, self.predictor)
+        swept = () if self.swept is None else self.swept.programs
+        found = (self.plan, self.drift, self.flow, *swept, self.law, self.applied, self.gauss, self.predictor)
         return tuple(each for each in (*found, self.estimator) if each is not None)
 
     @property
@@ -141,13 +147,14 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
         model=model,
         plan=plan,
         recipe=recipe,
-        reach=_reach(certificate, recipe),
+        reach=_reach(certificate, recipe, spec.hardware.geodesic if geodesics.varies(model) else None),
         clip=data.clip,
         coordinates=None if tube is None else tube.coordinates,
         held=spec.hardware.held,
         horizon=_horizon(certificate),
         ranges=tuple(data.inputs.get(each, (-math.inf, math.inf)) for each in model.inputs),
         feedback_gain=_gain(certificate),
+        geodesic=spec.hardware.geodesic,
     )
     if certificate.result.claim.plans is not None or spec.trajectory.bundle is not None:
         raise refused(
@@ -161,7 +168,7 @@ class Machine:
     """What a controller is made of.
 
     `clip` by input, empty for the ball of the recipe; `coordinates` S, by rows; `horizon` of the claim, None for ever;
-    `feedback_gain` du.
+    `feedback_gain` du; `geodesic`: how geodesics are computed.
     """
 
     name: str
@@ -176,12 +183,14 @@ class Machine:
     horizon: Fraction | None
     ranges: tuple[tuple[float, float], ...]
     feedback_gain: Fraction = Fraction(0)
+    geodesic: Picard | None = None
 
 
 def assembled(machine: Machine) -> Controller:
     """The controller of a machine; raises TC710 where it cannot be exported."""
     model, plan, recipe = machine.model, machine.plan, machine.recipe
-    _require(model, recipe)
+    _require(model, recipe, machine.geodesic)
+    bent = geodesics.varies(model)
     pieces = _pieces(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
     still, m = pieces is None and not free_symbols(plan.u), len(model.inputs)
     played, covered = not still and not machine.held, bool(recipe.rounding)
@@ -196,7 +205,7 @@ def assembled(machine: Machine) -> Controller:
         horizon=machine.horizon,
         level=recipe.level,
         reach=machine.reach,
-        metric=inverse([[e.fraction for e in row] for row in model.W]),
+        metric=() if bent else inverse([[e.fraction for e in row] for row in model.W]),
         ranges=machine.ranges,
         share=forgotten(recipe),
         estimate=2 * recipe.clip_radius
@@ -211,12 +220,15 @@ def assembled(machine: Machine) -> Controller:
         pieces=pieces,
         drift=_drift(model),
         flow=_flow(model),
-        law=_law(model, machine.feedback_gain if covered else None),
+        law=geodesics.law(model, machine.feedback_gain)
+        if bent
+        else _law(model, machine.feedback_gain if covered else None),
         applied=_applied(m, recipe, played=played),
         gauss=_gauss(m) if played and pieces is None else None,
         bend=_bend(plan) if played and pieces is None and covered else None,
         predictor=None if recipe.prediction is None else _predictor(model, recipe.delay / INTEGRATION),
         estimator=_estimator(machine),
+        swept=geodesics.swept(model, machine.geodesic) if bent and machine.geodesic is not None else None,
     )
 
 
@@ -250,16 +262,17 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
     return spec, Plan(x, u, trajectory.horizon), model
 
 
-def _require(model: ControlAffineModel, recipe: HardwareRecipe) -> None:
+def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard | None) -> None:
     """Raises TC710 for what the exported code could not do."""
-    if any(not e.is_constant for row in model.W for e in row):
+    if geodesics.varies(model) and geodesic is None:
         raise refused(
-            "the metric is not constant: its geodesics would have to be computed with a certified error",
-            "metric: {synthesise: {degree: 0}} asks for a constant one",
+            "the metric is not constant: its geodesics have to be computed, and the certificate assumes exact ones",
+            "certify with hardware: {geodesic: {nodes: 16, sweeps: 3}}, which allows for what that loses",
         )
-    if any(node.op == "table" for node in topological([*model.f, *(e for row in model.B for e in row)])):
+    entries = [*model.f, *(e for rows in (model.B, model.W) for row in rows for e in row)]
+    if any(node.op == "table" for node in topological(entries)):
         raise refused(
-            "a table stands in f or B, which is not exported yet", "fit a polynomial, or a sum of tanh"
+            "a table stands in f, B or W, which is not exported yet", "fit a polynomial, or a sum of tanh"
         )
     if model.gained:
         raise refused(
@@ -279,13 +292,24 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe) -> None:
         )
 
 
-def _reach(certificate: Certificate, recipe: HardwareRecipe) -> Fraction:
-    """dhat + n_M, rounded up; with a prediction dhat + n_P of theorem H-P."""
+def _reach(certificate: Certificate, recipe: HardwareRecipe, geodesic: Picard | None) -> Fraction:
+    """dhat + n_M, rounded up; with a prediction dhat + n_P of theorem H-P; what a computed geodesic is off is added."""
     noise, metric = certificate.result.constants[_NOISE].above, certificate.result.metric
     upper = None if metric is None or metric.upper is None else metric.upper.above
     if noise is None or upper is None:
         raise incomplete("that is exported", "what noise is in the metric is missing")
-    return looked_at(recipe, noise, upper)
+    reach = looked_at(recipe, noise, upper)
+    return reach if geodesic is None else reach + _off(certificate, geodesic, reach, upper)
+
+
+def _off(certificate: Certificate, geodesic: Picard, reach: Fraction, upper: float) -> Fraction:
+    """sqrt(A) e/2: how far d is off as it is computed, from above."""
+    lower, G, L = (certificate.result.constants[name] for name in _BENT)
+    if not lower.below or G.above is None or L.above is None:
+        raise incomplete("that is exported", "what is known of its metric is missing")
+    r = Interval.of(reach) / sqrt(Interval.of(Fraction(lower.below)))
+    e = error_of_speed(geodesic, Interval.exact(G.above), Interval.exact(L.above), r)
+    return Fraction(f"{float((sqrt(Interval.exact(upper)) * e / 2).hi) * (1 + 1e-6):.6e}")
 
 
 def looked_at(recipe: HardwareRecipe, noise: float, upper: float) -> Fraction:

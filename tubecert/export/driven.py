@@ -141,7 +141,6 @@ class Plant:
         self._layer = disturbance.layer
         self._plan = Reference(controller=controller)
         self._adds_plan = controller.adds_plan
-        self._M = np.array([[float(q) for q in row] for row in controller.metric])
         self._program = _plant(setting)
         self._sizes = len(setting.model.states), len(setting.model.inputs), self._own.blowing.shape[1]
         lanes = len(self._own.wind)
@@ -200,8 +199,7 @@ class Plant:
             k3 = self._rate(x + h / 2 * k2, t + h / 2, u)
             k4 = self._rate(x + h * k3, t + h, u)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            z = x - self._on_plan(t + h)[0]
-            distance = np.sqrt(np.einsum("li,ij,lj->l", z, self._M, z))
+            distance = self._plan.distance(x, np.asarray(t + h))
             seen.distance = np.fmax(seen.distance, np.nan_to_num(distance, nan=np.inf))
         return x
 
@@ -215,13 +213,13 @@ class Plant:
         return np.asarray(f + np.einsum("lij,lj->li", B, acting + self._h(x, t, c)) + wind)
 
     def _at(self, x: Array, t: float) -> tuple[Array, Array, Array, Array]:
-        """f (N, n), B (N, n, m), E w + r (N, n) and c = B'M z (N, m)."""
+        """f (N, n), B (N, n, m), E w + r (N, n) and c = B'M z (N, m), which adversaries aim by."""
         n, m, k = self._sizes
         lanes = len(x)
         (found,) = execute(self._program, np.concatenate([x, self._own.theta], axis=1))
         f, B = found[:, :n], found[:, n : n + n * m].reshape(lanes, n, m)
         E = found[:, n + n * m : n + n * m + n * k].reshape(lanes, n, k)
-        g = (x - self._on_plan(t)[0]) @ self._M
+        g = np.einsum("lij,lj->li", self._plan.metric(x), x - self._on_plan(t)[0])
         c = np.einsum("lij,li->lj", B, g)
         return f, B, self._wind(t, E, B, g, c) + found[:, n + n * m + n * k :], c
 

@@ -9,6 +9,7 @@ from typing import Final
 from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, Program
+from tubecert.export.sweeps import in_python
 from tubecert.export.vectors import Vectors
 from tubecert.export.words import TIMING, heading, promise
 
@@ -72,6 +73,8 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
         yield from _tables(c.pieces)
     for program in c.programs:
         yield from _function(program)
+    if c.swept is not None:
+        yield from in_python(c.swept, len(c.states))
     yield from _plan(c)
     yield from _mean(c)
     yield from _class(c)
@@ -208,10 +211,12 @@ def _class(c: Controller) -> Iterator[str]:
     yield ""
     yield "    def _law(self, y, t):"
     yield "        x, u = on_plan(t)"
-    yield "        kappa, (square, excess, size) = law(y, drift(y), x, flow(x, u), u)"
+    ends = "" if c.swept is None else ", *geodesic(x, y)"
+    yield f"        kappa, (square, excess, size) = law(y, drift(y), x, flow(x, u), u{ends})"
     yield "        self.status = 1 if t > HORIZON else 0"
     yield "        self.status += 0 if square < REACH * REACH else 2"
-    yield "        self.status += 4 if excess > 0.0 and not size > 0.0 else 0"
+    if c.swept is None:  # else it is known up to what computed geodesics lose
+        yield "        self.status += 4 if excess > 0.0 and not size > 0.0 else 0"
     yield f"        return {'tuple(p + q for p, q in zip(kappa, u))' if c.adds_plan else 'kappa'}"
     if c.predicts:
         yield ""

@@ -14,6 +14,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
+from tubecert.export.geodesics import Swept
 from tubecert.export.program import GREATEST, LEAST, RATIO, Program, Step
 
 _NUMPY: Final = {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan}
@@ -31,6 +32,24 @@ def execute(program: Program, *given: Array, real: type = np.float64) -> tuple[A
         np.stack([np.broadcast_to(memory[p], (lanes,)) for p in port.places], axis=1)
         for port in program.outputs
     )
+
+
+def speeds(own: Swept, x: Array, y: Array, real: type) -> tuple[Array, Array]:
+    """The speeds (N, n) at both ends of computed geodesics from x (1, n) to y (N, n)."""
+    zero = np.zeros_like(y)
+    w = [zero] * own.nodes
+    for k in range(own.sweeps + 1):
+        p = v = zero
+        for each in w:
+            p, v = execute(own.onward, p, v, each, real=real)
+        first = (y - x) - p
+        last = first + v
+        p, v = np.broadcast_to(x, y.shape), first
+        for j in range(own.nodes if k < own.sweeps else 0):
+            (bent,) = execute(own.symbols, *execute(own.halfway, p, v, w[j], real=real), real=real)
+            p, v = execute(own.onward, p, v, w[j], real=real)
+            w[j] = bent
+    return first, last
 
 
 def _value(step: Step, number: Array, memory: list[Array], given: Mapping[str, Array], real: type) -> Array:
@@ -125,8 +144,25 @@ class Reference:
         c, real = self.controller, self.real
         x, u = self.plan(t)
         (f,), (v,) = execute(c.drift, y, real=real), execute(c.flow, x, u, real=real)
-        found, told = execute(c.law, y, f, x, v, u, real=real)
+        ends = () if c.swept is None else speeds(c.swept, x, y, real)
+        found, told = execute(c.law, y, f, x, v, u, *ends, real=real)
         return found, told[:, 0]
+
+    def metric(self, x: Array) -> Array:
+        """M (N, n, n) at states (N, n)."""
+        c, n = self.controller, len(self.controller.states)
+        if c.swept is None:
+            M = np.array([[float(q) for q in row] for row in c.metric])
+            return np.broadcast_to(M, (len(x), n, n))
+        (W,) = execute(c.swept.dual, x)
+        return np.asarray(np.linalg.inv(W.reshape(len(x), n, n)))
+
+    def distance(self, x: Array, t: Array) -> Array:
+        """d(x*(t), x) (N,) of states (N, n), as the controller computes it."""
+        plan = self.plan(t)[0]
+        swept = self.controller.swept
+        last = x - plan if swept is None else speeds(swept, plan, x, np.float64)[1]
+        return np.asarray(np.sqrt(np.einsum("li,lij,lj->l", last, self.metric(x), last)))
 
     def _law(self, y: Array, t: Array) -> tuple[Array, Array]:
         """The same, with u* where that is held."""

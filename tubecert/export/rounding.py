@@ -89,6 +89,8 @@ class _Analysis:
     """The programs of a controller, one after the other, on all that can go in."""
 
     def __init__(self, controller: Controller, real: Float) -> None:
+        if controller.swept is not None:
+            raise UncoveredError("geodesics that are computed")
         if controller.predicts:
             raise UncoveredError("the integration of a prediction")
         if controller.pieces is not None and not (controller.held and controller.pieces.continuous):

@@ -57,8 +57,6 @@ def run(controller: Controller, y: Array, real: type = np.float64) -> Array:
 def measured(controller: Controller, samples: int = _SAMPLES) -> Array:
     """Measurements (K, n) within the level around the plan; numbers of few digits."""
     reference = Reference(controller=controller)
-    metric = np.array([[float(q) for q in row] for row in controller.metric])
-    factor = np.linalg.inv(np.linalg.cholesky(metric).T)  # columns of length 1 in the metric
     n, calm = len(controller.states), _CALM * samples // _SAMPLES
     rows = []
     for k in range(samples):
@@ -68,5 +66,6 @@ def measured(controller: Controller, samples: int = _SAMPLES) -> Array:
         size = 0.5 * float(controller.level) / np.sqrt(n)
         reference.sample = k
         plan = reference.plan(reference.time())[0][0]
+        factor = np.linalg.inv(np.linalg.cholesky(reference.metric(plan[None])[0]).T)  # columns of length 1
         rows.append([float(f"{value:.9g}") for value in plan + factor @ (size * turn)])
     return np.array(rows)

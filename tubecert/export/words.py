@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from tubecert.export.controller import INTEGRATION, NODES, Controller
+from tubecert.export.sweeps import counted
 
 _EXACT: Final = (
     "What the proof covers: the loop of theorem H in EXACT arithmetic. The rounding of this code is not",
@@ -27,9 +28,16 @@ TIMING: Final = (
 )
 
 
+_SWEPT: Final = (
+    "The metric is not constant. What is lost because its geodesics are computed, of panels with a constant",
+    "second derivative, is part of the proof (theorem H-G).",
+)
+
+
 def promise(controller: Controller) -> tuple[str, ...]:
-    """What the proof says of rounding."""
-    return _EXACT if controller.lost is None else _ROUNDED
+    """What the proof says of rounding, and of computed geodesics."""
+    rounding = _EXACT if controller.lost is None else _ROUNDED
+    return rounding if controller.swept is None else (*rounding, *_SWEPT)
 
 
 def brief(controller: Controller) -> str:
@@ -151,6 +159,7 @@ def operations(c: Controller) -> dict[str, int]:
     if c.predictor is not None:
         more["add"] += 3 * INTEGRATION * (m + 2)
         more["mul"] += 3 * INTEGRATION
-    for name, number in more.items():
+    swept = {} if c.swept is None else counted(c.swept, n)
+    for name, number in (*more.items(), *swept.items()):
         found[name] = found.get(name, 0) + number
     return {name: number for name, number in found.items() if number}
