@@ -18,8 +18,8 @@ from typing import Final
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Certificate
 from tubecert.conditions.hardware import HardwareRecipe, Rounding
-from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.conditions.hardware.geodesics import error_of_speed
+from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.enclosure.interval import Array, Interval, sqrt
 from tubecert.errors import TubecertError
 from tubecert.export import geodesics
@@ -72,9 +72,9 @@ class Controller:
 
     `name` begins every name in the code; `hash` is that of the certificate. Times in s; `horizon` None
     without end; `level`: d(x*, x) stays below it, and `reach` what d(x*, .) is at most where the feedback
-    looks, as it is computed; `metric` is M, empty where it is not constant: then geodesics are `swept`; `ranges`: what is proven of every input; `share` is th; `estimate` bounds |q|, and
-    `feedback_gain` is du. `lost`: what rounding may cost, where the certificate covers it. Of the plan, either the
-    program `plan` or `pieces`.
+    looks, as it is computed; `metric` is M, empty where it is not constant: then geodesics are `swept`; `ranges`:
+    what is proven of every input; `share` is th; `estimate` bounds |q|, and `feedback_gain` is du. `lost`: what
+    rounding may cost, where the certificate covers it. Of the plan, either the program `plan` or `pieces`.
     `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is covered.
     `still`: u* is constant; `held`: u* is played from sample to sample.
     """

@@ -87,9 +87,7 @@ def _symbols(model: ControlAffineModel) -> Program:
     forms = [writer.dot(eta, each) for each in turned]
     half = writer.constant(Fraction(1, 2))
     along = [writer.dot(v, [each[i] for each in turned]) for i in n]
-    writer.output(
-        "w", [writer.sub(along[i], writer.mul(half, writer.dot(W[i], forms))) for i in n]
-    )
+    writer.output("w", [writer.sub(along[i], writer.mul(half, writer.dot(W[i], forms))) for i in n])
     return writer.finished("symbols", "the second derivative of a geodesic at the state x, of the speed v")
 
 

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from flint import arb, arb_mat, ctx
 
+from tubecert.recheck.arcs import Geometry
 from tubecert.recheck.balls import Ball, exact, length
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import Case
@@ -95,16 +96,40 @@ class Machine:
             yield acting
 
     def feedback(self, y: Column, t: Fraction) -> Column:
-        """kappa of (0.5) at (x*(t), y) for a constant metric, with u* where that is held."""
+        """kappa of (0.5) at (x*(t), y), or of (H.40), with u* where that is held."""
         x, u = self.plan(t)
+        kappa = self._least(x, u, y) if self.case.system.flat else self._swept(x, u, y)
+        return [a + b for a, b in zip(kappa, u, strict=True)] if self.whole else kappa
+
+    def _least(self, x: Column, u: Column, y: Column) -> Column:
+        """Of a constant metric."""
         z = [a - b for a, b in zip(y, x, strict=True)]
         g = _times(self.metric, z)
         moved = [a - b for a, b in zip(self.speed(y, u), self.speed(x, u), strict=True)]
         excess = _dot(g, moved) + exact(self.case.system.rate) * _dot(g, z)
         c = _times(_turned(self.inputs(y)), g)
         share = excess / _dot(c, c) if excess > 0 else arb(0)
-        kappa = [-share * each for each in c]
-        return [a + b for a, b in zip(kappa, u, strict=True)] if self.whole else kappa
+        return [-share * each for each in c]
+
+    def _swept(self, x: Column, u: Column, y: Column) -> Column:
+        """By the geodesic that is computed, (H.39), (H.40)."""
+        machine = self.case.result.specification.hardware
+        arcs = None if machine is None else machine.arcs
+        if arcs is None:
+            raise ValueError("its metric is not constant, and its geodesics are exact")
+        geometry = Geometry(self.case.system)
+        first, last = geometry.speeds(arcs, x, y)
+        p0, p1 = geometry.lowered(x, first), geometry.lowered(y, last)
+        square = _dot(p1, last)
+        slope = _dot(p1, self.speed(y, u)) - _dot(p0, self.speed(x, u))
+        excess = slope + exact(self.case.system.rate) * square
+        c = _times(_turned(self.inputs(x)), p0)
+        norm = length(c)
+        if not (excess > 0 and norm > 0):
+            return [arb(0)] * len(c)
+        limit = exact(self.case.bound("feedback_gain")) * square.sqrt()
+        share = (excess / norm).min(limit) / norm
+        return [-share * each for each in c]
 
     def estimate(self, y: Column, last: Column, mean: Column) -> Column:
         """sigma of (H.5)."""
