@@ -12,7 +12,7 @@ import numpy as np
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.export.controller import Controller, Machine, assembled
 from tubecert.model import build
-from tubecert.spec import Knots, load_text
+from tubecert.spec import Knots, Picard, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
 
@@ -55,6 +55,9 @@ trajectory: {kind: equilibrium, at: [0, 0]}
 metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
 tube: {epsilon: 0.1, rho_a: 0.1}
 """
+BENT = (CONFIGS / "state_dependent_input.yaml").read_text("utf-8") + (
+    "hardware: {rate: 500, delay: 0.0005, geodesic: {nodes: 3, sweeps: 2}}\n"
+)
 KNOTS = Knots(
     t=tuple(map(Fraction, ("0", "0.013", "0.02", "0.3", "0.31"))),
     x=tuple(
@@ -131,7 +134,14 @@ GIVEN = {
     ),
     # a plan through knots, of which several meet one sample, and no filter
     "path": _path(bandwidth=None),
-    # the same, with a prediction in which u* moves
+    # a metric that depends on the state, and B(x): its geodesics are computed
+    "bent": machine(
+        BENT,
+        recipe=recipe(level=Fraction("0.05"), clip_radius=Fraction("0.3")),
+        feedback_gain=Fraction("1.85"),
+        geodesic=Picard(nodes=3, sweeps=2),
+    ),
+    # the same as "path", with a prediction in which u* moves
     "predicting_path": _path(prediction=Fraction("0.01")),
 }
 # of no other tests: a slow machine with a wide clip

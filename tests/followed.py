@@ -35,6 +35,7 @@ TEXTS = {
     "turning": controllers.TURNING,
     "path": controllers.PATH,
     "steep": controllers.STEEP,
+    "bent": controllers.BENT,
 }
 
 
@@ -59,7 +60,8 @@ def in_recheck(name: str) -> Machine:
         system=system,
         curve=curve,
         tube=SimpleNamespace(coordinates=S),
-        result=SimpleNamespace(plan=SimpleNamespace(knots=knots)),
+        result=SimpleNamespace(plan=SimpleNamespace(knots=knots), specification=read_again),
+        bound={"feedback_gain": given.feedback_gain}.__getitem__,
     )
     section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
     return Machine(case, section, given.recipe, held=given.held)

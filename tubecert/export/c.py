@@ -182,7 +182,7 @@ def _source(c: Controller, language: C) -> Iterator[str]:
     yield from _plan(c, language)
     yield from _mean(c, language)
     if c.swept is not None:
-        yield from in_c(c.swept, language.number(Fraction(0)))
+        yield from in_c(c.swept, len(c.states), language.number(Fraction(0)))
     yield from _law(c, language)
     if c.predicts:
         yield from _predicted(c, language)
