@@ -48,6 +48,7 @@ NOT_RUN = {
     ".venv/bin/pip install": "needs the network; .ci/run does it",
     ".venv/bin/python -m pytest": "these tests",
     "tubecert design": "minutes; tests/sweep runs designs of smaller systems",
+    "tubecert certify plant.yaml --set hardware.delay": "minutes, of the windows of a plant with a machine",
     "tubecert sweep": "30 certificates, or a cluster; tests/sweep runs smaller ones",
     "dask": "a cluster; tests/executor starts one",
     "tubecert recheck hardware_orbit": "tests/export/test_export_belongs.py, with this certificate",
