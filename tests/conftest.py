@@ -28,6 +28,13 @@ def pytest_runtestloop():
     gc.enable()
 
 
+@pytest.fixture(autouse=True)
+def subnormal_numbers():
+    """A library that a test loads may make the processor flush them to 0: then no rounding is outward any more."""
+    yield
+    assert sys.float_info.min / 2 > 0, "subnormal numbers are flushed to 0 from here on"
+
+
 @pytest.fixture(scope="session", autouse=True)
 def interruptible():
     """A shell starts jobs in the background deaf to interruptions, nohup to hangups; children would inherit that."""

@@ -139,12 +139,14 @@ def test_a_part_of_fast_math_is_refused_or_changes_nothing(flag, cc, tmp_path):
     for flags in ((), (flag,)):
         files.save(str(tmp_path))
         target, source = str(tmp_path / f"of{len(found)}.so"), str(tmp_path / f"{controller.name}.c")
-        command = [cc, "-std=c99", "-O2", *flags, "-shared", "-fPIC", source, "-o", target, "-lm"]
+        command = [cc, "-std=c99", "-O2", *flags, "-c", "-fPIC", source, "-o", f"{target}.o"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if flags and cc == "gcc":
             assert "compile without" in done.stderr
             return
         assert done.returncode == 0, done.stderr
+        # linked without the flag: with it clang adds code that flushes subnormal numbers to 0 in this whole process
+        subprocess.run([cc, "-shared", f"{target}.o", "-o", target, "-lm"], check=True)
         own = Compiled(ctypes.CDLL(target), controller, single=False, lanes=1)
         found.append(np.array([own.start(y[0]), *(own.step(row) for row in y)]))
     assert np.array_equal(*found)
