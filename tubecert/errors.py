@@ -48,3 +48,13 @@ class SpecError(TubecertError):
 
 class TargetError(TubecertError):
     """A file cannot be read or written (exit code 2)."""
+
+
+class ProcessorError(RuntimeError):
+    """The process rounds in another way than IEEE 754 does by default (exit code 3)."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "this process does not round as IEEE 754 does by default, so nothing can be proven in it; a library "
+            "compiled with -ffast-math may have changed that when it was loaded: run tubecert without it"
+        )

@@ -24,6 +24,7 @@ from tubecert.conditions.proposal import Proposal
 from tubecert.conditions.theorem import R, Recipe, Theorem
 from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded
 from tubecert.enclosure.interval import Interval
+from tubecert.enclosure.processor import require_ieee
 
 THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
     theorem.recipe: theorem
@@ -53,8 +54,9 @@ class Proof(Generic[R]):
     recipe: R
 
     def __init__(self, problem: TubeProblem, recipe: R) -> None:
-        """Evaluates every inequality; raises `NotProvenError` if one is not proven."""
+        """Evaluates every inequality; raises `NotProvenError` if one is not proven, or `ProcessorError`."""
         margins = _margins(problem, recipe)
+        require_ieee()
         if not _proves(problem, recipe, margins):
             raise NotProvenError(margins)
         for name, value in (("margins", margins), ("problem", problem), ("recipe", recipe)):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from tubecert.errors import ExitCode, TargetError, TubecertError
+from tubecert.errors import ExitCode, ProcessorError, TargetError, TubecertError
 from tubecert.printable import printable_lines
 
 if TYPE_CHECKING:
@@ -32,6 +32,9 @@ def guarded(output: Output) -> Iterator[None]:
     except KeyboardInterrupt as stop:
         _tell(str(stop) or "interrupted")
         raise typer.Exit(ExitCode.INTERRUPTED) from None
+    except ProcessorError as error:
+        _tell(str(error))
+        raise typer.Exit(ExitCode.INTERNAL) from None
     except MemoryError as error:
         if output.debug:
             raise

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.enclosure.processor import require_ieee
 from tubecert.executor import Executor, WorkerError
 from tubecert.progress import Phase, Progress, Step
 from tubecert.verdict import Verdict
@@ -177,6 +178,7 @@ class _Search:
                 for old, new in zip((lo, hi, bound), zip(*children, strict=True), strict=True)
             )
             self._tell(float(bound.max(initial=-np.inf)))
+        require_ieee()  # after the work: what was changed in between stays changed
         return lo, hi, bound
 
     def _tell(self, above: float) -> None:
