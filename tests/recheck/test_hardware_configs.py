@@ -13,7 +13,7 @@ ORBIT = (CONFIGS / "hardware_orbit.yaml").read_text("utf-8")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hardware_orbit", "hardware_three"])
+@pytest.mark.parametrize("name", ["hardware_orbit", "hardware_three", "hardware_state_dependent_input"])
 def test_a_shipped_machine_is_certified_and_confirmed(name):
     document = proven.shipped(name)
     assert document["result"]["verdict"] == Verdict.CERTIFIED
@@ -39,3 +39,16 @@ def test_a_shipped_machine_is_certified_and_confirmed(name):
 def test_the_certificate_is_of_no_other_machine(change):
     document = proven.proven(ORBIT)
     assert rechecked.unconfirmed(respecified(document, change))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda e: e["hardware"]["geodesic"].update(nodes="2"),
+        lambda e: e["hardware"]["geodesic"].update(sweeps="1"),
+        lambda e: e["hardware"].pop("geodesic"),
+    ],
+)
+def test_the_certificate_is_of_no_other_geodesics(change):
+    assert rechecked.unconfirmed(respecified(proven.shipped("hardware_state_dependent_input"), change))
