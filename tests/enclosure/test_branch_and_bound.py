@@ -291,6 +291,25 @@ def test_nested_norms_have_the_product_of_their_slopes():
     assert found.above <= 5.1
 
 
+@pytest.mark.parametrize(
+    ("h", "lower", "most"),
+    [
+        ("1/(x + abs(x))", 1, 0.5),  # -1/(2 x^2)
+        ("sqrt(x + abs(x))", 1, 0.5 * math.sqrt(2)),
+        ("y/(x - abs(x) - 1)", -1, math.sqrt(5)),  # both signs are there, and either is defined
+        ("norm(x - abs(x), abs(x) - x)", -1, 2 * math.sqrt(2)),
+    ],
+)
+def test_a_branch_that_divides_by_zero_is_no_bound_and_no_error(h, lower, most):
+    """For x < 0 there is no 1/(x + abs(x)); where x > 0 nothing depends on that."""
+    from tubecert.bounds.suprema import _lipschitz
+
+    parsed = parse(h, symbols=SYMBOLS, kinks=True).expression
+    found = supremum(_lipschitz((parsed,), IN_X), box(x=(lower, 2), y=(-1, 1)), Effort(budget=20_000))
+    assert found.above >= most * (1 - 1e-9)
+    assert found.above < 1.1 * most
+
+
 def test_weights_below_the_exact_ones_never_lower_the_bound():
     """Sup over mu of v'Nv/(p/mu + mu q) is N/(2 sqrt(p q)), at mu = sqrt(p/q)."""
 

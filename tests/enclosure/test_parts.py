@@ -70,6 +70,7 @@ def ridge(workers: Executor | None, effort: Effort = EFFORT) -> Supremum:
     return supremum(RIDGE, CUBE, replace(effort, workers=workers))
 
 
+@pytest.mark.slow
 def test_the_parts_are_the_same_whoever_searches_them(short, monkeypatch):
     own = ridge(None)
     assert own.boxes > 600  # it does fall apart
@@ -94,6 +95,7 @@ def test_short_searches_and_decisions_stay_whole(short):
         supremum(RIDGE, CUBE, replace(EFFORT, workers=alone))
 
 
+@pytest.mark.slow
 def test_the_budget_is_that_of_all_parts_together(short):
     found = ridge(Elsewhere(), Effort(gap=1e-9, absolute=0, budget=9_000))
     assert not found.reached

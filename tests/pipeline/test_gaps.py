@@ -49,6 +49,7 @@ def test_gains_are_those_of_close_constants(name, kind):
         assert other.below <= found.above
 
 
+@pytest.mark.slow
 def test_the_certificate_says_how_closely_and_is_confirmed():
     text = SMALL.replace("tube: {", "tube: {gap: auto, ")
     assert text != SMALL
@@ -63,6 +64,7 @@ def test_the_certificate_says_how_closely_and_is_confirmed():
     assert examine(sealed(document)).verdict != "confirmed"
 
 
+@pytest.mark.slow
 def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
     text = SMALL.replace("tube: {", "tube: {gap: auto, ")
     own, plain = (proven(each, conditions="B", by_effect=by) for each, by in ((text, False), (SMALL, None)))

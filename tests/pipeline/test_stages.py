@@ -194,6 +194,7 @@ def judged():
     return answer(question_of(THREE, Options()))
 
 
+@pytest.mark.slow
 def test_a_metric_that_is_not_proven_is_no_stage(judged):
     metric = judged.bounded.enclosed.tube.planned.metric
     end = answer(question_of(load_text(THREE.source.replace("rate: 0.9999", "rate: 1.01")), Options()))

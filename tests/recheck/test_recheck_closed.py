@@ -363,6 +363,7 @@ PLACES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES, ids=".".join)
 def test_a_number_that_is_none_is_refused_at_once(place):
     """R9: 1e-999999999 hung, integers of 4000 digits and 1e308 were internal errors."""

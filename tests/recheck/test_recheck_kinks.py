@@ -68,6 +68,7 @@ def bound():
     return suprema.lipschitz(suprema.h)
 
 
+@pytest.mark.slow
 def test_the_lipschitz_constant_needs_few_boxes(bound):
     """Natural extensions needed two millions for 1 %."""
     assert bound.above - bound.below < 1e-3 * bound.above

@@ -531,6 +531,7 @@ def test_margins_around_are_those_of_each_bandwidth(regulated):
     )
 
 
+@pytest.mark.slow
 def test_a_margin_around_is_the_margin_of_those_gains(regulated):
     problem = problem_of(load(str(CONFIGS / "three_state.yaml")), Options())
     data = regulated["result"]["conditions_26"]["margins_around"]
@@ -762,6 +763,7 @@ def _inside(inner, outer, slack=1.0):
     )
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize(
     ("name", "width", "dark"),
@@ -784,6 +786,7 @@ def test_layout_in_a_browser(shown, tmp_path, name, width, dark):
     assert min(found["sizes"]) > 9, "ticks can be read"
 
 
+@pytest.mark.slow
 @needs_browser
 def test_layout_on_paper(shown, tmp_path):
     sheet = 680  # A4 within its margins
@@ -800,11 +803,13 @@ def test_layout_on_paper(shown, tmp_path):
     assert min(found["sizes"]) > 6, "ticks can be read"
 
 
+@pytest.mark.slow
 @needs_browser
 def test_the_browser_has_nothing_to_complain_about(shown, tmp_path):
     assert pages.console_of(shown.values(), tmp_path) == []
 
 
+@pytest.mark.slow
 @needs_browser
 def test_the_console_test_would_notice(tmp_path):
     broken = tmp_path / "broken.html"
@@ -814,6 +819,7 @@ def test_the_console_test_would_notice(tmp_path):
     assert pages.console_of([broken], tmp_path)
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize(("width", "height", "dark"), [(1280, 4000, False), (390, 5000, True)])
 def test_screenshots(shown, tmp_path, width, height, dark):

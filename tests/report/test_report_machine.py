@@ -24,6 +24,7 @@ conditions: {decides: H}
 """
 
 
+@pytest.mark.slow
 def test_noise_that_is_given_by_state_is_told_by_state_with_units():
     page = tc.report(tc.certify(tc.specification(PLANT.replace("NOISE", "{v: 0.0004, z: 0.0003}"))))
     assert "noise z 0.0003 m, v 0.0004 m/s" in page.html.replace("&#x27;", "'")
@@ -31,12 +32,14 @@ def test_noise_that_is_given_by_state_is_told_by_state_with_units():
     assert "noise 0.0001" in page.html
 
 
+@pytest.mark.slow
 def test_states_keep_their_order_in_a_certificate_that_is_read(tmp_path):
     result = tc.certify(tc.specification(PLANT.replace("NOISE", "0")))
     result.save(tmp_path / "cart.json")
     assert list(tc.read(tmp_path / "cart.json").half_widths) == list(result.half_widths) == ["z", "v"]
 
 
+@pytest.mark.slow
 def test_a_band_over_time_is_as_wide_as_its_window():
     result = tc.certify(tc.specification(PLANT.replace("NOISE", "0"))).result
     own = result.sections["hardware"]

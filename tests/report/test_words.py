@@ -104,6 +104,7 @@ def labels(shown):
     )  # ends of sentences
 
 
+@pytest.mark.slow
 def test_every_label_of_the_first_screen_has_a_page(screen):
     found = labels(screen)
     assert {

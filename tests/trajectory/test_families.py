@@ -55,6 +55,7 @@ def result_of(text, **options):
     return pipeline.certify(load_text(text, "spec.yaml"), Options(**{"conditions": "distance"} | options))
 
 
+@pytest.mark.slow
 def test_a_family_is_certified_for_all_time_and_says_which_plans(document):
     result = document["result"]
     assert result["verdict"] == "certified"

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -440,8 +440,13 @@ def _kinks(h: tuple[Expression, ...], fields: Fields) -> Kinks | None:
     if not 0 < len(signs) <= _SIGNS:
         return None
     slopes = fields.by_state(jacobian(tuple(plain[e] for e in h), fields.states))
-    every = {
-        chosen: substituted(slopes, dict(zip(signs, map(constant, map(Fraction, chosen)), strict=True)))
-        for chosen in product((1, -1), repeat=len(signs))
-    }
+    every = {chosen: _branch(slopes, signs, chosen) for chosen in product((1, -1), repeat=len(signs))}
     return Kinks(arguments=column(list(signs.values())), branches=every)
+
+
+def _branch(slopes: Matrix, signs: Iterable[str], chosen: tuple[int, ...]) -> Matrix | None:
+    """The slopes with signs chosen; None where a divisor is 0 then, as x + abs(x) is for x < 0."""
+    try:
+        return substituted(slopes, dict(zip(signs, map(constant, chosen), strict=True)))
+    except ZeroDivisionError:
+        return None

@@ -89,11 +89,11 @@ class SumOfNorms:
 class Kinks:
     """Where an h with absolute values |a_k| has kinks: `arguments` a, (K, 1), and its Jacobian for choices of signs.
 
-    In `branches` every |a_k| is s_k a_k, s in {-1, 1}^K.
+    In `branches` every |a_k| is s_k a_k, s in {-1, 1}^K; None: nothing is known of that one, as it is defined nowhere.
     """
 
     arguments: Matrix
-    branches: Mapping[tuple[int, ...], Matrix]
+    branches: Mapping[tuple[int, ...], Matrix | None]
 
 
 class _Branches:
@@ -105,8 +105,11 @@ class _Branches:
 
     def __init__(self, kinks: Kinks) -> None:
         self._arguments = MatrixFunction([kinks.arguments])
-        self._norms = [(signs, SumOfNorms([own])) for signs, own in kinks.branches.items()]
-        used = {*self._arguments.variables}.union(*(norm.variables for _, norm in self._norms))
+        self._norms = [
+            (signs, None if own is None else SumOfNorms([own])) for signs, own in kinks.branches.items()
+        ]
+        norms = [norm for _, norm in self._norms if norm is not None]
+        used = {*self._arguments.variables}.union(*(norm.variables for norm in norms))
         self.variables = tuple(sorted(used))
 
     def upper(self, variables: tuple[str, ...], lo: Array, hi: Array, target: float) -> Estimate:
@@ -123,6 +126,9 @@ class _Branches:
         for signs, norm in self._norms:
             rows = np.flatnonzero(np.all([there[s][:, k] for k, s in enumerate(signs)], axis=0))
             if not len(rows):
+                continue
+            if norm is None:
+                value[rows] = np.inf
                 continue
             columns = np.array([variables.index(v) for v in norm.variables], dtype=np.intp)
             own = norm.upper(lo[rows][:, columns], hi[rows][:, columns], target)

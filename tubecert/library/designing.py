@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tubecert import certificate
+from tubecert.digits import short
 from tubecert.errors import SpecError
 from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
@@ -187,7 +188,7 @@ class TradeOff:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        rows = [(f"{size:.4g}", f"{value:.4g}") for size, value in self.curve]
+        rows = [(short(size), short(value)) for size, value in self.curve]
         return notebook.of_line(str(self), self.spec.name, "", rows)
 
 
@@ -439,10 +440,10 @@ def _sealed(result: Result) -> Certification:
 def _rows(attempts: Sequence[Attempt]) -> list[tuple[str, str]]:
     """Scales with what came of them."""
     return [
-        (f"{float(each.scale):.4g} times as wide", str(each.result.verdict) + _wide(each.size))
+        (f"{short(each.scale)} times as wide", str(each.result.verdict) + _wide(each.size))
         for each in attempts
     ]
 
 
 def _wide(size: float | None) -> str:
-    return "" if size is None else f": {size:.4g}"
+    return "" if size is None else f": {short(size)}"

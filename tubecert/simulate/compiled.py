@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 if "numba" not in sys.modules:
     os.environ.setdefault("NUMBA_OPT", "1")  # compiles faster by a third, and the loops are as fast
@@ -25,6 +25,7 @@ from numba.core.options import DefaultOptions
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.sealed import SealedFile
 
+Kernel: TypeAlias = Callable[..., Any]  # a function of whatever numba compiles it for
 _NAMES: list[str] = []  # of all kernels
 # Kernels make no arrays, and their callers hold those that they work on: without counting references, which numba does
 # atomically for every member of every tuple, the loops are twice as fast.
@@ -35,7 +36,7 @@ KERNELS = (
 )  # fmt: skip
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+def compiled(function: Kernel) -> Kernel:
     """The function compiled when another kernel first needs it; it cannot be called from Python.
 
     Without the wrappers that a call from Python needs, half of the compilation is saved.
@@ -43,7 +44,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def folded(function: Callable[..., Any]) -> Callable[..., Any]:
+def folded(function: Kernel) -> Kernel:
     """The same, made a part of each kernel that calls it, which should be one or two.
 
     A call passes every member of every tuple, hundreds of words, which costs more than most of these functions do.
@@ -51,18 +52,18 @@ def folded(function: Callable[..., Any]) -> Callable[..., Any]:
     return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
 
 
-def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+def entry(function: Kernel) -> Kernel:
     """The function compiled when first called from Python; it runs without the GIL."""
     return _kernel(function, nogil=True, no_cfunc_wrapper=True)
 
 
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+def inlined(function: Kernel) -> Kernel:
     """The function, written out wherever a kernel calls it."""
     compiler: Any = numba.njit
     return compiler(inline="always")(function)  # type: ignore[no-any-return]
 
 
-def _kernel(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
+def _kernel(function: Kernel, **options: bool) -> Kernel:
     """Numba finds a folder for the machine code: beside the package, or in the user's cache.
 
     It would trust every file there that is not older than the function's own source. Kernels call each other across
