@@ -129,6 +129,10 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     resealed = certification_of(certificate.seal(data["result"], {})).certificate
     with pytest.raises(TubecertError, match="that of another certificate"):
         examined(str(folder), resealed, text, target.name)
+    less = json.loads(json.dumps(data["result"]))
+    less["constants"]["feedback_gain"]["above"] = None
+    with pytest.raises(TubecertError, match="feedback_gain has no bound"):
+        controller_of(certification_of(certificate.seal(less, {})).certificate)
     section = data["result"]["hardware"]
     section["verdict"] = "undecided"
     with pytest.raises(TubecertError, match="certifies no controller"):

@@ -153,7 +153,7 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
         held=spec.hardware.held,
         horizon=_horizon(certificate),
         ranges=tuple(data.inputs.get(each, (-math.inf, math.inf)) for each in model.inputs),
-        feedback_gain=_gain(certificate),
+        feedback_gain=_gain(certificate, name),
         geodesic=spec.hardware.geodesic,
     )
     if certificate.result.claim.plans is not None or spec.trajectory.bundle is not None:
@@ -320,9 +320,12 @@ def looked_at(recipe: HardwareRecipe, noise: float, upper: float) -> Fraction:
     return recipe.level + Fraction(f"{float(looked) * (1 + 1e-6):.6e}")
 
 
-def _gain(certificate: Certificate) -> Fraction:
-    """du, from above."""
-    return Fraction(certificate.result.constants[_GAIN].above or 0)
+def _gain(certificate: Certificate, name: str) -> Fraction:
+    """du, from above: what the feedback is clipped by; one that is missing would be a controller without feedback."""
+    gain = certificate.result.constants.get(_GAIN)
+    if gain is None or gain.above is None:
+        raise incomplete(name, f"the constant {_GAIN} has no bound")
+    return Fraction(gain.above)
 
 
 def _horizon(certificate: Certificate) -> Fraction | None:
