@@ -78,6 +78,12 @@ def certification_numbers(given: Mapping[str, str | None], named: Named) -> Cert
     return CertificationNumbers(**radii, **gains, gap=gap, by_effect=by_effect, budget=budget)
 
 
+def effort_numbers(given: Mapping[str, str | None]) -> CertificationNumbers:
+    """The same where gap and budget are all that is asked with; raises `SpecError`."""
+    others = ("rho_a", "epsilon", "deadline", "bandwidth", "adaptation_rate")
+    return certification_numbers({**dict.fromkeys(others), **given}, str)
+
+
 def jobs_of(name: str, given: str | None) -> int | None:
     """How many processes are asked for; raises `SpecError`."""
     numbers = Numbers()

@@ -20,7 +20,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
 from tubecert.libraries import versions
-from tubecert.library.asked import Named, certification_numbers
+from tubecert.library.asked import Named, effort_numbers
 from tubecert.library.certification import Certification, certification_of
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
@@ -413,18 +413,7 @@ def _searched(spec: Spec, asked: Asked) -> str | None:
 
 
 def _options(gap: Number | None, budget: int | None) -> Options:
-    numbers = certification_numbers(
-        number_texts(
-            rho_a=None,
-            epsilon=None,
-            deadline=None,
-            bandwidth=None,
-            adaptation_rate=None,
-            gap=gap,
-            budget=budget,
-        ),
-        str,
-    )
+    numbers = effort_numbers(number_texts(gap=gap, budget=budget))
     return numbers.options(conditions=None, formulas="corrected")
 
 

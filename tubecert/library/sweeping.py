@@ -17,7 +17,7 @@ from tubecert.errors import SpecError
 from tubecert.executor import Executor, chosen
 from tubecert.files import replace
 from tubecert.findings import Finding
-from tubecert.library.asked import certification_numbers, jobs_of
+from tubecert.library.asked import effort_numbers, jobs_of
 from tubecert.library.certification import Certification, read
 from tubecert.library.plain import Number, number_text, number_texts
 from tubecert.library.specification import NAME, File, Specifiable, spec_of
@@ -158,18 +158,7 @@ def sweep(
 
     Raises `SpecError` where no point has a specification that can be read, `TargetError` for a folder of another sweep.
     """
-    numbers = certification_numbers(
-        number_texts(
-            rho_a=None,
-            epsilon=None,
-            deadline=None,
-            bandwidth=None,
-            adaptation_rate=None,
-            gap=gap,
-            budget=budget,
-        ),
-        str,
-    )
+    numbers = effort_numbers(number_texts(gap=gap, budget=budget))
     file = None if metric is None else Path(metric)
     axes = axes_of(f"{key}={_range_text(values, key)}" for key, values in over.items())
     whole = spec_of(spec)
