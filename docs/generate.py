@@ -1,4 +1,7 @@
-"""Writes docs/reference/ from the JSON Schemas and the pages of `explain`: python docs/generate.py"""
+"""Writes docs/reference/ and the README's table of published metrics: python docs/generate.py
+
+From the JSON Schemas, the pages of `explain` and what `verify` said of the published metrics.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator
-from decimal import ROUND_CEILING, Context
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from pathlib import Path
 from typing import Any
 
@@ -251,6 +254,54 @@ def _sources(folder: Path, known: list[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(re.sub(r"cached metric \d+", "cached metrics (ged_..)", text) for text in told))
 
 
+def readme(text: str) -> str:
+    """The text of README.md with its table of published metrics: the page above, by source and rate."""
+    folder = ROOT / "configs" / "published"
+    known = json.loads((folder / "verified.json").read_text(encoding="utf-8"))
+    found = json.loads((folder / "found" / "verified.json").read_text(encoding="utf-8"))
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for each in known:
+        notes = _notes(folder / Path(each["file"]).name)
+        series = "cached metric" in notes["source"]
+        source = re.sub(r", cached metric \d+| \(GitHub[^)]*\)", "", notes["source"])
+        claimed = f"rates near {each['rate']:.1f}" if series else notes["published"].split(";")[0]
+        groups.setdefault((source, claimed), []).append(each)
+    rows = [
+        "| source | published | proven | supports rates, 1/s | found there instead |",
+        "|---|---|---|---|---|",
+        *(_readme_row(folder, *key, groups[key], found) for key in sorted(groups)),
+    ]
+    begin, end = (f"<!-- {word} of the table that docs/generate.py writes -->\n" for word in ("start", "end"))
+    before, rest = text.split(begin)
+    return before + begin + "\n" + "\n".join(rows) + "\n\n" + end + rest.split(end)[1]
+
+
+def _readme_row(
+    folder: Path, source: str, claimed: str, group: list[dict[str, Any]], found: list[dict[str, Any]]
+) -> str:
+    failed = [each for each in group if each["verdict"] != "certified"]
+    claims = dict.fromkeys(_FAILS[each["reason"]["claim"]] for each in failed)
+    holds, fails = f"{len(group) - len(failed)} hold", f"{len(failed)} refuted ({', '.join(claims)})"
+    if len(group) == 1:
+        holds, fails = "holds", f"refuted ({', '.join(claims)})"
+    below = Context(prec=4, rounding=ROUND_FLOOR)
+    rates = sorted(each["largest_rate"][0] for each in group if each.get("largest_rate"))
+    ends = (f"{below.create_decimal(str(r))}" if r > 0 else "none above 0" for r in (*rates[:1], *rates[-1:]))
+    supports = " to ".join(dict.fromkeys(ends))
+    beside = {
+        str(Context(prec=4, rounding=ROUND_CEILING).create_decimal(str(each["condition_number"][1])))
+        for each in found
+        for notes in [_notes(folder / "found" / Path(each["file"]).name)]
+        if "beside" not in notes and {Path(e["file"]).stem for e in failed} & set(notes["for"].split(", "))
+    }
+    instead = (
+        f"condition number {', '.join(sorted(beside))}" if beside else "none on its set" if failed else ""
+    )
+    proven = ", ".join(words for words, told in ((holds, len(failed) < len(group)), (fails, failed)) if told)
+    cells = [source, claimed, proven, supports, instead]
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
 def everything() -> dict[str, str]:
     """The text of every page by its file name."""
     schemas = {"specification": "spec", "metric": "metric", "certificate": "certificate"}
@@ -266,6 +317,8 @@ def main() -> None:
     REFERENCE.mkdir(exist_ok=True)
     for name, text in everything().items():
         (REFERENCE / name).write_text(text, encoding="utf-8")
+    page = ROOT / "README.md"
+    page.write_text(readme(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -342,3 +342,6 @@ def test_the_reference_is_what_the_schemas_say():
 
     for name, text in generate.everything().items():
         assert (ROOT / "docs" / "reference" / name).read_text("utf-8") == text, "run python docs/generate.py"
+    page = (ROOT / "README.md").read_text("utf-8")
+    assert generate.readme(page) == page, "run python docs/generate.py"
+    assert page.count("\n| ") > 20  # the table of published metrics is there
