@@ -18,9 +18,9 @@ from tubecert.claims.tube import TubeInSafeSet
 from tubecert.cli.app import app
 from tubecert.expression import scan
 from tubecert.model import build
-from tubecert.pipeline import Deadline, Options, Synthesised, synthesis
+from tubecert.pipeline import Deadline, Options, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
-from tubecert.pipeline.synthesised import Row
+from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 

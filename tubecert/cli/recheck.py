@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tubecert.cli.belonging import belongs
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
@@ -38,7 +37,7 @@ def run(given: Given, output: Output) -> ExitCode:
     numbers.check()
     name = given.certificate
     text = text_of(name)
-    note = "" if given.spec is None else belongs(document.read(text, name), name, given.spec)
+    note = "" if given.spec is None else _specification(given.spec, text, name)
     code = "" if given.controller is None else _controller(given.controller, text, name)
     from tubecert.report import progress
     from tubecert.report.terminal import Terminal
@@ -52,6 +51,13 @@ def run(given: Given, output: Output) -> ExitCode:
     shown = _as_json(found, name, notes) if output.json else _as_text(found, name, notes, output)
     write_stdout(shown)
     return found.exit_code
+
+
+def _specification(path: str, text: str, name: str) -> str:
+    """A sentence that says that the certificate is of a specification; raises TC604 if it is not."""
+    from tubecert.cli.belonging import belongs
+
+    return belongs(document.read(text, name), name, path)
 
 
 def _controller(folder: str, text: str, name: str) -> str:

@@ -18,7 +18,7 @@ from tubecert.report.terminal import Terminal
 from tubecert.spec.synthesis import COORDINATES
 
 if TYPE_CHECKING:
-    from tubecert.pipeline import Synthesised
+    from tubecert.pipeline.synthesised import Synthesised
     from tubecert.spec import Spec
 
 

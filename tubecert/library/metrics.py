@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from tubecert import certificate, pipeline
 from tubecert.certificate.metric_file import MetricFile
@@ -30,15 +30,16 @@ from tubecert.library.asked import (
 )
 from tubecert.library.plain import Data, Number, number_texts
 from tubecert.library.specification import File, Specifiable, Specification, spec_of
-from tubecert.pipeline.synthesised import Synthesised
-from tubecert.pipeline.verification import Verified
-from tubecert.pipeline.verification import verify as decided
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec, metric_file
 from tubecert.spec.synthesis import COORDINATES, OBJECTIVES, ROUTES
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
+
+if TYPE_CHECKING:
+    from tubecert.pipeline.synthesised import Synthesised
+    from tubecert.pipeline.verification import Verified
 
 IN_CODE: Final = "given in code"  # what a certificate calls a metric that is no file
 
@@ -206,6 +207,8 @@ def verify(
     Without `metric` it is the specification's own. `rate`, in 1/s, is asked about in place of the metric's. A file or a
     mapping with a system, its safe set and a metric suffices as `spec`. Raises `SpecError` if there is no metric.
     """
+    from tubecert.pipeline.verification import verify as decided
+
     numbers = verification_numbers(number_texts(rate=rate, gap=gap, budget=budget), str)
     wanted, effort = numbers.rate, Effort(gap=float(numbers.gap), budget=numbers.budget)
     whole, name = spec_of(spec, alone=True), ""

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from tubecert.certificate.file import KIND, unreadable
 from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
-from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
-from tubecert.library.plain import Number, number_texts
-from tubecert.library.specification import File
 from tubecert.progress import Phase, Progress, Step
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
 from tubecert.report.progress import timed
+
+if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
+    from tubecert.library.certification import Certification
+    from tubecert.library.plain import Number
+    from tubecert.library.specification import File
 
 WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
@@ -74,15 +77,17 @@ def recheck(
     `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided.
     Raises `TubecertError` for what is no certificate.
     """
+    from tubecert.library.plain import number_texts
+
     numbers = Numbers()
     given = number_texts(budget=budget, deadline=deadline)
     most, seconds = numbers.count("budget", given["budget"]), numbers.positive("deadline", given["deadline"])
     numbers.check()
-    if isinstance(result, Certification):
-        text, name = result.text, result.name
-    else:
+    if isinstance(result, (str, os.PathLike)):
         name = os.fspath(result)
         text = text_of(name)
+    else:
+        text, name = result.text, result.name
     shown = timed(progress)
     report = None if shown is None else told(shown)
     limit = None if seconds is None else float(seconds)

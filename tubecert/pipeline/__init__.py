@@ -15,8 +15,11 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from tubecert.certificate.result import Result
 from tubecert.enclosure.branch_and_bound import Effort
@@ -29,8 +32,6 @@ from tubecert.pipeline.certification import answer, result
 from tubecert.pipeline.checks import inspect, missing_parts, moving_drift, not_covered
 from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
-from tubecert.pipeline.synthesis import SynthesisRun
-from tubecert.pipeline.synthesised import Synthesised
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
@@ -38,14 +39,15 @@ from tubecert.stages.options import Options, overridden
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Stage
 from tubecert.stages.time import time_of
-from tubecert.synthesis.bridge import required
+
+if TYPE_CHECKING:
+    from tubecert.pipeline.synthesised import Synthesised
 
 __all__ = [
     "Deadline",
     "Memory",
     "Options",
     "Result",
-    "Synthesised",
     "certify",
     "inspect",
     "synthesise",
@@ -125,6 +127,9 @@ def synthesise(
     was proven by then is what comes out (`Synthesised.cut`).
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
+    from tubecert.pipeline.synthesis import SynthesisRun  # solvers, only where they are needed
+    from tubecert.synthesis.bridge import required
+
     required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)
     findings, time = time_of(spec)

@@ -20,9 +20,7 @@ from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
-from tubecert.pipeline.rounding import rounded
 from tubecert.pipeline.windows import windowed
-from tubecert.planner.propose import course_of, knots_of
 from tubecert.search.coordinates import Wish, propose
 from tubecert.search.machines import PARTS
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
@@ -69,6 +67,8 @@ def plan(metric: ProvenMetric) -> Planned:
     spec, model, task, show = question.spec, question.model, question.spec.trajectory.task, question.progress
     if task is None:
         return lay(metric)
+    from tubecert.planner.propose import course_of, knots_of  # only where they are needed
+
     whole = canonical(spec)
     depends_on = {key: whole[key] for key in ("system", "trajectory")}
     course = question.memory.recall("plan", depends_on, lambda: course_of(spec, task, model, show))
@@ -104,7 +104,11 @@ def judge(bounded: Bounded) -> Judged:
     for recipe, each in PROPOSERS.items():
         tell_gains(bounded.question, recipe)
         proposals[recipe] = each.propose(problem, asked)
-    return judge_all(bounded, rounded(bounded, proposals, asked))
+    if bounded.machine is None or bounded.machine.asked.arithmetic is None:
+        return judge_all(bounded, proposals)
+    from tubecert.pipeline.rounding import rounded  # the exporter, only where it is needed
+
+    return judge_all(bounded, rounded(bounded, bounded.machine, proposals, asked))
 
 
 def _windowed(bounded: Bounded) -> Bounded:

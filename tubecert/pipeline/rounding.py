@@ -32,13 +32,13 @@ _ROOM, _DIGITS = (
 
 
 def rounded(
-    bounded: Bounded, found: Mapping[type, Proposal[Any]], asked: Asked
+    bounded: Bounded, machine: Known, found: Mapping[type, Proposal[Any]], asked: Asked
 ) -> Mapping[type, Proposal[Any]]:
     """The proposals, that of certificate H with what rounding costs; raises `SpecError` where that is not derived."""
     first = found[HardwareRecipe].decisive
-    if bounded.machine is None or bounded.machine.asked.arithmetic is None or first is None:
+    if machine.asked.arithmetic is None or first is None:
         return found
-    lost = _lost(bounded, bounded.machine, first, bounded.machine.asked.arithmetic)
+    lost = _lost(bounded, machine, first, machine.asked.arithmetic)
     again = PROPOSERS[HardwareRecipe].propose(bounded.problem, replace(asked, lost=lost))
     return {**found, HardwareRecipe: again}
 
