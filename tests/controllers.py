@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from tubecert.conditions.hardware import HardwareRecipe
-from tubecert.export.controller import Controller, Machine, assembled
+from tubecert.export.assembly import assembled
+from tubecert.export.blocks import Machine
+from tubecert.export.controller import Controller
 from tubecert.model import build
 from tubecert.spec import Knots, Picard, load_text
 from tubecert.trajectory import Plan

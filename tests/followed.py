@@ -14,7 +14,8 @@ from flint import arb_mat, ctx
 
 from tubecert import certificate
 from tubecert.conditions.hardware import Rounding
-from tubecert.export.controller import Controller, assembled
+from tubecert.export.assembly import assembled
+from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
 from tubecert.recheck.balls import exact, root
 from tubecert.recheck.code.losses import About, lost_by

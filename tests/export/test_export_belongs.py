@@ -21,8 +21,8 @@ from tubecert import certificate
 from tubecert.cli.app import app
 from tubecert.errors import TubecertError
 from tubecert.export import compiled as compiled_code
+from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import COMPILERS, compiled, compiler
-from tubecert.export.controller import controller_of
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
 from tubecert.export.vectors import vectors

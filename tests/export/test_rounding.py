@@ -12,8 +12,8 @@ from controllers import GIVEN, KNOTS, PATH, machine, recipe, wandering
 
 from tubecert.conditions.hardware import Rounding
 from tubecert.errors import TubecertError
+from tubecert.export.assembly import assembled
 from tubecert.export.compiled import compiled, compiler
-from tubecert.export.controller import assembled
 from tubecert.export.folder import exported
 from tubecert.export.program import GREATEST, LEAST, Program
 from tubecert.export.reference import execute

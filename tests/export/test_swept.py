@@ -9,7 +9,7 @@ import pytest
 from controllers import GIVEN
 
 from tubecert.errors import TubecertError
-from tubecert.export.controller import assembled
+from tubecert.export.assembly import assembled
 from tubecert.export.reference import Reference, speeds
 from tubecert.export.rounding import UncoveredError, rounding_of
 from tubecert.export.words import operations

@@ -27,9 +27,9 @@ def drive(
     """Drive the code in a folder; `paths`: specification, certificate, folder; `wanted`: runs, seed, duration."""
     require_extra()
     from tubecert import spec
+    from tubecert.export.assembly import controller_of
     from tubecert.export.belonging import belonging
     from tubecert.export.compiled import compiled
-    from tubecert.export.controller import controller_of
     from tubecert.export.driven import driven
     from tubecert.report import progress
     from tubecert.report.terminal import Terminal

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
+from tubecert.export.blocks import INTEGRATION, NODES
+from tubecert.export.controller import Controller, Pieces
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, Port, Program
 from tubecert.export.sweeps import in_c

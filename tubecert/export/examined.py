@@ -16,9 +16,10 @@ import numpy as np
 from tubecert.certificate.result import Certificate
 from tubecert.enclosure.interval import Array
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.export.assembly import controller_of
 from tubecert.export.belonging import belonging
 from tubecert.export.compiled import compiled, compiler
-from tubecert.export.controller import controller_of, refused
+from tubecert.export.controller import refused
 from tubecert.export.folder import Exported
 from tubecert.export.vectors import Vectors, vectors
 from tubecert.recheck.code.constants import entries, literals, miscompiled

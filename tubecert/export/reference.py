@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.export.controller import INTEGRATION, NODES, Controller, Pieces
+from tubecert.export.blocks import INTEGRATION, NODES
+from tubecert.export.controller import Controller, Pieces
 from tubecert.export.geodesics import Swept
 from tubecert.export.program import GREATEST, LEAST, RATIO, Program, Step
 

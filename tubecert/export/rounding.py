@@ -23,7 +23,8 @@ from tubecert.coordinates import inverse
 from tubecert.enclosure import interval
 from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt, up
-from tubecert.export.controller import LEAST_SIZE, Controller, Pieces
+from tubecert.export.blocks import LEAST_SIZE
+from tubecert.export.controller import Controller, Pieces
 from tubecert.export.program import GREATEST, LEAST, Program, Step
 from tubecert.spec import Arithmetic
 

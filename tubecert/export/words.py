@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from tubecert.export.controller import INTEGRATION, NODES, Controller
+from tubecert.export.blocks import INTEGRATION, NODES
+from tubecert.export.controller import Controller
 from tubecert.export.sweeps import counted
 
 _EXACT: Final = (

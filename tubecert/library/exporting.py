@@ -45,7 +45,7 @@ def export(
     `tubecert export`. In C everything is `double`, or `float` if the precision is `single`; in Python `double`.
     Raises `TubecertError` where certificate H does not hold or cannot be exported, and `TargetError`.
     """
-    from tubecert.export.controller import controller_of
+    from tubecert.export.assembly import controller_of
     from tubecert.export.folder import exported
 
     one_of("language", language, _LANGUAGES)

@@ -17,7 +17,8 @@ from tubecert.conditions.hardware import HardwareRecipe, Rounding
 from tubecert.conditions.machine import Machine as Known
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.errors import SpecError, TubecertError
-from tubecert.export.controller import Machine, assembled, looked_at
+from tubecert.export.assembly import assembled, looked_at
+from tubecert.export.blocks import Machine
 from tubecert.export.rounding import UncoveredError, rounding_of
 from tubecert.expression import number_text
 from tubecert.findings import Finding
