@@ -15,9 +15,10 @@ from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
 from tubecert.export.compiled import compiled, compiler
 from tubecert.export.folder import exported
+from tubecert.export.followed import UncoveredError
 from tubecert.export.program import GREATEST, LEAST, Program
 from tubecert.export.reference import execute
-from tubecert.export.rounding import UncoveredError, rounding_of, within
+from tubecert.export.rounding import rounding_of, within
 from tubecert.expression import constant
 from tubecert.model import build
 from tubecert.spec import load_text

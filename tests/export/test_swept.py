@@ -10,8 +10,9 @@ from controllers import GIVEN
 
 from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
+from tubecert.export.followed import UncoveredError
 from tubecert.export.reference import Reference, speeds
-from tubecert.export.rounding import UncoveredError, rounding_of
+from tubecert.export.rounding import rounding_of
 from tubecert.export.words import operations
 from tubecert.spec import Picard
 

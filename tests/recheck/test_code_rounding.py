@@ -14,6 +14,7 @@ from followed import bounds, covered, in_recheck, texts
 
 from tubecert.enclosure.interval import Interval
 from tubecert.export import rounding as own
+from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
 from tubecert.recheck.balls import exact
@@ -51,7 +52,7 @@ def without(operation):
         found = whole(self, program, step, memory, given)
         if step.operation != operation:
             return found
-        _, error = own._combined(operation, *(memory[place] for place in step.places))
+        _, error = own.combined(operation, *(memory[place] for place in step.places))
         return replace(found, error=np.asarray(error.hi))
 
     return own._Analysis, "_step", step
@@ -59,7 +60,7 @@ def without(operation):
 
 def blind(operation, side):
     """The exporter's errors that do not know one of the operands."""
-    whole = own._combined
+    whole = own.combined
 
     def combined(kind, *args):
         given = list(args)
@@ -67,7 +68,7 @@ def blind(operation, side):
             given[side] = replace(given[side], error=0 * given[side].error)
         return whole(kind, *given)
 
-    return own, "_combined", combined
+    return own, "combined", combined
 
 
 def exact_program(name):
@@ -104,10 +105,10 @@ BUGS = {
     "the unit of the other type": (
         "steep",
         "single",
-        lambda: (own, "FLOATS", dict.fromkeys(own.FLOATS, own.DOUBLE)),
+        lambda: (own, "FLOATS", dict.fromkeys(own.FLOATS, DOUBLE)),
     ),
     "functions of math.h are exact": ("steep", "double", lambda: (own, "_LIBRARY", 0)),
-    "a slope of 0": ("held_orbit", "double", lambda: (own, "_steepest", lambda name, x: 0 * x.hi)),
+    "a slope of 0": ("held_orbit", "double", lambda: (own, "steepest", lambda name, x: 0 * x.hi)),
     "additions are exact": ("steep", "double", lambda: without("add")),
     "subtractions are exact": ("held_orbit", "double", lambda: without("sub")),
     "products are exact": ("steep", "double", lambda: without("mul")),

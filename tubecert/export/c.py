@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from tubecert.export.blocks import INTEGRATION, NODES
+from tubecert.export.c_language import C, comment
+from tubecert.export.c_loop import entries_in_c, feedback_in_c, mean_in_c, plan_in_c, prediction_in_c
 from tubecert.export.controller import Controller, Pieces
-from tubecert.export.listing import decimal, lines
-from tubecert.export.program import GREATEST, LEAST, RATIO, Port, Program
+from tubecert.export.listing import lines
+from tubecert.export.program import Port, Program
 from tubecert.export.sweeps import in_c
 from tubecert.export.vectors import Vectors
 from tubecert.export.words import TIMING, heading, promise
@@ -18,44 +18,6 @@ from tubecert.export.words import TIMING, heading, promise
 _UNSAFE: Final = (
     "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__", "_M_FP_FAST",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class C:
-    """Expressions of C99, in `float` or in `double`."""
-
-    single: bool
-
-    @property
-    def real(self) -> str:
-        """The type."""
-        return "float" if self.single else "double"
-
-    def number(self, value: Fraction) -> str:
-        """A constant."""
-        text = decimal(value, single=self.single)
-        if not self.single:
-            return text
-        return f"{text[:-1]}f)" if text.endswith(")") else f"{text}f"
-
-    def entry(self, name: str, index: int) -> str:
-        """An entry of a vector that goes in."""
-        return f"{name}[{index}]"
-
-    def call(self, name: str, argument: str) -> str:
-        """A function."""
-        return f"{name}{'f' if self.single else ''}({argument})"
-
-    def choice(self, name: str, a: str, b: str) -> str:
-        """A choice between two."""
-        if name == LEAST:
-            return f"{a} < {b} ? {a} : {b}"
-        if name == GREATEST:
-            return f"{a} > {b} ? {a} : {b}"
-        zero, one = self.number(Fraction(0)), self.number(Fraction(1))
-        if name == RATIO:
-            return f"({a} > {zero} && {b} > {zero}) ? {a} / {b} : {zero}"
-        return f"{a} > {b} ? {b} / {a} : {one}"
 
 
 def header(c: Controller, language: C) -> str:
@@ -73,16 +35,9 @@ def self_test(c: Controller, language: C, vectors: Vectors) -> str:
     return "\n".join(_self_test(c, language, vectors)) + "\n"
 
 
-def _comment(texts: Sequence[str]) -> Iterator[str]:
-    yield f"/* {texts[0]}"
-    for text in texts[1:]:
-        yield f" * {text}".rstrip()
-    yield " */"
-
-
 def _header(c: Controller, language: C) -> Iterator[str]:
     name, big = c.name, c.name.upper()
-    yield from _comment((heading(c), "", f"Certificate: {c.hash}", "", *promise(c), "", *TIMING))
+    yield from comment((heading(c), "", f"Certificate: {c.hash}", "", *promise(c), "", *TIMING))
     yield f"#ifndef {big}_H"
     yield f"#define {big}_H"
     yield ""
@@ -142,7 +97,7 @@ def _out(c: Controller, name: str, size: str) -> str:
 
 def _source(c: Controller, language: C) -> Iterator[str]:
     big = c.name.upper()
-    yield from _comment((heading(c), f"Certificate: {c.hash}", "", *promise(c)))
+    yield from comment((heading(c), f"Certificate: {c.hash}", "", *promise(c)))
     yield f'#include "{c.name}.h"'
     yield ""
     yield "#include <float.h>"
@@ -180,14 +135,14 @@ def _source(c: Controller, language: C) -> Iterator[str]:
         yield from _tables(c.pieces, language)
     for program in c.programs:
         yield from _function(program, language)
-    yield from _plan(c, language)
-    yield from _mean(c, language)
+    yield from plan_in_c(c, language)
+    yield from mean_in_c(c, language)
     if c.swept is not None:
         yield from in_c(c.swept, len(c.states), language.number(Fraction(0)))
-    yield from _law(c, language)
+    yield from feedback_in_c(c, language)
     if c.predicts:
-        yield from _predicted(c, language)
-    yield from _entries(c, language)
+        yield from prediction_in_c(c, language)
+    yield from entries_in_c(c, language)
 
 
 def _tables(pieces: Pieces, language: C) -> Iterator[str]:
@@ -241,212 +196,9 @@ def _entries_of(port: Port) -> list[str]:
     return [f"{port.name}[{i}]" for i in range(len(port.places))]
 
 
-def _plan(c: Controller, language: C) -> Iterator[str]:
-    yield ""
-    if c.pieces is not None:
-        steps = max(1, (len(c.pieces.start) - 1).bit_length())
-        yield "/* The piece that a time lies in. */"
-        yield "static int piece(real t)"
-        yield "{"
-        yield "    int low = 0, high = PIECES - 1, k;"
-        yield f"    for (k = 0; k < {steps}; k++) {{"
-        yield "        const int middle = (low + high + 1) / 2;"
-        yield "        if (low < high) {"
-        yield "            if (t >= START[middle]) {"
-        yield "                low = middle;"
-        yield "            } else {"
-        yield "                high = middle - 1;"
-        yield "            }"
-        yield "        }"
-        yield "    }"
-        yield "    return low;"
-        yield "}"
-        yield ""
-    yield "/* x*(t) and u*(t); beyond the horizon those at its end. */"
-    yield "static void on_plan(real t, real x[N], real u[M])"
-    yield "{"
-    if c.horizon is not None:
-        yield f"    const real s = t < {c.name.upper()}_HORIZON ? t : {c.name.upper()}_HORIZON;"
-    else:
-        yield "    const real s = t;"
-    if c.pieces is None:
-        yield "    plan(&s, x, u);"
-    else:
-        yield "    const int k = piece(s);"
-        yield "    const real r = s - START[k];"
-        yield "    int i;"
-        yield "    for (i = 0; i < N; i++) {"
-        yield "        x[i] = X[k][i][0] + r * (X[k][i][1] + r * (X[k][i][2] + r * X[k][i][3]));"
-        yield "    }"
-        yield "    for (i = 0; i < M; i++) {"
-        yield "        u[i] = U[k][i][0] + r * U[k][i][1];"
-        yield "    }"
-    yield "}"
-
-
-def _mean(c: Controller, language: C) -> Iterator[str]:
-    if c.adds_plan:
-        return
-    half = language.number(Fraction(1, 2))
-    yield ""
-    yield "/* The mean of u* over a sample. */"
-    yield "static void mean_of_plan(real begin, real end, real mean[M])"
-    yield "{"
-    if c.gauss is not None:
-        yield "    real x[N], a[M], b[M], c[M];"
-        for name, share in zip("abc", NODES, strict=True):
-            yield f"    on_plan(begin + {language.number(share * c.sample_time)}, x, {name});"
-        yield "    (void)end;"
-        yield "    gauss(a, b, c, mean);"
-    elif c.pieces is not None:
-        yield "    const real length = end - begin;"
-        yield "    int k = piece(begin), i, j;"
-        yield "    for (i = 0; i < M; i++) {"
-        yield f"        mean[i] = {language.number(Fraction(0))};"
-        yield "    }"
-        yield f"    for (j = 0; j < {c.pieces.most}; j++) {{"
-        yield "        const real until = k + 1 < PIECES && START[k + 1] < end ? START[k + 1] : end;"
-        yield f"        const real middle = {half} * (begin + until) - START[k];"
-        yield "        const real share = (until - begin) / length;"
-        yield "        for (i = 0; i < M; i++) {"
-        yield "            mean[i] = mean[i] + share * (U[k][i][0] + middle * U[k][i][1]);"
-        yield "        }"
-        yield "        begin = until;"
-        yield "        k = begin < end && k + 1 < PIECES ? k + 1 : k;"
-        yield "    }"
-    yield "}"
-
-
-def _law(c: Controller, language: C) -> Iterator[str]:
-    big, zero = c.name.upper(), language.number(Fraction(0))
-    yield ""
-    yield "/* The feedback at (x*(t), y), with u* where that is held; what step returns. */"
-    yield "static int feedback(const real y[N], real t, real u[M])"
-    yield "{"
-    ends = "" if c.swept is None else ", first[N], last[N]"
-    yield f"    real f[N], xs[N], us[M], vs[N], kappa[M], told[3]{ends};"
-    yield "    int status = 0, i;"
-    yield "    on_plan(t, xs, us);"
-    yield "    drift(y, f);"
-    yield "    flow(xs, us, vs);"
-    if c.swept is not None:
-        yield "    geodesic(xs, y, first, last);"
-    yield f"    law(y, f, xs, vs, us, {'' if c.swept is None else 'first, last, '}kappa, told);"
-    yield "    for (i = 0; i < M; i++) {"
-    yield f"        u[i] = kappa[i]{' + us[i]' if c.adds_plan else ''};"
-    yield "    }"
-    if c.horizon is not None:
-        yield f"    status += t > {big}_HORIZON ? {big}_OVER : 0;"
-    yield f"    status += told[0] < {big}_REACH * {big}_REACH ? 0 : {big}_OUTSIDE;"
-    if c.swept is None:  # else it is known up to what computed geodesics lose
-        yield f"    status += told[1] > {zero} && !(told[2] > {zero}) ? {big}_NO_FEEDBACK : 0;"
-    yield "    return status;"
-    yield "}"
-
-
-def _predicted(c: Controller, language: C) -> Iterator[str]:
-    yield ""
-    yield "/* The state when the input of this sample begins to act, theorem H-P. */"
-    yield "static void predicted(const real y[N], real t, const real acting[M], real x[N])"
-    yield "{"
-    yield "    real from[N], a[M], b[M], c[M];"
-    if not c.adds_plan:
-        yield f"    const real h = {language.number(c.delay / INTEGRATION)};"
-        yield "    real xs[N];"
-    yield "    int i, k;"
-    yield "    for (i = 0; i < N; i++) {"
-    yield "        x[i] = y[i];"
-    yield "    }"
-    yield f"    for (k = 0; k < {INTEGRATION}; k++) {{"
-    if not c.adds_plan:
-        for name, share in zip("abc", (Fraction(0), Fraction(1, 2), Fraction(1)), strict=True):
-            yield f"        on_plan(t + ((real)k + {language.number(share)}) * h, xs, {name});"
-    else:
-        yield "        (void)t;"
-    yield "        for (i = 0; i < M; i++) {"
-    for name in "abc":
-        yield f"            {name}[i] = acting[i]{'' if c.adds_plan else f' + {name}[i]'};"
-    yield "        }"
-    yield "        for (i = 0; i < N; i++) {"
-    yield "            from[i] = x[i];"
-    yield "        }"
-    yield "        predictor(from, a, b, c, x);"
-    yield "    }"
-    yield "}"
-
-
-def _entries(c: Controller, language: C) -> Iterator[str]:
-    name, big, zero = c.name, c.name.upper(), language.number(Fraction(0))
-    yield ""
-    yield f"void {name}_feedforward(real t, real u[M])"
-    yield "{"
-    yield "    real x[N];"
-    yield "    on_plan(t, x, u);"
-    yield "}"
-    yield ""
-    yield f"int {name}_start({name}_state *c, const real y[N], real u[M])"
-    yield "{"
-    yield f"    const int status = feedback(y, {zero}, u);"
-    yield "    int i;"
-    yield "    c->sample = 0;"
-    yield "    for (i = 0; i < N; i++) {"
-    yield f"        c->y[i] = {zero};"
-    yield f"        c->f[i] = {zero};"
-    yield "    }"
-    yield "    for (i = 0; i < M; i++) {"
-    yield f"        c->q[i] = {zero};"
-    yield "        c->feedback[i] = u[i];"
-    yield "        c->held[i] = u[i];"
-    yield "        c->before[i] = u[i];"
-    yield "    }"
-    yield "    return status;"
-    yield "}"
-    yield ""
-    yield f"int {name}_step({name}_state *c, const real y[N], real u[M])"
-    yield "{"
-    yield f"    const real t = (real)c->sample * {big}_SAMPLE_TIME;"
-    yield f"    real f[N], q[M], mean[M], estimate[M]{', x[N]' if c.predicts else ''};"
-    if not c.adds_plan:
-        yield "    real played[M];"
-    yield "    int status, i;"
-    yield "    drift(y, f);"
-    yield "    for (i = 0; i < M; i++) {"
-    yield "        q[i] = c->q[i];"
-    yield "        estimate[i] = c->q[i];"
-    yield "    }"
-    yield "    if (c->sample > 0) {"
-    if c.adds_plan:
-        yield "        applied(c->held, c->before, mean);"
-    else:
-        yield f"        mean_of_plan((real)(c->sample - 1) * {big}_SAMPLE_TIME, t, played);"
-        yield "        applied(c->held, c->before, played, mean);"
-    yield "        estimator(y, f, c->y, c->f, c->q, mean, q, estimate);"
-    yield "    }"
-    if c.predicts:
-        yield "    predicted(y, t, c->feedback, x);"
-        yield f"    status = feedback(x, t + {big}_DELAY, c->feedback);"
-    else:
-        yield "    status = feedback(y, t, c->feedback);"
-    yield "    for (i = 0; i < M; i++) {"
-    yield "        c->before[i] = c->held[i];"
-    yield "        c->held[i] = c->feedback[i] - estimate[i];"
-    yield "        c->q[i] = q[i];"
-    yield "        u[i] = c->held[i];"
-    yield "    }"
-    yield "    for (i = 0; i < N; i++) {"
-    yield "        c->y[i] = y[i];"
-    yield "        c->f[i] = f[i];"
-    yield "    }"
-    yield "    if (c->sample < UINT32_MAX) {"
-    yield "        c->sample++;"
-    yield "    }"
-    yield "    return status;"
-    yield "}"
-
-
 def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
     name, count = c.name, len(vectors.y)
-    yield from _comment((f"{c.system}: the self-test of its controller.", f"Certificate: {c.hash}"))
+    yield from comment((f"{c.system}: the self-test of its controller.", f"Certificate: {c.hash}"))
     yield f'#include "{name}.h"'
     yield ""
     yield "#include <stdio.h>"

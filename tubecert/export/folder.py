@@ -11,9 +11,11 @@ from typing import Final, Literal
 from tubecert.certificate.file import write_text
 from tubecert.errors import TargetError
 from tubecert.export import c as c99
+from tubecert.export.c_language import C
 from tubecert.export.controller import Controller, refused
+from tubecert.export.followed import UncoveredError
 from tubecert.export.python import python
-from tubecert.export.rounding import UncoveredError, within
+from tubecert.export.rounding import within
 from tubecert.export.vectors import vectors
 from tubecert.export.words import readme
 from tubecert.findings import Finding
@@ -86,7 +88,7 @@ def _require_digits(controller: Controller, precision: Precision) -> None:
 
 def _c(controller: Controller, precision: Precision) -> dict[str, tuple[str, str]]:
     single, name = precision == "single", controller.name
-    language = c99.C(single)
+    language = C(single)
     test = c99.self_test(controller, language, vectors(controller, single=single))
     return {
         f"{name}.h": ("the types, and what is called", c99.header(controller, language)),

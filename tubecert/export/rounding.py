@@ -21,10 +21,24 @@ import numpy as np
 from tubecert.conditions.hardware import Rounding
 from tubecert.coordinates import inverse
 from tubecert.enclosure import interval
-from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt, up
 from tubecert.export.blocks import LEAST_SIZE
 from tubecert.export.controller import Controller, Pieces
+from tubecert.export.followed import (
+    FLOATS,
+    Float,
+    Followed,
+    UncoveredError,
+    by_pieces,
+    combined,
+    known_by_size,
+    largest_of,
+    length_of,
+    over_pieces,
+    printed,
+    size_of,
+    steepest,
+)
 from tubecert.export.program import GREATEST, LEAST, Program, Step
 from tubecert.spec import Arithmetic
 
@@ -32,46 +46,6 @@ _LIBRARY: Final = 8  # units of rounding that a function of math.h may be off: 4
 _GAUSS: Final = 2016000  # of the error of Gauss's rule with three nodes: f^(6) length^6/2016000 of the mean
 _MOST_SAMPLES: Final = 2**32 - 1
 _PIECES: Final = 64  # of the horizon, along which a plan is followed
-
-
-class UncoveredError(ValueError):
-    """What a controller does, and no bound is derived for; the text says what, for a reader."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Float:
-    """A type of IEEE 754: `unit` u of rounding, `least`, what underflow may lose, and `most`, below infinity."""
-
-    unit: Fraction
-    least: Fraction
-    most: float
-
-    def near(self, value: Fraction) -> Fraction:
-        """The number of the type that stands in the code for a constant."""
-        with np.errstate(over="ignore"):
-            near = float(np.float32(float(value))) if self.unit > DOUBLE.unit else float(value)
-        if not np.isfinite(near):
-            raise UncoveredError("a number that is too large for this type")
-        return Fraction(near)
-
-
-DOUBLE: Final = Float(unit=Fraction(1, 2**53), least=Fraction(1, 2**1074), most=2.0**1022)
-SINGLE: Final = Float(unit=Fraction(1, 2**24), least=Fraction(1, 2**149), most=2.0**126)
-
-FLOATS: Final[Mapping[Arithmetic, Float]] = {"single": SINGLE, "double": DOUBLE}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Followed:
-    """A result: exactly in `value`, and off by `error` at most; both (P,), by pieces of the plan."""
-
-    value: Interval
-    error: Array
-
-    @property
-    def most(self) -> Interval:
-        """A bound of what the computer has."""
-        return Interval.exact(self.value.magnitude) + Interval.exact(self.error)
 
 
 def rounding_of(controller: Controller, arithmetic: Arithmetic) -> Rounding:
@@ -108,9 +82,9 @@ class _Analysis:
         xs, us = self._plan()
         law = self._law(xs, us)
         return Rounding(
-            feedback=_printed(law.lost),
-            input=_printed(law.beside + self._written(law, us) + self._clipped()),
-            estimate=_printed(self._estimated(xs, law, us)),
+            feedback=printed(law.lost),
+            input=printed(law.beside + self._written(law, us) + self._clipped()),
+            estimate=printed(self._estimated(xs, law, us)),
             prediction=Fraction(0),
         )
 
@@ -147,7 +121,7 @@ class _Analysis:
             raise UncoveredError("a plan of no known form")
         t = self._time(self.c.plan)
         out = self._run(self.c.plan, {"t": [t]})
-        return [_over(t, x) for x in out["x"]], [_over(t, u) for u in out["u"]]
+        return [by_pieces(t, x) for x in out["x"]], [by_pieces(t, u) for u in out["u"]]
 
     def _through_knots(self, plan: Pieces) -> tuple[list[Followed], list[Followed]]:
         """Piece by piece; where a time near a knot is taken for one in the next piece, x* and u* go on continuously."""
@@ -180,8 +154,8 @@ class _Analysis:
         slope = Interval.exact(np.zeros(len(values)))
         for k in range(len(powers) - 2, -1, -1):
             slope = slope * r.value + found.value
-            found = self._rounded(*_combined("mul", r, found))
-            found = self._rounded(*_combined("add", powers[k], found))
+            found = self._rounded(*combined("mul", r, found))
+            found = self._rounded(*combined("add", powers[k], found))
         wrong = 4 * late * Interval.exact(float(np.max(slope.sanitised().magnitude)))
         worst = np.full_like(found.error, np.max(found.error))  # of whichever piece the code takes
         return Followed(value=found.value, error=(Interval.exact(worst) + wrong).hi)
@@ -202,8 +176,8 @@ class _Analysis:
         vs = self._run(self.c.flow, {"x": xs, "u": us})["v"]
         found = self._run(self.c.law, {"y": y, "f": f, "xs": xs, "vs": vs, "us": us}, apart=("y", "xs"))
         z, c, (excess,), (square, *_) = (found[name] for name in ("z", "c", "excess", "told"))
-        e_z, e_c, e_a = _length(z), _length(c), Interval.exact(excess.error)
-        C = _size(c)
+        e_z, e_c, e_a = length_of(z), length_of(c), Interval.exact(excess.error)
+        C = size_of(c)
         theta = 2 * (self.m + 8) * self.u + self.m * self.eta / Interval.of(LEAST_SIZE)
         nu = (2 * self.n + 4) * self.u * self.norm_M * self.norm_W
         if not float(nu.hi) < 0.5:
@@ -220,7 +194,7 @@ class _Analysis:
         # a share and its product with c may underflow
         above = beyond + theta * L + self.eta * (2 * C + 2 * self.m + 4)
         r_a = e_a + L * (7 * e_c + 4 * theta * (C + e_c)) + 2 * C * beyond + 2 * L * least + C * above
-        return _Law(lost=_most(r_a), beside=_most(above), feedback=_most(L + above))
+        return _Law(lost=largest_of(r_a), beside=largest_of(above), feedback=largest_of(L + above))
 
     def _require_no_overflow(self, sizes: Sequence[Interval]) -> None:
         """Of what (H.37) computes after c and alpha/2."""
@@ -231,8 +205,8 @@ class _Analysis:
 
     def _written(self, law: _Law, us: Sequence[Followed]) -> Interval:
         """u* and the two sums that make the input of kappa, u* and the estimate."""
-        most = law.feedback + _most(_size(us)) + self._estimate
-        return _most(_length(us)) + 3 * self.u * (most + most) + 4 * self.m * self.eta
+        most = law.feedback + largest_of(size_of(us)) + self._estimate
+        return largest_of(length_of(us)) + 3 * self.u * (most + most) + 4 * self.m * self.eta
 
     @property
     def _estimate(self) -> Interval:
@@ -254,19 +228,19 @@ class _Analysis:
         f = self._run(self.c.drift, {"x": y})["f"]
         pieces = len(y[0].error)
         # what was measured a sample before may lie in the piece before
-        last_y, last_f = [_widened(x) for x in y], [_widened(x) for x in f]
-        held = law.feedback + _most(_size(us)) + 2 * self._estimate
-        acted = [_within(held, pieces) for _ in range(self.m)]
+        last_y, last_f = [over_pieces(x) for x in y], [over_pieces(x) for x in f]
+        held = law.feedback + largest_of(size_of(us)) + 2 * self._estimate
+        acted = [known_by_size(held, pieces) for _ in range(self.m)]
         given = {"held": acted, "before": acted}
         if self.c.gauss is not None:
             given["played"] = self._played(self.c.gauss, us, self._written(law, us))
         mean = self._run(self.c.applied, given)["mean"]
-        q = [_within(self._estimate, pieces) for _ in range(self.m)]
+        q = [known_by_size(self._estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
         new = self._run(self.c.estimator, {**seen, "q": q, "mean": mean})["q"]
         share = Interval.of(self.c.share)
         # th and pi are decimals of 50 digits at least
-        return _most(_length(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
+        return largest_of(length_of(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
 
     def _played(self, gauss: Program, us: Sequence[Followed], written: Interval) -> list[Followed]:
         """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*.
@@ -275,7 +249,7 @@ class _Analysis:
         """
         if self.c.bend is None:
             raise UncoveredError("the mean of a feedforward that moves within a sample")
-        nodes = [_widened(u) for u in us]
+        nodes = [over_pieces(u) for u in us]
         found = self._run(gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
         bends = self._run(self.c.bend, {"t": [self._time(self.c.bend)]})["u"]
         share = Interval.of(self.c.sample_time**6 / _GAUSS)
@@ -283,7 +257,9 @@ class _Analysis:
             Followed(
                 value=x.value,
                 error=(
-                    Interval.exact(x.error) + share * Interval.exact(_widened(bend).value.magnitude) + written
+                    Interval.exact(x.error)
+                    + share * Interval.exact(over_pieces(bend).value.magnitude)
+                    + written
                 ).hi,
             )
             for x, bend in zip(found, bends, strict=True)
@@ -338,7 +314,7 @@ class _Analysis:
             least = (args[0].value - Interval.exact(args[0].error)).lo
             sure = clamped or step.name != "sqrt" or bool(np.all(least >= 0))
             return found if sure else replace(found, error=found.error + np.inf)
-        return self._rounded(*_combined(step.operation, args[0], args[1]))
+        return self._rounded(*combined(step.operation, args[0], args[1]))
 
     def _rounded(self, value: Interval, error: Interval, units: int = 1) -> Followed:
         """With the rounding of the operation itself."""
@@ -360,7 +336,7 @@ class _Analysis:
     def _called(self, name: str, a: Followed) -> Followed:
         value, off = getattr(interval, name)(a.value), Interval.exact(a.error)
         wide = Interval((a.value - off).lo, (a.value + off).hi)
-        error = Interval.exact(_steepest(name, wide)) * off
+        error = Interval.exact(steepest(name, wide)) * off
         if name == "sqrt":
             # |sqrt(p) - sqrt(q)| <= sqrt(|p - q|), where the slope has no bound
             error = Interval.exact(np.fmin(error.sanitised().hi, sqrt(off).hi))
@@ -374,43 +350,6 @@ class _Law:
     lost: Interval
     beside: Interval
     feedback: Interval
-
-
-def _combined(operation: str, a: Followed, b: Followed) -> tuple[Interval, Interval]:
-    """The exact result, and how far it moves with its operands."""
-    x, y = a.value, b.value
-    off_a, off_b = Interval.exact(a.error), Interval.exact(b.error)
-    if operation == "add":
-        return x + y, off_a + off_b
-    if operation == "sub":
-        return x - y, off_a + off_b
-    size_x, size_y = Interval.exact(x.magnitude), Interval.exact(y.magnitude)
-    if operation == "mul":
-        return x * y, size_x * off_b + size_y * off_a + off_a * off_b
-    ratio = x / y
-    room = Interval.exact(y.mignitude) - off_b
-    moved = (off_a + Interval.exact(ratio.sanitised().magnitude) * off_b) / room
-    return ratio, Interval(moved.lo, np.where(room.lo > 0, moved.hi, np.inf))
-
-
-def _steepest(name: str, x: Interval) -> Array:
-    """A bound of |f'| over an interval."""
-    one = Interval.of(1)
-    slopes = {
-        "sin": one,
-        "cos": one,
-        "atan": one,
-        "tanh": one,
-        "tan": one + interval.tan(x) * interval.tan(x),
-        "exp": interval.exp(x),
-        "sinh": interval.cosh(x),
-        "cosh": interval.sinh(x),
-        "log": one / x,
-        "sqrt": one / (2 * sqrt(x)),
-        "asin": one / sqrt(one - x * x),
-        "acos": one / sqrt(one - x * x),
-    }
-    return slopes[name].sanitised().magnitude
 
 
 def _reads_input(program: Program) -> bool:
@@ -433,49 +372,3 @@ def _numbers(table: Sequence[Sequence[Sequence[Fraction]]]) -> Array:
 
 def _frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:
     return sqrt(Interval.of(sum((q * q for row in rows for q in row), Fraction(0))))
-
-
-def _length(vector: Sequence[Followed]) -> Interval:
-    """The Euclidean length of the errors, by pieces."""
-    return _root([Interval.exact(x.error) for x in vector])
-
-
-def _size(vector: Sequence[Followed]) -> Interval:
-    """A bound of the length of what a computer has, by pieces."""
-    return _root([x.most for x in vector])
-
-
-def _root(sizes: Sequence[Interval]) -> Interval:
-    """The root of a sum of squares; of 0 an enclosure may be a little below."""
-    square = sum((x * x for x in sizes), Interval.of(0))
-    return sqrt(Interval(np.maximum(square.lo, 0.0), square.hi))
-
-
-def _over(t: Followed, x: Followed) -> Followed:
-    """By pieces, also what does not depend on time."""
-    zero = 0 * t.error
-    return Followed(value=Interval(x.value.lo + zero, x.value.hi + zero), error=x.error + zero)
-
-
-def _widened(x: Followed) -> Followed:
-    """Over all pieces."""
-    value = Interval(np.full_like(x.error, x.value.lo.min()), np.full_like(x.error, x.value.hi.max()))
-    return Followed(value=value, error=np.full_like(x.error, x.error.max()))
-
-
-def _within(most: Interval, pieces: int) -> Followed:
-    """What is known by its size only, and has no error of its own: it is what the code has."""
-    ends = np.full(pieces, float(np.max(most.hi)))
-    return Followed(value=Interval(-ends, ends), error=np.zeros(pieces))
-
-
-def _most(x: Interval) -> Interval:
-    """The largest over all pieces."""
-    return Interval.exact(float(np.max(x.sanitised().hi)))
-
-
-def _printed(x: Interval) -> Fraction:
-    most = float(x.hi)
-    if not np.isfinite(most):
-        raise UncoveredError("what a program computes has no bound in this type")
-    return Fraction(repr(printable_above(most)))

@@ -19,7 +19,8 @@ from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.errors import SpecError, TubecertError
 from tubecert.export.assembly import assembled, looked_at
 from tubecert.export.blocks import Machine
-from tubecert.export.rounding import UncoveredError, rounding_of
+from tubecert.export.followed import UncoveredError
+from tubecert.export.rounding import rounding_of
 from tubecert.expression import number_text
 from tubecert.findings import Finding
 from tubecert.search.proposers import PROPOSERS
