@@ -11,24 +11,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from itertools import product as choices
 
 import numpy as np
 
 from tubecert.bounds.constants import BoundConstants, Constant
+from tubecert.bounds.feedforward import rate_of
 from tubecert.bounds.machines import HARDWARE as TABLE
 from tubecert.bounds.machines import HardwareConstants
 from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.bounds.whitened import Whitened, whitened
 from tubecert.bounds.wind import joined
-from tubecert.coordinates import Coordinates
-from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Supremum
 from tubecert.enclosure.constant import decimal_above
-from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import SumOfNorms
-from tubecert.enclosure.pencil import Pencil, SumOfPencils
+from tubecert.enclosure.pencil import SumOfPencils
 from tubecert.expression import ZERO, derivatives
 from tubecert.expression.matrix import (
     Matrix,
@@ -38,13 +37,11 @@ from tubecert.expression.matrix import (
     identity,
     jacobian,
     multiply,
-    transpose,
 )
 from tubecert.metric.covariant import Geometry, MetricTensorNorm
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.model import TIME
-from tubecert.spec import Hardware, Knots
-from tubecert.trajectory.hermite import slopes_of_inputs
+from tubecert.spec import Hardware
 
 _FEW = 4_000  # boxes
 _NEGLIGIBLE = 1e-3  # of what a constant is added to
@@ -171,7 +168,7 @@ class HardwareSuprema(Suprema):
     def input_rate(self) -> Constant:
         """Lus: the Lipschitz constant of u*, infinite where u* may jump."""
         if self.plan.knots is not None:
-            return _rate_of(self.plan.knots)
+            return rate_of(self.plan.knots)
         if self.plan.allowance is not None:
             held = all(e.is_constant for e in self.plan.u)
             return Constant.exactly(0.0) if held else Constant(below=0.0, above=np.inf)
@@ -319,89 +316,7 @@ def _smaller(direct: Constant, bound: Constant) -> Constant:
     return Constant(below=direct.below, above=min(direct.above, bound.above), at=direct.at)
 
 
-def _rate_of(knots: Knots) -> Constant:
-    """The largest slope of u* through knots; where it is held and not the same throughout, it jumps."""
-    steps = list(pairwise(knots.u))
-    if all(a == b for a, b in steps):
-        return Constant.exactly(0.0)
-    if knots.interpolation == "hold":
-        return Constant(below=0.0, above=np.inf)
-    if knots.interpolation == "hermite-simpson":
-        return _steepest(knots)
-    durations = [b - a for a, b in pairwise(knots.t)]
-    squares = [
-        sum(((q - p) / length) ** 2 for p, q in zip(a, b, strict=True))
-        for (a, b), length in zip(steps, durations, strict=True)
-    ]
-    root = sqrt(Interval.of(max(map(Fraction, squares))))
-    return Constant(below=float(root.lo), above=float(root.hi))
-
-
-def _steepest(knots: Knots) -> Constant:
-    """The largest slope of a u* that is quadratic on each piece: at an end of one, for it is linear there."""
-    lengths = [end - begin for begin, end in zip(knots.t[::2], knots.t[2::2], strict=False)]
-    squares = [
-        sum(((c + 2 * bend * tau) ** 2 for c, bend in zip(*of_piece, strict=True)), Fraction(0))
-        for of_piece, length in zip(slopes_of_inputs(knots), lengths, strict=True)
-        for tau in (Fraction(0), length)
-    ]
-    root = sqrt(Interval.of(max(squares)))
-    return Constant(below=float(root.lo), above=float(root.hi))
-
-
 # -- a constant metric -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True)
-class Whitened:
-    """Coordinates y = T x in which a constant W is nearly the identity: `least` I <= T W T' <= `most` I."""
-
-    coordinates: Coordinates
-    least: float
-    most: float
-
-    def vector(self, a: Matrix) -> Matrix:
-        """T a."""
-        return multiply(self.coordinates.S, a)
-
-    def map(self, a: Matrix) -> Matrix:
-        """T A T^-1."""
-        return self.vector(multiply(a, self.coordinates.S_inverse))
-
-    def form(self, a: Matrix) -> Matrix:
-        """T A T'."""
-        return multiply(self.vector(a), transpose(self.coordinates.S))
-
-    def of_form(self, found: Constant) -> Constant:
-        """|Theta A Theta'| from |T A T'|."""
-        return _scaled(found, 1 / Interval(self.least, self.most))
-
-    def length(self, found: Constant) -> Constant:
-        """|Theta a| from |T a|: M = T'(T W T')^-1 T."""
-        return _scaled(found, 1 / sqrt(Interval(self.least, self.most)))
-
-    def norm(self, found: Constant) -> Constant:
-        """|Theta A Theta^-1| from |T A T^-1|."""
-        root = sqrt(Interval(self.least, self.most))
-        return _scaled(found, root / root)
-
-
-def _scaled(found: Constant, factor: Interval) -> Constant:
-    value = Interval(found.below, found.above) * factor
-    return Constant(below=max(0.0, float(value.lo)), above=float(value.hi), at=found.at)
-
-
-def whitened(W: Matrix) -> Whitened | None:
-    """Such coordinates, if W is a matrix of rational numbers."""
-    if not all(e.is_constant for row in W for e in row):
-        return None
-    factor = np.linalg.inv(np.linalg.cholesky(np.array([[float(e.fraction) for e in row] for row in W])))
-    T = Coordinates(tuple(tuple(Fraction(float(x)) for x in row) for row in factor))
-    scaled = multiply(multiply(T.S, W), transpose(T.S))
-    unit, nowhere = identity(len(W)), BoxDomain({})
-    most = supremum(Pencil(scaled, unit), nowhere, Effort()).above
-    least = -supremum(Pencil([[-e for e in row] for row in scaled], unit), nowhere, Effort()).above
-    return Whitened(coordinates=T, least=least, most=most)
 
 
 # -- matrices --------------------------------------------------------------------------------------------------

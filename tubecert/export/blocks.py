@@ -1,6 +1,6 @@
 """The blocks of a controller as programs: plan, drift, feedback, means of inputs, predictor, estimator.
 
-Implements: (0.5), (H.5) and the rule of Runge and Kutta of H-P, in the operations that every language has.
+The feedback is (0.5), the estimator (H.5), the predictor the rule of Runge and Kutta of H-P.
 """
 
 from __future__ import annotations

@@ -22,7 +22,8 @@ from tubecert.recheck.claims import Case
 from tubecert.recheck.curve import CLOCK, Part
 from tubecert.recheck.digital import Digital
 from tubecert.recheck.document import read
-from tubecert.recheck.kinds.hardware import HardwareSection, OfMachines
+from tubecert.recheck.kinds.hardware import OfMachines
+from tubecert.recheck.kinds.hardware_section import HardwareSection
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import names
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure, maybe
-from tubecert.recheck.kinds.hardware import OF_GAINS, SHARES
+from tubecert.recheck.kinds.hardware_section import OF_GAINS, SHARES
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specified.numbers import Numbers

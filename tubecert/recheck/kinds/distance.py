@@ -29,7 +29,7 @@ from tubecert.recheck.kinds.bounds import (
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.parts import Level, Parts, ranges, read_levels
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
-from tubecert.recheck.kinds.windows import WindowSection, read_windows
+from tubecert.recheck.kinds.window_section import WindowSection, read_windows
 from tubecert.recheck.legs import of_distance
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.predictor import Gains

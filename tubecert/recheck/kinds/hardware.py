@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import ClassVar
 
@@ -12,70 +12,31 @@ from tubecert.recheck.balls import exact, root
 from tubecert.recheck.clipping import clips
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome, prove
-from tubecert.recheck.digital import Digital, Loop, Losses, Promise, loop, proposed
+from tubecert.recheck.digital import Digital, Loop, loop, proposed
 from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
-from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
-from tubecert.recheck.kinds.windows import (
-    Course,
-    WindowSection,
-    claims_of_constants,
-    claims_of_levels,
-    covers,
-    feedback,
-    read_range,
-    read_stretches,
-    read_windows,
+from tubecert.recheck.kinds.course import Course, claims_of_levels, feedback
+from tubecert.recheck.kinds.hardware_section import (
+    OF_MACHINE,
+    OF_PROOF,
+    HardwareSection,
+    read_losses,
+    read_section,
 )
+from tubecert.recheck.kinds.kind import Ground, Kind, Shares
+from tubecert.recheck.kinds.machine import agrees, promise
+from tubecert.recheck.kinds.window_section import read_stretches
+from tubecert.recheck.kinds.windows import claims_of_constants, covers
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.hardware import Hardware
 from tubecert.recheck.specified.numbers import Range
 from tubecert.recheck.statements import NotNegative
 from tubecert.recheck.terms import number
 
 LEVEL, STAYS = "hardware_level", "hardware"
-SHARES = (
-    "plan",
-    "feedforward",
-    "wind",
-    "wind_estimate",
-    "bias",
-    "noise_estimate",
-    "lag",
-    "noise_feedback",
-    "sampling",
-)
-OF_GAINS = ("gain", "geodesic")  # of an uncertain B, and of computed geodesics: left out where they are 0
-_MACHINE = ("sample_time", "delay", "feedback_time", "noise", "wind", "clip_radius", "level")
-_PROOF = ("floor", "speed", "bias", "ripple")
 
-_MOST_POINTS = 100  # of the curve: for each a recipe is searched for
 _DUST = 1e-9  # of the level: a share that is printed as none
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HardwareSection(Section):
-    """The machine, the level that is proven for it, and what follows; None, and nothing, where there is no recipe."""
-
-    machine: dict[str, Fraction]
-    bandwidth: Fraction | None
-    deadbeat: bool
-    predict: bool
-    largest: str | None
-    clip: tuple[Range, ...]
-    radius: Fraction | None
-    half_widths: dict[str, Fraction]
-    inputs: dict[str, Range]
-    margin: Enclosure | None
-    level_margin: Enclosure | None
-    ultimate_radius: Fraction | None
-    budget: dict[str, Fraction] | None
-    curve: tuple[tuple[Fraction, Fraction], ...]
-    windows: tuple[WindowSection, ...]
 
 
 class OfMachines(Kind[HardwareSection, Digital]):
@@ -91,18 +52,18 @@ class OfMachines(Kind[HardwareSection, Digital]):
     def read(self, node: Node, n: int) -> HardwareSection:
         """The section `hardware`."""
         del n
-        return _section(node)
+        return read_section(node)
 
     def read_recipe(self, node: Node) -> Digital:
         """The machine and the numbers of the proof."""
-        own = node.closed(*_MACHINE, *_PROOF, "bandwidth", "prediction", optional=("windows", "rounding"))
-        found = {key: own[key].decimal() for key in (*_MACHINE, *_PROOF)}
+        own = node.closed(*OF_MACHINE, *OF_PROOF, "bandwidth", "prediction", optional=("windows", "rounding"))
+        found = {key: own[key].decimal() for key in (*OF_MACHINE, *OF_PROOF)}
         return Digital(
             **found,
             bandwidth=own.known("bandwidth", Node.decimal),
             prediction=own.known("prediction", Node.decimal),
             windows=own.get("windows", read_stretches) or (),
-            losses=own.get("rounding", _losses),
+            losses=own.get("rounding", read_losses),
         )
 
     def uncovered(self, setting: Setting) -> str | None:
@@ -147,7 +108,7 @@ class OfMachines(Kind[HardwareSection, Digital]):
             return
         parts = (section, recipe)
         yield ground.claim(
-            "H: the machine is the one that is asked for", parts, lambda: _agrees(section, recipe, ground)
+            "H: the machine is the one that is asked for", parts, lambda: agrees(section, recipe, ground)
         )
         yield ground.over_tube(
             "H: the estimate is clipped to a set that holds h",
@@ -224,70 +185,6 @@ def _share(found: Loop, key: str, share: Fraction) -> Outcome:
 # -- reading
 
 
-def _section(node: Node) -> HardwareSection:
-    others = (
-        "verdict",
-        "bandwidth",
-        "deadbeat",
-        "predict",
-        "clip",
-        "radius",
-        "half_widths",
-        "inputs",
-    )
-    rest = ("margin", "level_margin", "ultimate_radius", "budget", "curve", "shortfalls")
-    own = node.closed(*_MACHINE, *others, *rest, optional=("largest", "windows"))
-    verdict = own["verdict"].word(*VERDICTS)
-    present = [own[key].value is not None for key in (*_MACHINE, "margin", "level_margin")]
-    if any(present) != all(present) or (verdict == "certified" and not all(present)):
-        raise node.refused("has a part of its machine only")
-    return HardwareSection(
-        verdict=verdict,
-        machine={key: own[key].decimal() for key in _MACHINE} if all(present) else {},
-        bandwidth=own.known("bandwidth", Node.decimal),
-        deadbeat=own["deadbeat"].flag(),
-        predict=own["predict"].flag(),
-        largest=own.get("largest", Node.text),
-        clip=tuple(read_range(item) for item in own["clip"].entries()),
-        radius=own.known("radius", Node.number),
-        half_widths={name: item.number() for name, item in own["half_widths"].items()},
-        inputs={name: read_range(item) for name, item in own["inputs"].items()},
-        margin=own.known("margin", enclosure),
-        level_margin=own.known("level_margin", enclosure),
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        budget=own.known("budget", _budget),
-        curve=_points(own["curve"]),
-        windows=own.get("windows", read_windows) or (),
-        shortfalls=printed.read_shortfalls(own["shortfalls"]),
-    )
-
-
-def _losses(node: Node) -> Losses:
-    """One record, in a list: none is left out."""
-    (own,) = node.sized(1)
-    keys = tuple(item.name for item in fields(Losses))
-    members = own.closed(*keys)
-    return Losses(**{key: members[key].decimal() for key in keys})
-
-
-def _budget(node: Node) -> dict[str, Fraction]:
-    own = node.closed(*SHARES, optional=OF_GAINS)
-    more = {key: own.get(key, Node.number) or Fraction(0) for key in OF_GAINS}
-    return {key: own[key].number() for key in SHARES} | more
-
-
-def _points(node: Node) -> tuple[tuple[Fraction, Fraction], ...]:
-    items = node.entries()
-    if len(items) > _MOST_POINTS:
-        raise node.refused(f"has more than {_MOST_POINTS} points")
-    return tuple(map(_point, items))
-
-
-def _point(node: Node) -> tuple[Fraction, Fraction]:
-    own = node.closed("sample_time", "level")
-    return own["sample_time"].decimal(), own["level"].decimal()
-
-
 # -- claims
 
 
@@ -301,56 +198,6 @@ def _told(section: HardwareSection) -> Outcome:
     return not_shown_to_hold(margins) if margins else CONFIRMED
 
 
-def _agrees(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
-    """The section, the recipe and the specification speak of one machine."""
-    asked = ground.asked
-    for key in _MACHINE:
-        if section.machine[key] != getattr(recipe, key):
-            return stated(False, f"the recipe has another {key}")
-    searched = [name for name, value in _given(asked, ground, recipe) if value is None]
-    statements = [
-        (recipe.bandwidth == section.bandwidth, "the recipe has another bandwidth"),
-        (section.deadbeat == (section.bandwidth is None), "`deadbeat` says otherwise than the bandwidth"),
-        (section.predict == asked.predict, "`predict` is not that of the specification"),
-        (
-            asked.predict == (recipe.prediction is not None),
-            "the recipe predicts otherwise than the specification",
-        ),
-        (
-            (asked.arithmetic is None) == (recipe.losses is None),
-            "the recipe rounds otherwise than the specification",
-        ),
-        (asked.bandwidth in (None, recipe.bandwidth), "the bandwidth is not that of the specification"),
-        (len(recipe.windows) == len(section.windows), "the recipe has other windows"),
-        (section.largest == (searched[0] if searched else None), "`largest` is not what is searched for"),
-    ]
-    own = {
-        "sample_time": recipe.sample_time,
-        "delay": recipe.delay,
-        "noise": recipe.noise,
-        "wind": recipe.wind,
-    }
-    statements += [
-        (value is None or value == own[name], f"{name} is not that of the specification")
-        for name, value in _given(asked, ground, recipe)
-    ]
-    feedback = recipe.sample_time if asked.feedback_time is None else asked.feedback_time
-    statements.append((recipe.feedback_time == feedback, "feedback_time is not that of the specification"))
-    return all_of(stated(*statement) for statement in statements)
-
-
-def _given(asked: Hardware, ground: Ground, recipe: Digital) -> list[tuple[str, Fraction | None]]:
-    """What the specification says of the machine and of the wind; None where the largest is searched for."""
-    noise = Fraction(1) if isinstance(asked.noise, tuple) else asked.noise
-    wind = ground.specification.disturbance
-    return [
-        ("sample_time", asked.sample_time),
-        ("delay", recipe.sample_time if asked.one_sample else asked.delay),
-        ("noise", noise),
-        ("wind", Fraction(0) if wind is None else wind.bound),
-    ]
-
-
 def _clipped(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
     """R bounds the set that the estimate is clipped to, and h lies in that set."""
     Dh, place = ground.constants["h"].above, ground.place
@@ -362,15 +209,6 @@ def _clipped(section: HardwareSection, recipe: Digital, ground: Ground) -> Outco
     if square > recipe.clip_radius**2:
         return stated(False, "the radius of the clip is less than a corner of its box")
     return clips(place, section.clip, Dh)
-
-
-def promise(asked: Hardware) -> Promise:
-    """What the specification promises of the machine."""
-    drift = asked.noise_rate
-    if drift is not None and isinstance(asked.noise, tuple):
-        # a vector of that length is within so many units of noise: its other entries are 0
-        drift = drift / min((size for size in asked.noise if size), default=Fraction(1))
-    return Promise(held=asked.held, predicts=asked.predict, drift=drift, arcs=asked.arcs)
 
 
 def _loop(recipe: Digital, ground: Ground) -> Loop | None:

@@ -15,9 +15,9 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least
+from tubecert.recheck.kinds.window_section import WindowSection
 from tubecert.recheck.kinds.windows import (
     Windows,
-    WindowSection,
     above,
     claims_of_constants,
     claims_of_inputs,

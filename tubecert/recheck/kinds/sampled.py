@@ -17,7 +17,7 @@ from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold, told
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.parts import Level, Parts, ranges, read_levels
-from tubecert.recheck.kinds.windows import WindowSection, read_windows
+from tubecert.recheck.kinds.window_section import WindowSection, read_windows
 from tubecert.recheck.legs import of_samples
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.sampling import SampledGains, sampled_margin
