@@ -17,7 +17,8 @@ from tubecert.simulate.compare import compare
 from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
-from tubecert.simulate.summary import outcome, summary
+from tubecert.simulate.summary import summary
+from tubecert.simulate.told import outcome
 from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.trajectory import constant_plan
 

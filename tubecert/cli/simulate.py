@@ -32,7 +32,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
-    from tubecert.simulate.summary import Summary
+    from tubecert.simulate.told import Summary
     from tubecert.spec import Spec
 
 _CODES: Final = {
@@ -77,7 +77,8 @@ def run(given: Given, output: Output) -> ExitCode:
     folder = given.folder or f"{Path(given.spec).stem}.simulation"
     executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
     from tubecert.simulate.output import prepared, write
-    from tubecert.simulate.summary import outcome, summary
+    from tubecert.simulate.summary import summary
+    from tubecert.simulate.told import outcome
 
     require_members(system, wishes, flag)
     terminal = Terminal.stderr(color=output.color)

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tubecert.certificate import file
-from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
+from tubecert.certificate.follows import InputData
+from tubecert.certificate.result import Bound, Certificate, MetricData, Result
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
 from tubecert.kinds.data import Pair, SectionData

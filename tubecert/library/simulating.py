@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from tubecert.simulate.members import Drawing
     from tubecert.simulate.runs import Runs
     from tubecert.simulate.setting import Setting
-    from tubecert.simulate.summary import Summary
+    from tubecert.simulate.told import Summary
 
 _HERE: Final = Serial()
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
@@ -62,7 +62,7 @@ class Simulation:
     @property
     def outcome(self) -> str:
         """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        from tubecert.simulate.summary import outcome
+        from tubecert.simulate.told import outcome
 
         return outcome(self.campaign)
 

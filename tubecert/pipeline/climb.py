@@ -15,7 +15,7 @@ from math import inf, log2, sqrt
 
 import numpy as np
 
-from tubecert.certificate.result import RateLimit, RateLimits
+from tubecert.certificate.searched import RateLimit, RateLimits
 from tubecert.claims.tube import TubeInSafeSet, TubeRadius
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel

@@ -15,7 +15,7 @@ from math import inf
 from typing import Literal
 
 from tubecert.certificate.metric_file import metric_file
-from tubecert.certificate.result import SolverData
+from tubecert.certificate.searched import SolverData
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import (
     AskForRateBelow,

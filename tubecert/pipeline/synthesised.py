@@ -12,7 +12,7 @@ from typing import Literal
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SynthesisData
+from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
 from tubecert.claims.family import Claim, Reason
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data

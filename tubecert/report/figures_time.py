@@ -11,7 +11,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from tubecert.certificate.result import InputData, Result
+from tubecert.certificate.follows import InputData
+from tubecert.certificate.result import Result
 from tubecert.report import planned
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_tube import is_near, view

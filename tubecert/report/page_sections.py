@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from tubecert.bounds.meanings import EVERY
-from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
+from tubecert.certificate.follows import InputData
+from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
 from tubecert.report import console, sections
 from tubecert.report.figures_gains import gain_figures

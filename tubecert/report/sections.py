@@ -12,7 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.bounds.meanings import EVERY
-from tubecert.certificate.result import Bound, InputData, MetricData, Plans, Result, TubeData
+from tubecert.certificate.follows import InputData
+from tubecert.certificate.result import Bound, MetricData, Plans, Result, TubeData
 from tubecert.claims.assumptions import MachineAsGiven
 from tubecert.claims.family import Assumption, Reason
 from tubecert.digits import UNKNOWN, down, end, exact, near, percent, short, up

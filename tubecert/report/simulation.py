@@ -12,7 +12,7 @@ from rich.text import Text
 from tubecert.digits import UNKNOWN, down, short, up
 from tubecert.report.layout import indented, titled
 from tubecert.simulate.inputs import InputUse
-from tubecert.simulate.summary import (
+from tubecert.simulate.told import (
     ClearanceData,
     ComparisonData,
     GainsData,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.certificate.metric_file import MetricFile
-    from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SynthesisData
+    from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
     from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}

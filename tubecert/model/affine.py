@@ -1,0 +1,231 @@
+"""A specification as exact matrices of expressions.
+
+In: a `Spec`. Out: a `ControlAffineModel`, and the period of what depends on time. Trusted: yes.
+Implements: F(x) = -d_f W + f_x W + W f_x' + 2 rate W, B^+ = (B'B)^-1 B' and their parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import combinations, islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tubecert.enclosure.domain import Range
+from tubecert.enclosure.interval import PI, Interval
+from tubecert.expression import (
+    ZERO,
+    Expression,
+    free_symbols,
+    symbol,
+)
+from tubecert.expression.matrix import (
+    Matrix,
+    adjugate,
+    along,
+    combine,
+    determinant,
+    differentiate,
+    identity,
+    jacobian,
+    multiply,
+    null_space,
+    transpose,
+)
+from tubecert.expression.waves import frequencies
+
+if TYPE_CHECKING:
+    from tubecert.spec import Spec
+
+TIME = "t"
+_MINORS = 1_000  # of B that are looked at: there may be billions
+
+
+@dataclass(frozen=True)
+class ControlAffineModel:
+    """xdot = f(x) + B(x)(u + h(t, x)) + E(x) w with dual metric W at a rate, all exact.
+
+    Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
+    where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
+    `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
+    `gained`, B(x, theta) (n, m), in place of B, if that is not empty. `time`: the range of t in f(t, x), None if f is
+    free of t.
+    """
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    f: tuple[Expression, ...]
+    B: Matrix
+    W: Matrix
+    rate: Fraction
+    h: tuple[Expression, ...] | None
+    E: Matrix = ()
+    wind_bound: Fraction | None = None
+    wind_rate: Fraction | None = None
+    drift: tuple[Expression, ...] = ()
+    gained: Matrix = ()
+    parameters: tuple[tuple[str, Range], ...] = ()
+    time: Range | None = None
+
+    @cached_property
+    def f_x(self) -> Matrix:
+        """df/dx, (n, n)."""
+        return jacobian(self.f, self.states)
+
+    @cached_property
+    def columns(self) -> Matrix:
+        """The columns b_j of B, as rows (m, n)."""
+        return transpose(self.B)
+
+    @cached_property
+    def constant_input(self) -> bool:
+        """Whether B is a matrix of rational numbers."""
+        return all(e.is_constant for row in self.B for e in row)
+
+    @cached_property
+    def B_x(self) -> list[Matrix]:
+        """dB/dx_i for every state, each (n, m)."""
+        return [differentiate(self.B, name) for name in self.states]
+
+    @cached_property
+    def b_x(self) -> list[Matrix]:
+        """db_j/dx for every input, each (n, n)."""
+        return [jacobian(column, self.states) for column in self.columns]
+
+    @cached_property
+    def gram(self) -> Matrix:
+        """B'B, (m, m); its determinant is positive where B has full column rank."""
+        return multiply(self.columns, self.B)
+
+    @cached_property
+    def B_pinv(self) -> Matrix:
+        """B^+ = (B'B)^-1 B', (m, n)."""
+        return divide(multiply(adjugate(self.gram), self.columns), determinant(self.gram))
+
+    @cached_property
+    def B_pinv_x(self) -> list[Matrix]:
+        """dB^+/dx_i for every state, each (m, n)."""
+        return [differentiate(self.B_pinv, name) for name in self.states]
+
+    @cached_property
+    def BBt(self) -> Matrix:
+        """B B', (n, n)."""
+        return multiply(self.B, self.columns)
+
+    @cached_property
+    def W_x(self) -> list[Matrix]:
+        """dW/dx_i for every state, each (n, n)."""
+        return [differentiate(self.W, name) for name in self.states]
+
+    @cached_property
+    def drift_form(self) -> Matrix:
+        """-d_f W + f_x W + W f_x', (n, n): F without its rate term."""
+        product = multiply(self.f_x, self.W)
+        return combine(1, combine(1, product, 1, transpose(product)), -1, along(self.W, self.f, self.states))
+
+    @cached_property
+    def F(self) -> Matrix:
+        """-d_f W + f_x W + W f_x' + 2 rate W, (n, n)."""
+        return combine(1, self.drift_form, 2 * self.rate, self.W)
+
+    @cached_property
+    def annihilator(self) -> Matrix:
+        """B_perp of a constant rational B, (n, n - m): columns spanning {v : B'v = 0}."""
+        from tubecert.expression.matrix import constants
+
+        basis = null_space([[e.fraction for e in column] for column in self.columns])
+        return transpose(constants(basis)) if basis else ()
+
+    @cached_property
+    def projector(self) -> Matrix:
+        """I - B B^+, (n, n): its columns span {v : B'v = 0}."""
+        return combine(1, identity(len(self.states)), -1, multiply(self.B, self.B_pinv))
+
+    def killing_defect(self, j: int) -> Matrix:
+        """d_bj W - (b_j)_x W - W (b_j)_x', (n, n): zero where C3 holds for input j."""
+        product = multiply(self.b_x[j], self.W)
+        moved = along(self.W, self.columns[j], self.states)
+        return combine(1, moved, -1, combine(1, product, 1, transpose(product)))
+
+    @cached_property
+    def pivots(self) -> tuple[list[tuple[int, ...]], bool]:
+        """Choices of m rows of B that may be independent, and whether these are all there are."""
+        rows = [i for i, row in enumerate(self.B) if any(e is not ZERO for e in row)]
+        chosen = list(islice(combinations(rows, len(self.inputs)), _MINORS + 1))
+        return chosen[:_MINORS], len(chosen) <= _MINORS
+
+    def drift_on_plan(self) -> Matrix:
+        """f(x) + B(x) u* as a column, with the input names standing for u*, (n, 1)."""
+        u = [(symbol(name),) for name in self.inputs]
+        return combine(1, [(e,) for e in self.f], 1, multiply(self.B, u))
+
+
+def divide(a: Matrix, e: Expression) -> Matrix:
+    """Every entry over `e`."""
+    return tuple(tuple(x / e for x in row) for row in a)
+
+
+def build(spec: Spec) -> ControlAffineModel:
+    """The model of a specification; without a metric, W is empty."""
+    metric = spec.metric
+    h, wind = spec.uncertainty.h, spec.disturbance
+    return ControlAffineModel(
+        states=spec.states,
+        inputs=spec.inputs,
+        f=tuple(term.expression for term in spec.f),
+        B=tuple(tuple(term.expression for term in row) for row in spec.B),
+        W=tuple(tuple(term.expression for term in row) for row in metric.dual_metric) if metric else (),
+        rate=metric.rate if metric else Fraction(0),
+        h=None if h is None else tuple(term.expression for term in h),
+        E=() if wind is None else tuple(tuple(term.expression for term in row) for row in wind.E),
+        wind_bound=None if wind is None else wind.bound,
+        wind_rate=None if wind is None else wind.rate,
+        drift=tuple(term.expression for term in spec.drift),
+        gained=tuple(tuple(term.expression for term in row) for row in spec.gained),
+        parameters=spec.ranges,
+        time=_time_of(spec),
+    )
+
+
+def _time_of(spec: Spec) -> Range | None:
+    """The times of f, None where it is free of t: the horizon, or one period of all that depends on t.
+
+    The reader takes no f that has neither.
+    """
+    if TIME not in free_symbols(term.expression for term in spec.f):
+        return None
+    if spec.trajectory.horizon is not None:
+        return Fraction(0), spec.trajectory.horizon
+    period = time_period(moving_parts(spec))
+    if period is None:
+        raise ValueError("f depends on t without a horizon or a period")
+    return 0.0, float(period.hi)
+
+
+def moving_parts(spec: Spec) -> list[Expression]:
+    """What may depend on t for all time, h and f, and what must hold for them to be defined."""
+    terms = [*(spec.uncertainty.h or ()), *spec.f]
+    owed = (duty.argument for term in terms for duty, _ in term.owed())
+    return [*(term.expression for term in terms), *owed]
+
+
+def time_period(h: Iterable[Expression]) -> Interval | None:
+    """An enclosure of a common period in t of expressions that depend on t through sin, cos, tan only.
+
+    None if there is none to be seen; [0, 0] if t does not occur.
+    """
+    found = frequencies(h, TIME)
+    if found is None:
+        return None
+    if not found.rational and not found.of_pi:
+        return Interval.exact(0.0)
+    if found.period is None:
+        return Interval.exact(1.0)  # t occurs, as in sin((t + 1) - t), but changes nothing
+    length, of_pi = found.period
+    with np.errstate(over="ignore"):
+        period = Interval.of(length) * (PI if of_pi else Interval.exact(1.0))
+    return period if np.isfinite(period.hi) else None
