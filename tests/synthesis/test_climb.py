@@ -303,11 +303,11 @@ def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
 def test_the_verdict_is_told_before_advice(monkeypatch):
     said = []
 
-    def remedies(self, rate):
+    def remedies(*args):
         said.append("advice")
         return []
 
-    monkeypatch.setattr(synthesis.SynthesisRun, "_remedies", remedies)
+    monkeypatch.setattr(synthesis, "remedies", remedies)
     lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
     wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)
     pipeline.synthesise(lonely, wanted, Options(), told=said.append)

@@ -13,9 +13,10 @@ from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load_text
 from tubecert.spec.canonical import synthesis_data
+from tubecert.synthesis.attempts import Request
 from tubecert.synthesis.coordinates import coordinates
 from tubecert.synthesis.family import metric_family
-from tubecert.synthesis.ladder import Ladder, Request
+from tubecert.synthesis.ladder import Ladder
 from tubecert.synthesis.problem import FLOORS
 from tubecert.synthesis.rounding import rounded
 from tubecert.synthesis.routes import routes

@@ -22,9 +22,11 @@ from tubecert.model import ControlAffineModel, build
 from tubecert.spec import load, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis import cegis, routes, sos
+from tubecert.synthesis.attempts import Request
+from tubecert.synthesis.decimals import digits_below
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
-from tubecert.synthesis.ladder import Ladder, Request, digits_below, shrunk
+from tubecert.synthesis.ladder import Ladder, shrunk
 from tubecert.synthesis.problem import Proposal
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, rounded, shortest_proven
 

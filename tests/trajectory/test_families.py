@@ -376,7 +376,7 @@ def test_a_plan_of_ones_own_is_followed_if_it_is_of_the_family(tmp_path, monkeyp
 
 def test_the_report_names_the_family(document):
     from tubecert.certificate.result import Certificate
-    from tubecert.report.sections import family_words, plan_words
+    from tubecert.report.claimed import family_words, plan_words
 
     result = Certificate.from_json(document).result
     assert plan_words(result) == "every plan of the family"

@@ -19,7 +19,7 @@ from tubecert.model import ControlAffineModel
 from tubecert.recheck.document import CertificateError
 from tubecert.recheck.run import recheck
 from tubecert.report import planned
-from tubecert.report.sections import excursion
+from tubecert.report.reach import excursion
 from tubecert.spec import Knots, load
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import piecewise_plan

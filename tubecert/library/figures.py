@@ -18,10 +18,10 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.kinds import name_of
 from tubecert.report import figures_tube
+from tubecert.report.claimed import horizon
 from tubecert.report.figures_tube import Plane
 from tubecert.report.gains import rows
 from tubecert.report.outline import widths
-from tubecert.report.sections import horizon
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,7 +21,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
-from tubecert.synthesis.ladder import digits_below, two_digits
+from tubecert.synthesis.decimals import digits_below, two_digits
 from tubecert.synthesis.problem import FLOORS, Floor
 
 _DOUBLINGS, _HALVINGS = 12, 10

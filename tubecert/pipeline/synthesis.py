@@ -19,11 +19,9 @@ from tubecert.certificate.searched import SolverData
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import (
     AskForRateBelow,
-    AskForRateUpTo,
     ConstantInputs,
     EnlargeSafeSet,
     GiveInput,
-    HigherDegree,
     LowerDegree,
     LowerRate,
     OtherVariables,
@@ -35,8 +33,6 @@ from tubecert.claims.advice import (
 from tubecert.claims.failures import (
     ConditionNumber,
     Failure,
-    NoneCertified,
-    NothingFound,
     NotProvenAsWritten,
     NotWritable,
     RankUnproven,
@@ -57,7 +53,8 @@ from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
-from tubecert.pipeline.width import measure_in
+from tubecert.pipeline.unfound import equilibria, none_certified, remedies, tried
+from tubecert.pipeline.width import half_widths, measure_in
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
@@ -65,9 +62,11 @@ from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
+from tubecert.synthesis.attempts import Request
+from tubecert.synthesis.decimals import digits_below
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
-from tubecert.synthesis.family import FamilyError, suggested
-from tubecert.synthesis.ladder import Ladder, Request, digits_below
+from tubecert.synthesis.family import FamilyError
+from tubecert.synthesis.ladder import Ladder
 from tubecert.synthesis.problem import FLOORS, Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.synthesis.routes import routes
@@ -128,7 +127,7 @@ class SynthesisRun:
                 limit=self.limit,
                 solver=wanted.solver,
                 coordinates=wanted.coordinates,
-                half_widths=_half_widths(spec),
+                half_widths=half_widths(spec),
                 effort=self.effort,
                 pace=pace(slow_scale(self.model, spec)),
                 progress=self._tell,
@@ -355,79 +354,18 @@ class SynthesisRun:
                     RaiseConditionNumber(to=number),
                     LowerRate(),
                 )
-        if (failure := self._none_certified()) is not None:
+        if (failure := none_certified(self._table())) is not None:
             relax = (ReduceRadii(), EnlargeSafeSet()) if isinstance(failure.slow, TubeInSafeSet) else ()
             return self._failed(failure, *relax)
         if self.told is not None:
-            self.told(self._failed(self._tried()))
-        return self._failed(self._tried(), *self._remedies(rate))
-
-    def _none_certified(self) -> NoneCertified | None:
-        """That metrics were found, and what each of them lacks; None if none was found."""
-        failed = [
-            (row, row.claim)
-            for row in self._table()
-            if row.claim is not None and row.verdict is not None and row.floor == "identity"
-        ]
-        if not failed:
-            return None
-        (slow, slow_claim), (fast, fast_claim) = failed[0], failed[-1]
-        return NoneCertified(
-            compared=len(failed),
-            slowest=slow.rate,
-            fastest=fast.rate,
-            slow=slow_claim,
-            slow_verdict=slow.verdict or Verdict.UNDECIDED,
-            fast=fast_claim,
-            fast_verdict=fast.verdict or Verdict.UNDECIDED,
+            self.told(self._failed(tried(self.ladder.attempts)))
+        return self._failed(
+            tried(self.ladder.attempts), *remedies(self.ladder, rate, self.wanted.degree, self._say)
         )
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""
-        return uncontrollable_mode(self.model, self._equilibria(), rate)
-
-    def _tried(self) -> NothingFound:
-        attempts = self.ladder.attempts
-        return NothingFound(
-            attempts=len(attempts),
-            routes=tuple(sorted({a.route for a in attempts})),
-            degrees=tuple(sorted({a.degree for a in attempts})),
-            last=attempts[-1].outcome if attempts else None,
-        )
-
-    def _remedies(self, rate: Fraction | None) -> list[Relax]:
-        if any(attempt.undecided for attempt in self.ladder.attempts):
-            return [RaiseBudget(proof=True)]
-        remedies: list[Relax] = []
-        if self.wanted.degree is not None and suggested(self.model):
-            remedies.append(HigherDegree(degree=self.wanted.degree))
-        if rate is not None:
-            self._say("looking for a rate that works")
-            cheap = self.ladder.cheap()
-            lower = cheap.lower_rate(rate)
-            if lower is not None:
-                remedies.append(AskForRateUpTo(rate=lower))
-            self._say("looking for a box that works")
-            box = cheap.smaller_box(rate)
-            if box is not None:
-                remedies.append(ShrinkSafeSet(factor=float(box), rate=rate))
-        return remedies or [LowerRate(), ShrinkSafeSet()]
-
-    def _equilibria(self) -> list[tuple[Fraction, ...]]:
-        """Rational points that may be equilibria: the plan's, its target, the centre of the box, the origin."""
-        spec = self.spec
-        points: list[tuple[Fraction, ...]] = []
-        if spec.trajectory.kind == "equilibrium" and all(t.expression.is_constant for t in spec.trajectory.x):
-            points.append(tuple(t.expression.fraction for t in spec.trajectory.x))
-        if spec.trajectory.task is not None:
-            points.append(spec.trajectory.task.target)
-        points.append(tuple((low + high) / 2 for low, high in spec.safe_set))
-        points.append((Fraction(0),) * len(spec.states))
-        return [
-            p
-            for p in dict.fromkeys(points)
-            if all(low <= q <= high for q, (low, high) in zip(p, spec.safe_set, strict=True))
-        ]
+        return uncontrollable_mode(self.model, equilibria(self.spec), rate)
 
     def _say(self, words: str) -> None:
         self._tell(Step(phase=Phase.SYNTHESIS, name=words))
@@ -437,14 +375,6 @@ class SynthesisRun:
         if self.progress is not None:
             self.said += 1
             self.progress(replace(step, count=self.said, unit=Unit.STEPS))
-
-
-def _half_widths(spec: Spec) -> tuple[Fraction, ...]:
-    """What the states are measured in: the tube's half-widths where all are asked for, else the safe set's."""
-    asked = dict(spec.tube.half_widths)
-    if all(name in asked for name in spec.states):
-        return tuple(asked[name] for name in spec.states)
-    return tuple((high - low) / 2 for low, high in spec.safe_set)
 
 
 def _solver(metric: VerifiedMetric) -> SolverData:

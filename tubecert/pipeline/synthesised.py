@@ -16,7 +16,7 @@ from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, Sy
 from tubecert.claims.family import Claim, Reason
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
-from tubecert.synthesis.ladder import Attempt
+from tubecert.synthesis.attempts import Attempt
 from tubecert.synthesis.problem import Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict

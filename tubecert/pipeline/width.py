@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import inf
 
 from tubecert.certificate.result import Result
-from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
+from tubecert.letters import HARDWARE
 from tubecert.spec import Spec
 from tubecert.verdict import Verdict
 
@@ -75,3 +76,11 @@ def need_of(section: HardwareData, measure: Measure) -> float:
         return measure.of(section.half_widths, section.radius)
     largest = getattr(section, section.largest)
     return 1 / float(largest) if largest else inf
+
+
+def half_widths(spec: Spec) -> tuple[Fraction, ...]:
+    """What the states are measured in: the tube's half-widths where all are asked for, else the safe set's."""
+    asked = dict(spec.tube.half_widths)
+    if all(name in asked for name in spec.states):
+        return tuple(asked[name] for name in spec.states)
+    return tuple((high - low) / 2 for low, high in spec.safe_set)

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.limits import InputWithinLimits
-from tubecert.report import sections
+from tubecert.report import claimed, reach, sections
 from tubecert.report.gains import deciding
 from tubecert.report.layout import indented, titled
 from tubecert.report.outline import widths
@@ -52,8 +52,8 @@ def verdict_line(result: Result) -> Text:
     line.append(f" {name(result)}: ", style="bold")
     if verdict is Verdict.CERTIFIED:
         chosen = deciding(result)
-        extent = sections.extent(result)
-        numbers = [f"rho = {extent}" if sections.is_radius(result) else extent]
+        extent = reach.extent(result)
+        numbers = [f"rho = {extent}" if reach.is_radius(result) else extent]
         numbers += [gains.text(titled=len(chosen) > 1) for gains in chosen]
         line.append("; ".join(numbers))
     else:
@@ -95,17 +95,17 @@ def _promise(result: Result) -> Text:
     chosen = deciding(result)
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
-        f"With this metric, {loops}, the state stays within {sections.extent(result)} of "
-        f"{sections.plan_words(result)} {sections.span(result)}, under the assumptions below.{_by_state(result)}"
+        f"With this metric, {loops}, the state stays within {reach.extent(result)} of "
+        f"{claimed.plan_words(result)} {claimed.span(result)}, under the assumptions below.{_by_state(result)}"
     )
 
 
 def _by_state(result: Result) -> str:
     """What a radius over several states, whose units may differ, says of each of them."""
     known = widths(result)
-    if known is None or len(known) == 1 or not sections.is_radius(result):
+    if known is None or len(known) == 1 or not reach.is_radius(result):
         return ""
-    return f" State by state: {sections.half_widths(result, known)}."
+    return f" State by state: {reach.half_widths(result, known)}."
 
 
 def _tube_is_known(result: Result) -> bool:

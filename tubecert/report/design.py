@@ -10,7 +10,7 @@ from rich.text import Text
 from tubecert.digits import exact, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
-from tubecert.report import sections
+from tubecert.report import reach, sections
 from tubecert.report.console import verdict_line
 from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
@@ -39,7 +39,7 @@ def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType
     if best is not None:
         parts += titled("Machine", [Text(line) for line in lines(best.result)])
         scale = f"{exact(best.scale)} times as wide as the specification's"
-        parts += titled("Tube", [Text(f"{scale}: {sections.extent(best.result)}")])
+        parts += titled("Tube", [Text(f"{scale}: {reach.extent(best.result)}")])
     table = plain_table(">scale", "verdict", ">proven size", ">used", "what stops it", wrapped=4)
     for each in sorted(found.attempts, key=lambda each: each.scale):
         mark = " *" if each is best else ""

@@ -13,10 +13,10 @@ from tubecert.certificate.effective import ObstacleView
 from tubecert.certificate.result import Result
 from tubecert.digits import near
 from tubecert.enclosure.constant import Witness
+from tubecert.report.claimed import point
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
 from tubecert.report.outline import Outline, domain_outline, tube_outline
 from tubecert.report.page import Figure
-from tubecert.report.sections import point
 from tubecert.words.claims import title as title_of
 
 _NEAR = 0.25  # places closer than this part of rho share a number

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.result import Certificate, Result
 from tubecert.printable import visible
-from tubecert.report import console, sections
+from tubecert.report import console, reach
 from tubecert.report.html import environment
 from tubecert.report.page import Cell, Page, Table
 from tubecert.report.page_origin import equations
@@ -75,7 +75,7 @@ def _half_widths(result: Result) -> Table | None:
         return None
     return Table(
         columns=("half-widths of the tube",),
-        rows=((Cell(text=sections.half_widths(result, tube.half_widths)),),),
+        rows=((Cell(text=reach.half_widths(result, tube.half_widths)),),),
     )
 
 

@@ -9,9 +9,10 @@ from tubecert.certificate.effective import Effective, TableView
 from tubecert.certificate.result import Certificate, Result
 from tubecert.digits import end, exact
 from tubecert.records import to_json
+from tubecert.report.claimed import family_words
 from tubecert.report.mathml import Equation, aligned
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
-from tubecert.report.sections import family_words, safe_set
+from tubecert.report.reach import safe_set
 
 _POINTS = 8  # of a table
 

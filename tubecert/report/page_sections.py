@@ -12,7 +12,7 @@ from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
-from tubecert.report import console, sections
+from tubecert.report import claimed, console, reach, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
@@ -104,8 +104,8 @@ _MOST_TILES = 4  # half-widths that are shown first
 def _sizes(result: Result) -> Iterator[Tile]:
     """How wide the tube is: its radius, or half-widths where that is no length in the states, or is not proven."""
     units, known = result.spec.effective.system.units, widths(result)
-    if sections.is_radius(result) or known is None:
-        yield Tile(symbol="ρ", value=up(sections.radius(result)), unit="", words="radius of the tube")
+    if reach.is_radius(result) or known is None:
+        yield Tile(symbol="ρ", value=up(claimed.radius(result)), unit="", words="radius of the tube")
         return
     for name, width in list(known.items())[:_MOST_TILES]:
         yield Tile(symbol=name, value=up(width), unit=units.get(name, ""), words="half-width")
@@ -146,7 +146,7 @@ def reasons(result: Result) -> tuple[Reason, ...]:
             verdict=reason.verdict,
             claim=title(reason.claim),
             message=message(reason),
-            at="" if reason.at is None else sections.point(result, reason.at),
+            at="" if reason.at is None else claimed.point(result, reason.at),
             relax=advice(reason.relax),
         )
         for reason in result.reasons
@@ -249,24 +249,24 @@ def _drawn(result: Result) -> Iterator[Block]:
 
 
 def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
-    yield "radius rho", Cell(text=sections.radii(tube))
+    yield "radius rho", Cell(text=reach.radii(tube))
     yield "epsilon", Cell(text=short(tube.epsilon))
     if tube.coordinates is not None:
         yield (
             "measured by",
             Cell(text="z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states"),
         )
-        yield "epsilon, by state", Cell(text=sections.in_states(result, tube, tube.epsilon, "epsilon"))
+        yield "epsilon, by state", Cell(text=reach.in_states(result, tube, tube.epsilon, "epsilon"))
     known = widths(result)
     if known and known != tube.half_widths:
-        yield "proven half-widths", Cell(text=sections.half_widths(result, known))
-        yield "constants bounded over", Cell(text=sections.half_widths(result, tube.half_widths or {}))
+        yield "proven half-widths", Cell(text=reach.half_widths(result, known))
+        yield "constants bounded over", Cell(text=reach.half_widths(result, tube.half_widths or {}))
     elif known:
-        yield "half-widths", Cell(text=sections.half_widths(result, known))
-    for line in sections.clearances(result):
+        yield "half-widths", Cell(text=reach.half_widths(result, known))
+    for line in reach.clearances(result):
         yield "obstacles", Cell(text=line)
-    yield "claimed", Cell(text=sections.span(result))
-    for words, rest in sections.long_run(result):
+    yield "claimed", Cell(text=claimed.span(result))
+    for words, rest in reach.long_run(result):
         yield f"in the long run, {words}", Cell(text=rest)
 
 
@@ -304,12 +304,12 @@ def _input_row(result: Result, own: InputData, key: str | None) -> tuple[Cell, .
         Cell(text=f"{own.input} ({unit})" if unit else own.input),
         Cell(text=f"[{end(own.limits[0])}, {end(own.limits[1])}]", kind="number"),
         Cell(text=own.verdict, kind="verdict"),
-        Cell(text=sections.span_of(own.plan.least.below, own.plan.greatest.above), kind="number"),
+        Cell(text=reach.span_of(own.plan.least.below, own.plan.greatest.above), kind="number"),
         *(
             (
                 Cell(text=NAMES[key]),
-                Cell(text=sections.span_of(bound.least, bound.greatest), kind="number"),
-                Cell(text=sections.used(own, key), kind="number"),
+                Cell(text=reach.span_of(bound.least, bound.greatest), kind="number"),
+                Cell(text=reach.used(own, key), kind="number"),
                 Cell(text=up(bound.feedback), kind="number"),
                 Cell(text=up(bound.adaptation), kind="number"),
             )
@@ -369,7 +369,7 @@ def _order(constants: Mapping[str, Bound]) -> list[str]:
 
 
 def _constant(result: Result, name: str, item: Bound) -> tuple[Cell, ...]:
-    at = "" if item.at is None else sections.point(result, item.at)
+    at = "" if item.at is None else claimed.point(result, item.at)
     return (
         Cell(text=item.symbol, kind="code"),
         Cell(text=sections.described(name), note=f"at {at}" if at else ""),

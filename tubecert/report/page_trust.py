@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from tubecert.certificate.result import Result
 from tubecert.digits import exact, up
+from tubecert.report.claimed import plan_words
 from tubecert.report.gains import NAMES
-from tubecert.report.sections import plan_words
 from tubecert.verdict import Verdict
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from tubecert.certificate.result import Result
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
+from tubecert.report.claimed import horizon
 from tubecert.report.figures_axes import Point
 from tubecert.report.outline import expression_of
-from tubecert.report.sections import horizon
 
 _SAMPLES = 201
 _OF_A_PIECE = 8  # lines that a parabola is drawn by

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.report.claimed import place
 from tubecert.report.layout import indented, plain_table, titled
-from tubecert.report.sections import VERDICTS, place
+from tubecert.report.sections import VERDICTS
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from tubecert.claims.advice import HardwarePart
 from tubecert.digits import down, exact, up
 from tubecert.records import Json
-from tubecert.report import sections
+from tubecert.report import reach, sections
 from tubecert.report.console import verdict_line
 from tubecert.report.figures_axes import Axis, Chart
 from tubecert.report.figures_file import svg_file
@@ -73,7 +73,7 @@ def offers(spec: Spec, found: Sequence[Offer], files: Mapping[HardwarePart, str]
     parts += titled("Cheapest machine", [table, Text(f"{others}.", style="dim")])
     first = found[0].result
     if first.tube is not None:
-        parts += titled("Tube", [Text(sections.extent(first))])
+        parts += titled("Tube", [Text(reach.extent(first))])
     return parts + titled("Certificates in this tube", [_kinds(first)])
 
 

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
-from math import floor, inf, isfinite, log10, sqrt
+from math import inf, sqrt
 
-from tubecert.claims.outcomes import Outcome, Proven
-from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.model import ControlAffineModel
-from tubecert.progress import Phase, Progress, Step
-from tubecert.synthesis.coordinates import Choice
+from tubecert.progress import Phase, Step
+from tubecert.synthesis.attempts import Attempt, Box, Request, Route, attempted, guarded, kappa
+from tubecert.synthesis.decimals import digits_below, two_digits
 from tubecert.synthesis.family import MetricFamily, metric_family
-from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
+from tubecert.synthesis.problem import Floor, SynthesisProblem
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
 
 _DEGREES = (0, 1, 2, 3, 4)
@@ -33,53 +31,6 @@ _POLISHES = 0.9997  # a back-off that is ten times smaller must lower kappa to t
 _POLISH_BOXES = 20_000  # what its proof may cost
 _SMALL = 3  # states up to which metrics are polished in any coordinates
 _CHEAP_ROUNDS, _CHEAP_BOXES = 30, 20_000  # what advice may cost, if the search did not cost more
-
-Route = Callable[[SynthesisProblem], Proposal]
-Box = tuple[tuple[Fraction, Fraction], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """What is wanted: a metric of `model` on `safe_set`.
-
-    `degree` None: raised as long as it pays; `variables` None: chosen; `routes` in the order in which they are tried
-    for constant W, backwards where W moves; `limit` of the condition number. Unless
-    `thorough`, only the first route and back-off are tried; `rounds`: of all proposals together. `pace`: where the
-    search for the largest rate begins, in 1/s.
-    """
-
-    model: ControlAffineModel = field(repr=False)
-    safe_set: Box
-    routes: tuple[tuple[str, Route], ...]
-    degree: int | None = None
-    variables: tuple[str, ...] | None = None
-    limit: float | None = None
-    solver: str = "clarabel"
-    coordinates: Choice = "identity"
-    half_widths: tuple[Fraction, ...] = ()
-    thorough: bool = True
-    rounds: int | None = None
-    effort: Effort = field(default_factory=Effort)
-    pace: Fraction = Fraction(1)
-    progress: Progress | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Attempt:
-    """One proposal and what became of it; `condition_number` is proven, None if nothing was.
-
-    `undecided`: its proof ran out of boxes.
-    """
-
-    rate: float
-    degree: int
-    floor: Floor
-    route: str
-    outcome: Outcome
-    condition_number: float | None = None
-    undecided: bool = False
-    seconds: float
-    solver_seconds: float
 
 
 class Ladder:
@@ -206,9 +157,9 @@ class Ladder:
                 self._least_degree, self._hardest = degree, float(rate)
             if found is None:
                 continue
-            pays = best is None or _kappa(found) <= _PAYS * _kappa(best)
-            best = found if best is None else min(best, found, key=_kappa)
-            if not pays or _kappa(best) <= enough:
+            pays = best is None or kappa(found) <= _PAYS * kappa(best)
+            best = found if best is None else min(best, found, key=kappa)
+            if not pays or kappa(best) <= enough:
                 break
         return best if best is None or enough or not self._sharp else self._polished(best)
 
@@ -229,16 +180,16 @@ class Ladder:
         for back_off in _BACK_OFF[1:]:
             problem = replace(self._problem(best.rate, best.floor, degree, back_off), sharp=True)
             started = time.perf_counter()
-            proposal = _guarded(name, route, problem)
+            proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
-            if not proposal.kappa < _POLISHES * _kappa(best):
+            if not proposal.kappa < _POLISHES * kappa(best):
                 break
             outcome = shortest_proven(problem, proposal, best.rate, effort)
-            self._note(_attempt(problem, best.rate, proposal, outcome, time.perf_counter() - started))
+            self._note(attempted(problem, best.rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, Rejected):
                 break
             self.proven.append(outcome)
-            best = min(best, outcome, key=_kappa)
+            best = min(best, outcome, key=kappa)
         return best
 
     def _at_degree(self, rate: Fraction, floor: Floor, degree: int) -> VerifiedMetric | None:
@@ -275,10 +226,10 @@ class Ladder:
             back_off = back_offs.pop(0)
             problem = self._problem(rate, floor, degree, back_off)
             started = time.perf_counter()
-            proposal = _guarded(name, route, problem)
+            proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
             outcome = shortest_proven(problem, proposal, rate, self.request.effort)
-            self._note(_attempt(problem, rate, proposal, outcome, time.perf_counter() - started))
+            self._note(attempted(problem, rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, VerifiedMetric):
                 if retreated and self.request.coordinates == "auto":
                     self._wider[degree] = (
@@ -332,27 +283,6 @@ class Ladder:
             )
 
 
-def _attempt(
-    problem: SynthesisProblem,
-    rate: Fraction,
-    proposal: Proposal,
-    outcome: VerifiedMetric | Rejected,
-    seconds: float,
-) -> Attempt:
-    proven = outcome if isinstance(outcome, VerifiedMetric) else None
-    return Attempt(
-        rate=float(rate),
-        degree=problem.family.degree,
-        floor=problem.floor,
-        route=proposal.route,
-        outcome=outcome.outcome if isinstance(outcome, Rejected) else Proven(),
-        condition_number=None if proven is None else proven.condition_number.above,
-        undecided=isinstance(outcome, Rejected) and outcome.undecided,
-        seconds=seconds,
-        solver_seconds=proposal.solver_seconds,
-    )
-
-
 def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:
     """The largest factor seen to work: bisected in (0, 1), a few times only."""
     low, high = Fraction(0), Fraction(1)
@@ -362,30 +292,6 @@ def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:
     return low or None
 
 
-def _kappa(metric: VerifiedMetric) -> float:
-    """What a problem minimises, as it came out."""
-    plain = metric.floor == "identity" and metric.coordinates == "identity"
-    return metric.condition_number.above if plain else metric.proposal.kappa
-
-
-def _guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
-    """What a route proposes; a solver that breaks down has proposed nothing."""
-    started = time.perf_counter()
-    try:
-        return route(problem)
-    except (ArithmeticError, ValueError, RuntimeError) as error:
-        what = " ".join(str(error).split())[:120] or type(error).__name__
-        return Proposal(
-            route=name,
-            coefficients=None,
-            kappa=float("inf"),
-            feasible=None,
-            status=f"broke down ({what})",
-            seconds=time.perf_counter() - started,
-            solver_seconds=0.0,
-        )
-
-
 def shrunk(box: Sequence[tuple[Fraction, Fraction]], factor: Fraction) -> Box:
     """The box scaled about its centre."""
     result = []
@@ -393,19 +299,3 @@ def shrunk(box: Sequence[tuple[Fraction, Fraction]], factor: Fraction) -> Box:
         centre, half = (low + high) / 2, (high - low) / 2 * factor
         result.append((centre - half, centre + half))
     return tuple(result)
-
-
-def digits_below(value: float | Fraction, digits: int) -> Fraction:
-    """The largest decimal of so many digits that does not exceed a positive value."""
-    assert isfinite(value)
-    assert value > 0
-    exponent = floor(log10(value))
-    if Fraction(10) ** exponent > value:  # the logarithm was rounded up
-        exponent -= 1
-    unit = Fraction(10) ** (exponent - digits + 1)
-    return (Fraction(value) // unit) * unit
-
-
-def two_digits(value: Fraction) -> Fraction:
-    """Two digits, rounded down."""
-    return digits_below(value, 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tubecert.synthesis.ladder import Route
+from tubecert.synthesis.attempts import Route
 
 
 def routes(choice: str) -> tuple[tuple[str, Route], ...]:
