@@ -597,11 +597,7 @@ def test_everything_that_is_offered_is_there():
         _ = tc.certfy
 
 
-@pytest.mark.slow
-def test_a_script_of_a_user_is_type_checked(tmp_path):
-    from mypy import api
-
-    script = """
+RIGHT = """
 from pathlib import Path
 
 import tubecert as tc
@@ -621,21 +617,48 @@ ok: bool = tc.recheck(result).confirmed and tc.verify(spec, metric).proven
 axes = result.plot_tube()
 axes.plot(run.states("l1")[:, 0])
 """
-    wrong = """
+WRONG = """
 import tubecert as tc
 tc.certfy("plant.yaml")
 tc.certify("plant.yaml", rho="0.1")
 tc.simulate(3)
 omega: str = tc.read("x.json").omega
 """
-    for name, text in (("right.py", script), ("wrong.py", wrong)):
+
+
+@pytest.fixture
+def scripts(tmp_path):
+    """A user's script without, and one with a mistake in each line from the third."""
+    for name, text in (("right.py", RIGHT), ("wrong.py", WRONG)):
         (tmp_path / name).write_text(text, encoding="utf-8")
-    options = ["--strict", "--no-error-summary", "--config-file", "", "--cache-dir", str(tmp_path / "cache")]
-    said, _, _ = api.run([*options, str(tmp_path / "right.py"), str(tmp_path / "wrong.py")])
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_mypy_checks_the_script_of_a_user(scripts):
+    from mypy import api
+
+    options = ["--strict", "--no-error-summary", "--config-file", "", "--cache-dir", str(scripts / "cache")]
+    said, _, _ = api.run([*options, str(scripts / "right.py"), str(scripts / "wrong.py")])
     errors = [
-        line.removeprefix(f"{tmp_path}/").split(": ")[0] for line in said.splitlines() if "error" in line
+        line.removeprefix(f"{scripts}/").split(": ")[0] for line in said.splitlines() if "error" in line
     ]
     assert errors == ["wrong.py:3", "wrong.py:4", "wrong.py:5", "wrong.py:6"], said
+
+
+@pytest.mark.slow
+def test_pyright_checks_the_script_of_a_user(scripts):
+    options = {
+        "include": ["."],
+        "extraPaths": [str(Path(tc.__file__).parents[1])],
+        "typeCheckingMode": "standard",
+    }
+    (scripts / "pyrightconfig.json").write_text(json.dumps(options), encoding="utf-8")
+    command = [sys.executable, "-m", "basedpyright", "--outputjson", "--project", str(scripts)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    found = json.loads(run.stdout)["generalDiagnostics"]
+    errors = sorted((Path(item["file"]).name, item["range"]["start"]["line"] + 1) for item in found)
+    assert errors == [("wrong.py", line) for line in (3, 4, 5, 6)], found
 
 
 @pytest.mark.slow

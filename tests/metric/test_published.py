@@ -1,20 +1,22 @@
 """The gallery of published metrics: what is said of each is locked, and every refutation is confirmed at 50 digits.
 
-The witness of a refutation is evaluated from the text of the file with Python's own parser and ball arithmetic: none of
-the code under test takes part but for the point that it names.
+The witness of a refutation is evaluated from the text of the file with Python's own parser and the intervals of
+mpmath: none of the code under test takes part but for the point that it names.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import flint
 import numpy as np
 import pytest
 import yaml
+from mpmath import iv
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app
@@ -27,16 +29,17 @@ DIGITS = 50
 Point = dict[str, Fraction]
 
 
-def number(value: Any) -> flint.arb:
+def number(value: Any) -> Any:
+    """An exact number as an interval."""
     q = Fraction(str(value))
-    return flint.arb(flint.fmpq(q.numerator, q.denominator))
+    return iv.mpf(q.numerator) / q.denominator
 
 
 class Series:
     """a + b e with e^2 = 0: a value and its derivative along one direction."""
 
-    def __init__(self, value: flint.arb, slope: flint.arb | None = None) -> None:
-        self.value, self.slope = value, flint.arb(0) if slope is None else slope
+    def __init__(self, value: Any, slope: Any = None) -> None:
+        self.value, self.slope = value, iv.mpf(0) if slope is None else slope
 
     def _other(self, other: Any) -> Series:
         return other if isinstance(other, Series) else Series(number(other))
@@ -77,11 +80,11 @@ class Series:
 
 
 def sin(x: Any) -> Series:
-    return Series(x.value.sin(), x.value.cos() * x.slope)
+    return Series(iv.sin(x.value), iv.cos(x.value) * x.slope)
 
 
 def cos(x: Any) -> Series:
-    return Series(x.value.cos(), -x.value.sin() * x.slope)
+    return Series(iv.cos(x.value), -iv.sin(x.value) * x.slope)
 
 
 def tan(x: Any) -> Series:
@@ -116,29 +119,29 @@ def functions(spec: dict[str, Any]) -> dict[str, Any]:
 
 
 def matrices(spec: dict[str, Any], at: Point) -> tuple[Any, Any, Any, Any]:
-    """W, its derivative along f, f_x and B at a point, as balls."""
+    """W, its derivative along f, f_x and B at a point, as intervals."""
     states, known = spec["system"]["states"], functions(spec)
 
-    def along(texts: list[Any], direction: dict[str, flint.arb]) -> list[Series]:
+    def along(texts: list[Any], direction: dict[str, Any]) -> list[Series]:
         names = known | {x: Series(number(at[x]), direction.get(x)) for x in states}
         return [evaluated(str(text), names) for text in texts]
 
     f = [item.value for item in along(spec["system"]["f"], {})]
     rows = spec["metric"]["dual_metric"]
     W = [along(row, dict(zip(states, f, strict=True))) for row in rows]
-    columns = [[item.slope for item in along(spec["system"]["f"], {x: flint.arb(1)})] for x in states]
+    columns = [[item.slope for item in along(spec["system"]["f"], {x: iv.mpf(1)})] for x in states]
     B = [[item.value for item in along(row, {})] for row in spec["system"]["B"]]
-    value = flint.arb_mat([[item.value for item in row] for row in W])
-    moved = flint.arb_mat([[item.slope for item in row] for row in W])
-    return value, moved, flint.arb_mat(columns).transpose(), flint.arb_mat(B)
+    value = iv.matrix([[item.value for item in row] for row in W])
+    moved = iv.matrix([[item.slope for item in row] for row in W])
+    return value, moved, iv.matrix(columns).T, iv.matrix(B)
 
 
-def form(v: Any, A: Any) -> flint.arb:
-    return (v.transpose() * A * v)[0, 0]
+def form(v: Any, A: Any) -> Any:
+    return (v.T * A * v)[0, 0]
 
 
 def floats(A: Any) -> np.ndarray:
-    return np.array([[float(A[i, j]) for j in range(A.ncols())] for i in range(A.nrows())])
+    return np.array([[float(A[i, j].mid) for j in range(A.cols)] for i in range(A.rows)])
 
 
 def violates(spec: dict[str, Any], claim: str, at: Point, rate: Fraction) -> bool:
@@ -149,12 +152,11 @@ def violates(spec: dict[str, Any], claim: str, at: Point, rate: Fraction) -> boo
     if claim == "metric_definite":
         v = exact_vector(np.linalg.eigh(floats(W))[1][:, 0])
         return bool(form(v, W) < 0)
-    F = f_x * W + W * f_x.transpose() - moved + W * (2 * number(rate))
-    free = np.linalg.svd(floats(B).T)[2][B.ncols() :].T
+    F = f_x * W + W * f_x.T - moved + W * (2 * number(rate))
+    free = np.linalg.svd(floats(B).T)[2][B.cols :].T
     direction = free @ np.linalg.eigh(free.T @ floats(F) @ free)[1][:, -1]
     v = exact_vector(direction)
-    gram = B.transpose() * B  # what is left of v in the range of B is taken out in balls
-    v = v - B * gram.solve(B.transpose() * v)
+    v = v - B * iv.lu_solve(B.T * B, B.T * v)  # what is left of v in the range of B is taken out in intervals
     return bool(form(v, F) > 0)
 
 
@@ -172,7 +174,17 @@ def moves_along_inputs(spec: dict[str, Any], at: Point) -> bool:
 
 
 def exact_vector(v: np.ndarray) -> Any:
-    return flint.arb_mat([[number(Fraction(float(x)))] for x in v])
+    return iv.matrix([number(Fraction(float(x))) for x in v])
+
+
+@contextmanager
+def digits(count: int) -> Iterator[None]:
+    """Intervals of so many digits; the default of mpmath afterwards."""
+    before, iv.dps = iv.dps, count
+    try:
+        yield
+    finally:
+        iv.dps = before
 
 
 REFUTED = [each for each in TABLE if each["verdict"] == "refuted" and "at" in each.get("reason", {})]
@@ -194,7 +206,7 @@ def test_every_witness_is_confirmed_at_fifty_digits(each):
     }
     for x, (low, high) in each["safe_set"].items():
         assert Fraction(str(low)) <= at[x] <= Fraction(str(high)), "the witness lies in the set"
-    with flint.ctx.workdps(DIGITS):
+    with digits(DIGITS):
         assert violates(spec, reason["claim"], at, Fraction(str(each["rate"])))
         # at the rate that is said to hold there is nothing to object to at this point
         if reason["claim"] == "metric_contraction" and each["largest_rate"][0] > 0:
@@ -238,7 +250,7 @@ def test_the_one_beside_it_holds_where_it_fails(each):
         return
     point = zip(spec["system"]["states"], each["reason"]["at"]["x"], strict=True)
     at = {x: Fraction(str(value)) for x, value in point}
-    with flint.ctx.workdps(DIGITS):
+    with digits(DIGITS):
         for claim in ("metric_definite", "metric_contraction"):
             assert not violates(spec, claim, at, Fraction(spec["metric"]["rate"]))
 
