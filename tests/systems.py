@@ -146,6 +146,7 @@ IN_WINDOWS = (
         ' u: ["0.3*exp(-2*t) - 0.3*sin(0.3*exp(-2*t))"]}',
     )
     .replace("at: [0.05, 0]", "at: [0.35, -0.3]")
+    .replace("  B: ", "  outputs: {s: x - 0.5*y}\n  B: ")
     .replace("rho_a: 0.1}", "rho_a: 0.1, windows: [0.3, 0.9]}")
     + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0002, y: 0.0005}}\n"
     + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'

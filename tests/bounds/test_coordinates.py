@@ -66,7 +66,8 @@ def suprema(own: ControlAffineModel, coordinates: Coordinates | None, **effort) 
 
 def wished(asked) -> Wish:
     """Half-widths, from a start on the plan."""
-    return Wish(asked=asked, width=0.0, apart=np.zeros(3), within=0.0, box=np.array(BOX, dtype=float))
+    box = np.array(BOX, dtype=float)
+    return Wish(asked=asked, width=0.0, apart=np.zeros(3), within=0.0, box=box, outputs=np.zeros((0, 3)))
 
 
 def points(coordinates: Coordinates, rho: float, sides: np.ndarray, count: int, seed: int = 0) -> np.ndarray:

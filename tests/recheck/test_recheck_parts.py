@@ -151,6 +151,8 @@ FORGED = {
     **{f"supremum of window {j + 1}": scaled(0.99, *W, j, "supremum") for j in range(3)},
     **{f"radius of window {j + 1}": scaled(0.97, *W, j, "radius") for j in range(3)},
     **{f"width in window {j + 1}": scaled(0.97, *W, j, "half_widths", "x") for j in range(3)},
+    "width of an output": scaled(0.97, *W, 1, "half_widths", "s"),
+    "an output without a half-width": gone(*W, 1, "half_widths", "s"),
     **{f"speed of window {j + 1}": speed(j, 0.97) for j in range(3)},
     **{
         f"{end} end of u in window {j + 1}": put(0.5, *W, j, "inputs", "u", k)

@@ -67,14 +67,18 @@ def least_level(
 def greatest_level(
     suprema: Suprema, safe_set: Box, asked: Sequence[Fraction | None], proposed: Proposed
 ) -> Radius:
-    """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for."""
+    """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for.
+
+    `asked` of every state, then of every output of the model.
+    """
     now, best = proposed, None
     found = _nowhere(now.rho)
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.sides is None:
             return best or found
-        room = min(w / side for w, side in zip(asked, found.sides, strict=True) if w is not None)
+        sides = (*found.sides, *_of_outputs(suprema, found, asked[len(found.sides) :]))
+        room = min(w / side for w, side in zip(asked, sides, strict=True) if w is not None)
         if room >= 1 and (best is None or found.rho > best.rho):
             best = found
         if best is not None and (room < 1 or room <= _LOOSE):
@@ -108,6 +112,15 @@ def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:
         raised = tuple(_printed(least * growth) for least in needed)
         sides = raised if fits else tuple(max(pair) for pair in zip(raised, sides, strict=True))
     return best or replace(_nowhere(rho), obstacle="not_settled")
+
+
+def _of_outputs(suprema: Suprema, found: Radius, asked: Sequence[Fraction | None]) -> tuple[Fraction, ...]:
+    """The half-widths of the outputs of a tube that is proven, as they will be printed; only if one is asked for."""
+    if found.lower is None or not any(asked):
+        return (Fraction(0),) * len(asked)
+    reach = sqrt(Interval.exact(found.lower.below)) * Interval.of(found.rho)
+    widths = suprema.with_radius(found.rho, found.sides).output_widths()
+    return tuple(_printed(Fraction(float((Interval.exact(width.above) * reach).hi))) for width in widths)
 
 
 def _half_widths(tube: Suprema, a: Constant, rho: Fraction) -> tuple[Fraction, ...] | None:

@@ -37,7 +37,7 @@ from tubecert.expression import (
     topological,
 )
 from tubecert.expression import sqrt as sqrt_of
-from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply
+from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply, transpose
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.progress import Progress
 from tubecert.trajectory import Plan
@@ -313,6 +313,22 @@ class Suprema:
             effort = None if self.coordinates is None else self._fine  # it is no part of a ball
             found.append(self._root(self._over_tube(f"half width of {name}", entry, effort)))
         return tuple(found)
+
+    def output_widths(self) -> tuple[Constant, ...]:
+        """sup sqrt(c'W c) for every output c'x: |c'(x - x*)| <= that times the distance."""
+        found = []
+        for output in self.model.outputs:
+            c = constants([output.row])
+            entry = Pencil(multiply(multiply(c, self.model.W), transpose(c)), [[ONE]])
+            effort = None if self.coordinates is None else self._fine
+            found.append(self._root(self._over_tube(f"half width of {output.name}", entry, effort)))
+        return tuple(found)
+
+    def widths(self) -> dict[str, Constant]:
+        """What a length in the metric is at most in every state and output, by name."""
+        states = zip(self.model.states, self.half_widths(), strict=True)
+        outputs = zip(self.model.outputs, self.output_widths(), strict=True)
+        return dict(states) | {output.name: width for output, width in outputs}
 
     def shape_in(self, first: int, second: int) -> Shape:
         """Bounds over the tube of the block of W that belongs to two states."""

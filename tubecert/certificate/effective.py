@@ -51,6 +51,12 @@ class SystemView:
     f: tuple[str, ...] = ()
     B: tuple[tuple[str, ...], ...] = ()
     tables: Mapping[str, TableView] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """What has a half-width: states, then outputs."""
+        return *self.states, *self.outputs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -170,7 +170,7 @@ class MetricData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TubeData:
-    """The radii; `rho_r` and the half-widths, by state, once the tube is proven to lie in the safe set.
+    """The radii; `rho_r` and the half-widths, by state and output, once the tube is proven to lie in the safe set.
 
     `coordinates` S, by rows, exact: then the radii are lengths in z = S x, and the tube is |S (x - x*)| <= rho cut to
     the half-widths.
@@ -242,11 +242,12 @@ class Result:
     decided_by: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        states = set(self.spec.effective.system.states)
+        system = self.spec.effective.system
         widths = None if self.tube is None else self.tube.half_widths
-        for what, named in (("safe_set", self.safe_set), ("tube.half_widths", widths)):
-            if named is not None and set(named) != states:
-                raise ValueError(f"{what} is not about the states of the specification")
+        if self.safe_set is not None and set(self.safe_set) != set(system.states):
+            raise ValueError("safe_set is not about the states of the specification")
+        if widths is not None and set(widths) != set(system.lengths):
+            raise ValueError("tube.half_widths is not about the states of the specification")
         if not set(self.decided_by) <= set(self.sections):
             raise ValueError("decided_by names a section that is not there")
 

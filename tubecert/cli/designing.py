@@ -41,7 +41,7 @@ def design(
         str | None,
         typer.Option(
             metavar="STATES",
-            help="States whose half-widths count, separated by commas.  [those of tube.half_widths, or the radius]",
+            help="States and outputs whose half-widths count, by commas.  [those of tube.half_widths, or the radius]",
             show_default=False,
         ),
     ] = None,

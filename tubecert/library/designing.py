@@ -203,8 +203,8 @@ def design(
 ) -> Design:
     """The narrowest certified tube for the machine of a specification: `tubecert design`.
 
-    `minimise`: the states whose half-widths count, without it those of `tube.half_widths`, or the radius. `metric`
-    stands in for the specification's own; `"search"` looks for one for this machine. Raises `SpecError`.
+    `minimise`: the states and outputs whose half-widths count, without it those of `tube.half_widths`, or the radius.
+    `metric` stands in for the specification's own; `"search"` looks for one for this machine. Raises `SpecError`.
     """
     found: list[Mapping[str, object]] = []
 
@@ -369,13 +369,15 @@ def _error(spec: Spec, path: str, message: str, help: str) -> SpecError:
 
 
 def _minimised(spec: Spec, names: Sequence[str] | None, named: Named) -> Measure:
-    """What counts: the states that are named, each in its own unit or that of its half-width; raises `SpecError`."""
+    """What counts: the states and outputs named, each in its own unit or that of its half-width; raises `SpecError`."""
     if names is None:
         return measure_of(spec)
-    wrong = [name for name in names if name not in spec.states]
+    wrong = [name for name in names if name not in spec.lengths]
     if wrong:
-        help = suggestion(wrong[0], spec.states, what="states")
-        message = f"{named('minimise')}: {visible(wrong[0])} is no state"
+        help = suggestion(wrong[0], spec.lengths, what="states and outputs" if spec.outputs else "states")
+        message = f"{named('minimise')}: {visible(wrong[0])} is no state" + (
+            " or output" if spec.outputs else ""
+        )
         raise SpecError([Finding(code="TC122", message=message, help=help)])
     return measure_in(spec, names) or measure_of(spec)
 

@@ -40,6 +40,7 @@ from tubecert.expression.waves import frequencies
 
 if TYPE_CHECKING:
     from tubecert.spec import Spec
+    from tubecert.spec.types import Output
 
 TIME = "t"
 _MINORS = 1_000  # of B that are looked at: there may be billions
@@ -53,7 +54,7 @@ class ControlAffineModel:
     where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
     `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
     `gained`, B(x, theta) (n, m), in place of B, if that is not empty. `time`: the range of t in f(t, x), None if f is
-    free of t.
+    free of t. `outputs`: linear combinations of the states whose half-widths are told.
     """
 
     states: tuple[str, ...]
@@ -70,6 +71,7 @@ class ControlAffineModel:
     gained: Matrix = ()
     parameters: tuple[tuple[str, Range], ...] = ()
     time: Range | None = None
+    outputs: tuple[Output, ...] = ()
 
     @cached_property
     def f_x(self) -> Matrix:
@@ -188,6 +190,7 @@ def build(spec: Spec) -> ControlAffineModel:
         gained=tuple(tuple(term.expression for term in row) for row in spec.gained),
         parameters=spec.ranges,
         time=_time_of(spec),
+        outputs=spec.outputs,
     )
 
 

@@ -93,6 +93,7 @@ def tube(planned: Planned) -> TubeFound | Stopped:
         apart=np.zeros(len(centre)) if spec.within is not None else np.array(spec.x0, dtype=float) - centre,
         within=float(spec.within or 0),
         box=np.array(spec.safe_set, dtype=float),
+        outputs=np.array([output.row for output in spec.outputs], dtype=float).reshape(-1, len(spec.states)),
     )
     return find_tube(planned, propose(question.model, planned.plan, wish))
 

@@ -29,6 +29,7 @@ from tubecert.recheck.specification import Specification, read_specification
 from tubecert.recheck.specified.loop import DECIDES
 from tubecert.recheck.specified.metric import Wanted
 from tubecert.recheck.specified.numbers import Range, Rows
+from tubecert.recheck.specified.plant import Plant
 from tubecert.recheck.specified.start import Start, read_start
 
 MEASURED = (
@@ -260,7 +261,7 @@ def read_result(node: Node) -> Result:
         recipes=_recipes(own["proof"], applying),
         synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
-        tube=own.get("tube", lambda item: _tube(item, states)),
+        tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
         inputs=own.get("inputs", lambda item: tuple(map(read_limited, item.entries()))) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
@@ -404,16 +405,17 @@ def _geodesics(node: Node) -> Geodesics:
     return Geodesics(enclosure(own["value"]), own["holds"].flag())
 
 
-def _tube(node: Node, states: tuple[str, ...]) -> TubeSection:
+def _tube(node: Node, plant: Plant) -> TubeSection:
+    lengths = tuple(plant.lengths)
     own = node.closed("epsilon", "rho_a", "rho", optional=("rho_r", "half_widths", "coordinates"))
-    widths = own.get("half_widths", lambda item: item.closed(*states))
+    widths = own.get("half_widths", lambda item: item.closed(*lengths))
     return TubeSection(
         epsilon=own["epsilon"].decimal(),
         rho_a=own["rho_a"].decimal(),
         rho=own["rho"].decimal(),
         rho_r=own.get("rho_r", Node.decimal),
-        half_widths=None if widths is None else {name: widths[name].decimal() for name in states},
-        coordinates=own.get("coordinates", lambda item: _coordinates(item, len(states))),
+        half_widths=None if widths is None else {name: widths[name].decimal() for name in lengths},
+        coordinates=own.get("coordinates", lambda item: _coordinates(item, len(plant.states))),
     )
 
 

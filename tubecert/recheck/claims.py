@@ -300,11 +300,13 @@ def _tube(case: Case) -> Iterator[Claim]:
         SHARP,
     )
     yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))
-    for i, (name, width) in enumerate((case.tube.half_widths or {}).items()):
+    for name, width in (case.tube.half_widths or {}).items():
         yield Claim(
             f"half-width of {name} <= {float(width):.6g}",
-            (*case.over_tube, width, lower),
-            lambda i=i, width=width: half_width(place, i, width, case.bound("lower")),  # type: ignore[misc]
+            (*case.over_tube, case.system.lengths[name], width, lower),
+            lambda name=name, width=width: half_width(  # type: ignore[misc]
+                place, case.system.lengths[name], width, case.bound("lower")
+            ),
         )
 
 

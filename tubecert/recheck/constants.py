@@ -314,14 +314,14 @@ def contained(place: Place) -> Outcome:
     return together(outcomes)
 
 
-def half_width(place: Place, state: int, width: Fraction, lower: Fraction) -> Outcome:
-    """|x_i - x_i*| <= min(rho, sqrt(a) rho sup sqrt(W_ii)) <= width; without rho where it is no length in x.
+def half_width(place: Place, row: Sequence[Fraction], width: Fraction, lower: Fraction) -> Outcome:
+    """|c'(x - x*)| <= min(|c| rho, sqrt(a) rho sup sqrt(c'W c)) <= width; without rho where it is no length in x.
 
     In coordinates of its own the tube is cut to the half-widths: the supremum is over what they leave.
     """
-    if place.coordinates is None and width >= place.rho:
-        return stated(True, "")
     if width <= 0:
         return stated(False, "it is not positive")
+    if place.coordinates is None and width**2 >= sum(q * q for q in row) * place.rho**2:
+        return stated(True, "")
     top = number(width**2 / (lower * place.rho**2))
-    return prove(NotNegative(top - place.system.W[state][state]), place.tube(), place.budget)
+    return prove(NotNegative(top - place.system.squared(row)), place.tube(), place.budget)

@@ -143,9 +143,9 @@ def _tube(node: Node, plant: Plant) -> Members:
         return own
     own.require("coordinates")
     widths = own["half_widths"]
-    widths.closed(optional=plant.states)
+    widths.closed(optional=tuple(plant.lengths))
     if "epsilon" in own or not widths.mapping():
-        raise node.refused("must have epsilon, or half-widths of some states")
+        raise node.refused("must have epsilon, or half-widths of some states or outputs")
     return own
 
 

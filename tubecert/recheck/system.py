@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -61,6 +62,7 @@ class System:
     unknown: Matrix | None = None  # which is this, (n, 1), in place of f
     gained: Matrix | None = None  # the plant's B, if they stand in it
     moving: tuple[Term, ...] = ()  # f and what it owes, if t occurs in them
+    lengths: dict[str, Numbers] = field(default_factory=dict)  # what has a half-width, each as a row times x
 
     @property
     def varies(self) -> bool:
@@ -99,6 +101,15 @@ class System:
         """df/dx, (n, n)."""
         columns = [[row[0] for row in matrix_slopes(self.f, name)] for name in self.states]
         return turned(columns)
+
+    def squared(self, row: Sequence[Fraction]) -> Term:
+        """c'W c, which (c'v)^2 is at most for every v of metric length 1."""
+        found = number(0)
+        for i, left in enumerate(row):
+            for j, right in enumerate(row):
+                if left and right:
+                    found = found + number(left * right) * self.W[i][j]
+        return found
 
     @cached_property
     def W_x(self) -> list[Matrix]:
@@ -167,6 +178,7 @@ def system_of(spec: Specification) -> System:
         unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
         gained=spec.plant.gained,
         moving=spec.plant.moving,
+        lengths=spec.plant.lengths,
     )
 
 

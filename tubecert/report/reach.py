@@ -151,11 +151,11 @@ def radii(tube: TubeData) -> str:
 
 
 def half_widths(result: Result, widths: Mapping[str, float]) -> str:
-    """The half-width of every state."""
+    """The half-width of every state and output."""
     units = result.spec.effective.system.units
     return ", ".join(
         f"{name} {up(widths[name])} {units.get(name, '')}".rstrip()
-        for name in result.spec.effective.system.states
+        for name in result.spec.effective.system.lengths
         if name in widths
     )
 

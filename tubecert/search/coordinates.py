@@ -31,6 +31,7 @@ _DIGITS = Context(prec=9)
 class Wish:
     """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance.
 
+    Those of the states are followed by those of the `outputs` (k, n).
     `apart` (n,) is x(0) - x*(0); where any start within a radius is allowed, that is `within`. `box` (n, 2) is the safe
     set.
     """
@@ -40,15 +41,18 @@ class Wish:
     apart: Array
     within: float
     box: Array
+    outputs: Array
 
     def start(self, S: Array) -> float:
         """How far the start is from the plan's, in z."""
         return float(np.linalg.norm(S @ self.apart) + self.within * np.linalg.norm(S, 2))
 
-    def level(self, widths: Array, start: float) -> float:
-        """Dbar, given sup sqrt(W_ii) and the start's distance."""
+    def level(self, around: Array, start: float) -> float:
+        """Dbar, given W at points (K, n, n) and the start's distance."""
         if self.asked is None:
             return self.width + start
+        C = np.vstack([np.eye(len(self.box)), self.outputs])
+        widths = np.sqrt(np.max(np.diagonal(C @ around @ C.T, axis1=1, axis2=2), axis=0))
         return min(float(w) / float(s) for w, s in zip(self.asked, widths, strict=True) if w is not None)
 
 
@@ -65,7 +69,7 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
         S = S * sqrt(bounds[0])
         ratio = sqrt(bounds[1] / bounds[0])
         widths = np.sqrt(np.max(np.diagonal(around, axis1=1, axis2=2), axis=0))
-        level = wish.level(widths, ratio * wish.start(S))
+        level = wish.level(around, ratio * wish.start(S))
         if all(e.is_constant for row in model.W for e in row):
             break
         around = _values(dual, _samples(centres, S, level, level * widths, wish.box))

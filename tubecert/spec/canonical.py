@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from tubecert.expression import Lookup, full_text, number_text
+from tubecert.expression import ZERO, Lookup, constant, full_text, number_text, symbol, to_text
 from tubecert.spec.hardware import LARGEST, ONE_SAMPLE
 from tubecert.spec.load import VERSION
 from tubecert.spec.lookup import SLOPES
@@ -20,6 +20,7 @@ from tubecert.spec.types import (
     Hardware,
     Matrix,
     Obstacle,
+    Output,
     Simulation,
     Spec,
     Synthesis,
@@ -82,9 +83,16 @@ def _system(spec: Spec) -> dict[str, Any]:
         "f": _texts(spec.drift or spec.f),
         "B": [_texts(row) for row in spec.gained or spec.B],
     }
+    if spec.outputs:
+        data["outputs"] = {output.name: _combination(spec.states, output) for output in spec.outputs}
     if spec.tables:
         data["tables"] = {table.name: _lookup(table) for table in spec.tables}
     return data
+
+
+def _combination(states: Iterable[str], output: Output) -> str:
+    terms = (constant(factor) * symbol(state) for state, factor in zip(states, output.row, strict=True))
+    return to_text(sum(terms, start=ZERO))
 
 
 def _lookup(table: Lookup) -> dict[str, Any]:

@@ -77,7 +77,8 @@ _KEYS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("d", "delta", "matched"), "the uncertainty is the key h, an expression per input"),
     "A": 'f is written out, an expression per state: f: [v, "-3*p - 0.5*v"]',
     **dict.fromkeys(
-        ("C", "y", "outputs"), "nothing is said of outputs: every state is known, up to hardware.noise"
+        ("C", "y"),
+        "every state is known, up to hardware.noise; what is to have a half-width is named in system.outputs",
     ),
     **dict.fromkeys(("box", "rectangle", "square"), "a rectangle is a polygon of four corners"),
     "file": "the file of a metric is given by --metric FILE, that of a plan by kind: csv",
@@ -86,7 +87,9 @@ _KEYS: Final[Mapping[str, str]] = {
 
 _PLACES: Final[Mapping[str, str]] = {
     **dict.fromkeys(("epsilon", "rho_a", "half_widths"), "tube"),
-    **dict.fromkeys(("states", "inputs", "parameters", "tables", "definitions", "f", "B"), "system"),
+    **dict.fromkeys(
+        ("states", "inputs", "parameters", "tables", "definitions", "outputs", "f", "B"), "system"
+    ),
     "dual_metric": "metric",
     "h": "uncertainty",
     "horizon": "trajectory",

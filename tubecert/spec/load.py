@@ -14,6 +14,7 @@ from tubecert.spec.hardware import limits_of, read_disturbance, read_hardware
 from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_box, read_names, read_units
 from tubecert.spec.obstacles import read_obstacles
+from tubecert.spec.outputs import with_outputs
 from tubecert.spec.override import Setting, put
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
@@ -147,7 +148,8 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
         entries["system"].mapping(
-            required=("states", "inputs", "f", "B"), optional=("parameters", "tables", "definitions", "units")
+            required=("states", "inputs", "f", "B"),
+            optional=("parameters", "tables", "definitions", "outputs", "units"),
         )
         if "system" in entries
         else None
@@ -155,6 +157,7 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
     names = read_names(system) if system else None
     if system is None or names is None:
         return None  # without names nothing else can be read
+    names = with_outputs(names, system.get("outputs"))
     spec = _read_named(root.reader, entries, system, name, names)
     return (
         None if spec is None else replace(spec, settings=tuple((each.path, each.text) for each in settings))
@@ -251,6 +254,7 @@ def _read_named(
         ranges=names.ranges,
         B=known[1],
         gained=dynamics[1] if gained else (),
+        outputs=names.outputs,
         safe_set=box,
         uncertainty=uncertainty,
         trajectory=plan,

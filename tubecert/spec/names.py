@@ -29,6 +29,7 @@ from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.instead import glued
 from tubecert.spec.lookup import read_lookup
 from tubecert.spec.reader import Field, Scope
+from tubecert.spec.types import Output
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
@@ -55,6 +56,12 @@ class Names:
     definitions: tuple[tuple[str, Parsed], ...] = ()
     ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
     tables: tuple[tuple[str, Lookup], ...] = ()
+    outputs: tuple[Output, ...] = ()
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """What may have a half-width: states and outputs."""
+        return *self.states, *(output.name for output in self.outputs)
 
     @property
     def values(self) -> dict[str, Expression]:
@@ -194,12 +201,12 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
     items = field.items(None, f"{what} names") if field else None
     if items is None:
         return None
-    names = [_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
+    names = [new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None
 
 
-def _name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> str | None:
-    """The name, if it may be used."""
+def new_name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> str | None:
+    """A name that the file gives, if it may be used; it is one of `taken` then."""
     if name is None:
         return None
     problem = _problem(name, taken)
@@ -258,7 +265,7 @@ def _read_parameters(
     for key, node in pairs:
         later.remove(key.text)
         entry = field.child(key, node)
-        name = _name(key.text, _key_field(field, key), "parameter", taken)
+        name = new_name(key.text, key_field(field, key), "parameter", taken)
         if isinstance(entry.node, ListNode):
             ends = _read_range(entry, values)
             if name is not None:
@@ -323,7 +330,7 @@ def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Na
     """Tables by name; one that cannot be read stands as 1 everywhere."""
     for key, node in (field.pairs("of names to tables") or []) if field is not None else ():
         assert field is not None
-        name = _name(key.text, _key_field(field, key), "table", taken)
+        name = new_name(key.text, key_field(field, key), "table", taken)
         found = read_lookup(key.text, field.child(key, node), names.values)
         if name is not None:
             names = replace(names, tables=(*names.tables, (name, found or UNKNOWN)))
@@ -339,7 +346,7 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
     for key, node in pairs:
         later.remove(key.text)
         entry = field.child(key, node)
-        name = _name(key.text, _key_field(field, key), "definition", taken)
+        name = new_name(key.text, key_field(field, key), "definition", taken)
         scope = names.of_definition()
         refused = {
             word: f"{word} is defined further down; a definition may use those above it" for word in later
@@ -356,17 +363,17 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
 
 
 def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:
-    """Units of states and inputs, as printed."""
+    """Units of states, inputs and outputs, as printed."""
     units: list[tuple[str, str]] = []
     if field is None:
         return ()
     for key, node in field.pairs("of names to units") or []:
         unit = field.child(key, node).text("a unit")
-        if key.text not in (*names.states, *names.inputs):
+        known = [*names.lengths, *names.inputs]
+        if key.text not in known:
             message = f"{key.text[:60]} is neither a state nor an input"
-            known = [*names.states, *names.inputs]
             help = glued(key.text, known) or suggestion(key.text, known)
-            _key_field(field, key).fail(codes.UNKNOWN_KEY, message, help)
+            key_field(field, key).fail(codes.UNKNOWN_KEY, message, help)
         elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
             field.child(key, node).fail(
                 codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters"
@@ -404,5 +411,6 @@ def _side(field: Field | None, names: Names) -> tuple[Fraction, Fraction] | None
     return lower, upper
 
 
-def _key_field(field: Field, key: Scalar) -> Field:
+def key_field(field: Field, key: Scalar) -> Field:
+    """A key, to report about it."""
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)

@@ -29,6 +29,7 @@ _OWN_NAMES: Final = (
     "system.definitions",
     "system.tables",
     "system.units",
+    "system.outputs",
 )  # their keys are the user's words
 _MEANT: Final = _OWN_NAMES[:2]
 

@@ -76,10 +76,10 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
 
 
 def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fraction], ...] | None:
-    """Half-widths by state, in the order of the states; empty if there are none."""
+    """Half-widths by state and output, in their order; empty if there are none."""
     if field is None:
         return ()
-    entries = field.mapping(optional=names.states)
+    entries = field.mapping(optional=names.lengths)
     if entries is None:
         return None
     if not field.pairs():
@@ -87,7 +87,7 @@ def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fra
         return None
     found = {
         name: entries[name].number(names.values, above=0, side="below")
-        for name in names.states
+        for name in names.lengths
         if name in entries
     }
     kept = tuple((name, width) for name, width in found.items() if width is not None)

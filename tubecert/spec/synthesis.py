@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Final, Literal
 
 from tubecert.expression import suggestion
@@ -44,9 +45,9 @@ def read_synthesis(field: Field, names: Names) -> Synthesis | None:
     found = Synthesis(
         rate=rate.number(names.values, above=0) if rate else None,
         objective=objective or ("tube" if outputs else "condition" if rate else "adaptation"),
-        outputs=_variables(outputs, names) or (),
+        outputs=_chosen(outputs, names.lengths, "state or output") or (),
         degree=_degree(_unless_auto(entries.get("degree")), names),
-        variables=_variables(_unless_auto(entries.get("variables")), names),
+        variables=_chosen(_unless_auto(entries.get("variables")), names.states, "state"),
         condition_number=limit.number(names.values, least=1) if limit else None,
         coordinates=_coordinates(entries.get("coordinates")),
         route=entries["route"].word(ROUTES) or "auto" if "route" in entries else "auto",
@@ -99,15 +100,15 @@ def _degree(field: Field | None, names: Names) -> int | None:
     return None if value is None else int(value)
 
 
-def _variables(field: Field | None, names: Names) -> tuple[str, ...] | None:
-    items = field.items(None, "states") if field else None
+def _chosen(field: Field | None, known: Sequence[str], what: str) -> tuple[str, ...] | None:
+    items = field.items(None, f"{what}s" if " " not in what else "states and outputs") if field else None
     if field is None or items is None:
         return None
     chosen: list[str] = []
     for item in items:
-        word = item.word(names.states)
+        word = item.word(known)
         if word in chosen:
-            item.fail(codes.RANGE, f"{item.path}: {word} occurs twice", "name each state once")
+            item.fail(codes.RANGE, f"{item.path}: {word} occurs twice", f"name each {what} once")
         elif word:
             chosen.append(word)
     return tuple(chosen)

@@ -147,6 +147,14 @@ class Metric:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """A linear combination of the states that a half-width may be asked of: `row` (n,) times x."""
+
+    name: str
+    row: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Synthesis:
     """What metric is asked for in place of a given one.
 
@@ -154,7 +162,7 @@ class Synthesis:
     rate, least adaptation rate of the distance form, smallest tube; `degree` and `variables` of W, None: chosen
     automatically; `condition_number`: not to be exceeded; `coordinates`: those in
     which it is least, auto: half-widths of the safe set; `solver`: clarabel, scs or cvxpy:NAME. `outputs`: the states
-    in which the tube is to be small; none: all of it.
+    and outputs in which the tube is to be small; none: all of it.
     """
 
     rate: Fraction | None = None
@@ -170,7 +178,7 @@ class Synthesis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
-    """The tube's two radii, or half-widths (name, w) of some states; the radii may come from the command line instead.
+    """The tube's two radii, or half-widths (name, w) of states and outputs; the radii may come from the command line.
 
     `coordinates` None: what was not said, `identity` unless there are half-widths. `windows`: how many of equal length
     the plan is cut into, or the times between them in s; None for one. `gap`: how closely the constants over the tube
@@ -339,6 +347,7 @@ class Spec:
     drift: tuple[Term, ...] = ()
     B: TermMatrix
     gained: TermMatrix = ()
+    outputs: tuple[Output, ...] = ()
     safe_set: tuple[tuple[Fraction, Fraction], ...]
     uncertainty: Uncertainty
     trajectory: Trajectory
@@ -366,6 +375,11 @@ class Spec:
         assert all(len(row) == m for row in self.B)
         assert len(self.start_box) in (0, n)
         assert self.disturbance is None or len(self.disturbance.E) == n
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """What has a half-width: states, then outputs."""
+        return *self.states, *(output.name for output in self.outputs)
 
     def location(self, path: str) -> Location | None:
         """Where the value of `path` stands, or the nearest enclosing key that is in the file."""

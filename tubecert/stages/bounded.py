@@ -99,7 +99,8 @@ class Cleared:
 class Bounded:
     """What every kind needs is bounded, and what was declared holds.
 
-    `half_widths`: |x_i - x_i*| is below, per state. `geodesics`: whether minimising geodesics are proven unique.
+    `half_widths`: |x_i - x_i*| is below, per state, and |c'(x - x*)|, per output. `geodesics`: whether minimising
+    geodesics are proven unique.
     `parts`: windows, where certificates B and C are asked for levels in each; those of H are the machine's.
     """
 
@@ -337,16 +338,33 @@ def _undeclared(enclosed: Enclosed) -> Stopped | None:
 
 
 def half_widths(enclosed: Enclosed) -> dict[str, float]:
-    """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho; or the sides of the tube."""
+    """|x_i - x_i*| <= sqrt(W_ii) d with d < dbar = sqrt(a) rho, and never more than rho; or the sides of the tube.
+
+    Those of the outputs follow.
+    """
     tube = enclosed.tube
     states = tube.question.spec.states
     if tube.sides is not None:
-        return dict(zip(states, map(printable_above, tube.sides), strict=True))
+        return dict(zip(states, map(printable_above, tube.sides), strict=True)) | _of_outputs(enclosed)
     reach, most = _reach(tube), fraction_bounds(tube.rho)[1]
-    return {
+    found = {
         name: printable_above(min(float((Interval.exact(width.above) * reach).hi), most))
         for name, width in zip(states, enclosed.suprema.half_widths(), strict=True)
     }
+    return found | _of_outputs(enclosed)
+
+
+def _of_outputs(enclosed: Enclosed) -> dict[str, float]:
+    """|c'(x - x*)| <= sqrt(c'W c) d for every output, (1.8), and in a ball never more than |c| rho."""
+    tube, found = enclosed.tube, {}
+    outputs = zip(enclosed.question.spec.outputs, enclosed.suprema.output_widths(), strict=True)
+    for output, width in outputs:
+        most = float((Interval.exact(width.above) * _reach(tube)).hi)
+        if tube.sides is None:
+            square = sum((factor**2 for factor in output.row), start=Fraction(0))
+            most = min(most, float((sqrt(Interval.of(square)) * Interval.of(tube.rho)).hi))
+        found[output.name] = printable_above(most)
+    return found
 
 
 def _geodesics(enclosed: Enclosed) -> GeodesicTest:

@@ -30,9 +30,7 @@ def machine_of(spec: Spec, problem: TubeProblem, suprema: Suprema, geodesics: Ge
         covariant=_covariant(problem, suprema),
         clip=_clip(spec, suprema),
         asked=spec.hardware,
-        widths={
-            name: printable_above(w.above) for name, w in zip(spec.states, suprema.half_widths(), strict=True)
-        },
+        widths={name: printable_above(width.above) for name, width in suprema.widths().items()},
         inputs=ranges_of(spec, problem.constants, suprema),
     )
 

@@ -104,9 +104,9 @@ def radii(question: Question) -> tuple[Fraction, Fraction]:
 
 
 def asked_half_widths(question: Question) -> tuple[Fraction | None, ...] | None:
-    """The half-widths that are asked for, by state; None where the radii are given instead."""
+    """The half-widths that are asked for, by state and output; None where the radii are given instead."""
     asked = dict(question.spec.tube.half_widths)
-    return tuple(map(asked.get, question.spec.states)) if asked else None
+    return tuple(map(asked.get, question.spec.lengths)) if asked else None
 
 
 def room_of(metric: ProvenMetric) -> Room:

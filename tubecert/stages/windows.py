@@ -99,10 +99,7 @@ def _known(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, 
         constants=constants,
         wind=wind,
         residual=residual,
-        widths={
-            name: printable_above(width.above)
-            for name, width in zip(question.spec.states, suprema.half_widths(), strict=True)
-        },
+        widths={name: printable_above(width.above) for name, width in suprema.widths().items()},
         inputs=ranges_of(question.spec, constants, suprema),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import ClassVar
@@ -146,7 +146,7 @@ def _in_windows(section: HardwareSection, recipe: Digital, ground: Ground) -> It
 
 def _covers(section: HardwareSection, ground: Ground) -> Outcome:
     system = ground.place.system
-    named = section.half_widths.keys() == set(system.states) and section.inputs.keys() == set(system.inputs)
+    named = section.half_widths.keys() == set(system.lengths) and section.inputs.keys() == set(system.inputs)
     return all_of(
         (
             stated(named, "half-widths or inputs are of others"),
@@ -241,30 +241,30 @@ def _holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome
 
 
 def _states(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterator[Claim]:
-    """|x_i - x_i*| < level sup sqrt(W_ii): width^2 >= level^2 W_ii over the tube."""
+    """|c'(x - x*)| < level sup sqrt(c'W c): width^2 >= level^2 c'W c over the tube; c = e_i for a state."""
     place = ground.place
-    named = section.half_widths.keys() == set(place.system.states)
+    named = section.half_widths.keys() == set(place.system.lengths)
     yield ground.claim(
         "H: every state has a half-width", (section,), lambda: stated(named, "they are of others")
     )
-    for i, name in enumerate(place.system.states):
+    for name, row in place.system.lengths.items():
         width = section.half_widths.get(name)
         if width is not None:
             yield ground.over_tube(
                 f"H: half-width of {name} <= {float(width):.6g}",
-                (width, recipe.level, ground.constants["lower"].below),
-                lambda i=i, width=width: _within(i, width, recipe.level, ground),  # type: ignore[misc]
+                (row, width, recipe.level, ground.constants["lower"].below),
+                lambda row=row, width=width: _within(row, width, recipe.level, ground),  # type: ignore[misc]
             )
 
 
-def _within(state: int, width: Fraction, level: Fraction, ground: Ground) -> Outcome:
+def _within(row: Sequence[Fraction], width: Fraction, level: Fraction, ground: Ground) -> Outcome:
     if width <= 0:
         return stated(False, "it is not positive")
     place, a = ground.place, ground.constants["lower"].below
-    if place.coordinates is None and a is not None and width**2 * a >= level**2:
-        return CONFIRMED  # the radius of the tube
+    if place.coordinates is None and a is not None and width**2 * a >= sum(q * q for q in row) * level**2:
+        return CONFIRMED  # by the radius of the tube
     square = number(width**2 / level**2)
-    return prove(NotNegative(square - place.system.W[state][state]), place.tube(), place.budget)
+    return prove(NotNegative(square - place.system.squared(row)), place.tube(), place.budget)
 
 
 def _inputs(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterator[Claim]:

@@ -138,33 +138,35 @@ def within_tube(course: Windows, level: Fraction) -> Outcome:
 def claims_of_states(course: Windows, j: int, window: WindowSection) -> Iterator[Claim]:
     """The half-widths of a window, by its level."""
     ground = course.ground
-    states = ground.place.system.states
+    lengths = ground.place.system.lengths
     yield ground.claim(
         f"{course.letter}: window {j}: every state has a half-width",
         (window,),
-        lambda: stated(window.half_widths.keys() == set(states), "they are of others"),
+        lambda: stated(window.half_widths.keys() == set(lengths), "they are of others"),
     )
     lower = course.known(window, "lower")
-    for i, name in enumerate(states):
+    for name, row in lengths.items():
         width = window.half_widths.get(name)
         if width is not None and window.level is not None:
             yield ground.over_tube(
                 f"{course.letter}: window {j}: half-width of {name} <= {float(width):.6g}",
-                (window, lower),
-                lambda i=i, width=width, level=window.level: _within(  # type: ignore[misc]
-                    course.place(window), i, width, level, lower
+                (row, window, lower),
+                lambda row=row, width=width, level=window.level: _within(  # type: ignore[misc]
+                    course.place(window), row, width, level, lower
                 ),
             )
 
 
-def _within(place: Place, state: int, width: Fraction, level: Fraction, lower: Fraction | None) -> Outcome:
-    """width^2 >= level^2 W_ii over the tube of the window, or the width is the radius."""
+def _within(
+    place: Place, row: Sequence[Fraction], width: Fraction, level: Fraction, lower: Fraction | None
+) -> Outcome:
+    """width^2 >= level^2 c'W c over the tube of the window, or |c| times the radius serves."""
     if width <= 0:
         return stated(False, "it is not positive")
-    if lower is not None and width**2 * lower >= level**2:
+    if lower is not None and width**2 * lower >= sum(q * q for q in row) * level**2:
         return CONFIRMED
     square = number(width**2 / level**2)
-    return prove(NotNegative(square - place.system.W[state][state]), place.tube(), place.budget)
+    return prove(NotNegative(square - place.system.squared(row)), place.tube(), place.budget)
 
 
 Reach = Callable[[int], tuple[Fraction, Fraction] | None]

@@ -10,7 +10,8 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.lookup import Table
 from tubecert.recheck.reading import TIME, Column, Reader
-from tubecert.recheck.specified.numbers import Range, ends, not_negative
+from tubecert.recheck.specified.numbers import Numbers, Range, ends, not_negative
+from tubecert.recheck.specified.outputs import read_outputs, unit_rows
 from tubecert.recheck.terms import Matrix, Term, names, number, replaced
 
 _MOST_STATES = 32
@@ -36,6 +37,12 @@ class Plant:
     gained: Matrix | None
     tables: dict[str, Table] = field(default_factory=dict)
     moving: tuple[Term, ...] = ()  # f and what it owes, if t occurs in them
+    outputs: dict[str, Numbers] = field(default_factory=dict)  # by name, the row that is multiplied with x
+
+    @property
+    def lengths(self) -> dict[str, Numbers]:
+        """What has a half-width: the states, then the outputs."""
+        return unit_rows(self.states) | self.outputs
 
     @property
     def varies(self) -> bool:
@@ -64,18 +71,19 @@ class Uncertainty:
 
 def read_plant(node: Node, box: Node) -> Plant:
     """`system` on the `safe_set`."""
-    own = node.closed("states", "inputs", "units", "parameters", "f", "B", optional=("tables",))
+    own = node.closed("states", "inputs", "units", "parameters", "f", "B", optional=("tables", "outputs"))
     states, inputs = own["states"].texts(), own["inputs"].texts()
     n, m = len(states), len(inputs)
     if not (0 < m <= n <= _MOST_STATES):
         raise node.refused(f"must name 1 to {_MOST_STATES} states, and at most as many inputs")
-    _names(node, [*states, *inputs])
-    own["units"].closed(optional=(*states, *inputs))
+    outputs = own.get("outputs", lambda item: read_outputs(item, states)) or {}
+    _names(node, [*states, *inputs, *outputs])
+    own["units"].closed(optional=(*states, *inputs, *outputs))
     for _, unit in own["units"].items():
         unit.text()
     ranges = _ranges(own["parameters"])
     tables = own.get("tables", _tables) or {}
-    _names(own["parameters"], [*states, *inputs, *own["parameters"].mapping(), *tables])
+    _names(own["parameters"], [*states, *inputs, *outputs, *own["parameters"].mapping(), *tables])
     reader = Reader.of((*states, *ranges), tables)
     moving = Reader.of((*states, TIME, *ranges), tables)
     drift, B = moving.column(own["f"], n), reader.matrix(own["B"], n, m)
@@ -94,6 +102,7 @@ def read_plant(node: Node, box: Node) -> Plant:
         gained=B if gained else None,
         tables=tables,
         moving=whole if TIME in names(whole) else (),
+        outputs=outputs,
     )
 
 
