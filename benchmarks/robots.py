@@ -1,34 +1,41 @@
-"""Eight systems written from their equations, each in three unit systems: bare `synth`, then certificate B.
+"""Eight systems written from their equations, each in three unit systems: what a new user types, one after the other.
 
 python benchmarks/robots.py                     # all of them (half an hour of processor time)
 python benchmarks/robots.py joint missile       # some
 python benchmarks/robots.py joint --units 1     # in the units of the file only
+python benchmarks/robots.py --until certify     # no further than this command
 
-A row is one system in one unit system. Gains are printed in the units of the file: the rows of a system should agree.
+A row is one system in one unit system: `synth` without options, `certify`, `recheck`, `simulate`, `report`, with their
+processor times in s. Numbers are in the units of the file: the rows of a system should agree. A row is kept in
+`robots.runs` (`--folder DIR`) with all its files, and what is there is not done again.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from tubecert import pipeline
 from tubecert.letters import DISTANCE
-from tubecert.pipeline import Options
-from tubecert.spec import Spec, Synthesis, canonical, load, load_text
+from tubecert.spec import Spec, canonical, load
 
 FOLDER = Path(__file__).parent / "robots"
 NAMES = ("slider", "joint", "flexible_joint", "missile", "car", "crane", "arm", "boat")
 DEGREE = Fraction(355, 113 * 180)  # rad, nearly: any ratio will do
-BY_B = Options(conditions="distance")
+COMMANDS = (
+    ("synth", "spec.yaml"),
+    ("certify", "spec.yaml", "--metric", "spec.metric.json", "-o", "certificate.json"),
+    ("recheck", "certificate.json", "--spec", "spec.yaml"),
+    ("simulate", "spec.yaml", "--certificate", "certificate.json", "-o", "simulation"),
+    ("report", "certificate.json", "-o", "page.html"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,70 +142,96 @@ def _plan(spec: Spec, plan: Mapping[str, Any], old: Any, sizes: Any, folder: Pat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """What came out, in the units of the file: processor times in s, rate and omega in 1/s, Gamma."""
+class Ran:
+    """One command: its exit code, its processor time in s, and the line that says what came out."""
 
-    verdict: str
-    seconds: tuple[float, float]
-    rate: float = 0.0
-    omega: float = 0.0
-    adaptation_rate: float = 0.0
-    half_widths: tuple[float, ...] = ()
+    code: int
+    seconds: float
+    said: str
 
 
-def row(spec: Spec, units: Units, folder: Path) -> Row:
-    """One system in one unit system: a metric and its certificate."""
-    own = load_text(json.dumps(rescaled(spec, units, folder)), str(folder / "spec.yaml"))
-    began = time.process_time()
-    found = pipeline.synthesise(own, Synthesis(rate=None, objective="adaptation"), BY_B)
-    between = time.process_time()
-    if found.file is None:
-        return Row(verdict=str(found.reason), seconds=(between - began, 0.0))
-    result = pipeline.certify(found.spec, BY_B)
-    seconds = between - began, time.process_time() - between
-    gains = result.proof.of[DISTANCE.key]
+def ran(words: tuple[str, ...], folder: Path) -> Ran:
+    """Runs a command of tubecert in a folder; what it prints is kept beside its files."""
+    with (folder / f"{words[0]}.txt").open("w") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tubecert", *words, "--no-progress"],
+            cwd=folder,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONPATH": str(FOLDER.parents[1])},
+        )
+        _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    lines = (folder / f"{words[0]}.txt").read_text().splitlines()
+    said = next((line for line in lines if line.strip()), "")
+    return Ran(code=process.returncode, seconds=usage.ru_utime + usage.ru_stime, said=said)
+
+
+def kept_row(folder: Path) -> dict[str, Ran]:
+    """The commands that have been run in a folder."""
+    path = folder / "row.json"
+    rows = json.loads(path.read_text()) if path.exists() else {}
+    return {name: Ran(code=code, seconds=seconds, said=said) for name, (code, seconds, said) in rows.items()}
+
+
+def done(spec: Spec, units: Units, folder: Path, until: str) -> dict[str, Ran]:
+    """The commands for one system in one unit system, until one says that there is no certificate."""
+    kept = kept_row(folder)
+    if not kept:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "spec.yaml").write_text(json.dumps(rescaled(spec, units, folder), indent=1))
+    for words in COMMANDS:
+        name = words[0]
+        if name not in kept:
+            kept[name] = ran(words, folder)
+            rows = {name: [each.code, each.seconds, each.said] for name, each in kept.items()}
+            (folder / "row.json").write_text(json.dumps(rows))
+        if name == until or (kept[name].code and name in ("synth", "certify")):
+            break
+    return kept
+
+
+def row(spec: Spec, units: Units, folder: Path, until: str) -> list[str]:
+    """The cells of one row; numbers in the units of the file."""
+    kept = done(spec, units, folder, until)
+    times = [f"{kept[words[0]].seconds:.0f}" if words[0] in kept else "-" for words in COMMANDS]
+    short = [f"{name} {each.code}: {each.said}" for name, each in kept.items() if each.code]
+    ended = "; ".join(short) or "as hoped"
+    if "certify" not in kept or kept["certify"].code:
+        return [spec.name, units.name, "-", "-", "-", "-", *times, ended]
     named, T = dict(spec.units), units.time
-    inputs = {units.of(named.get(name, "")) for name in spec.inputs}
-    assert result.tube is not None
-    assert result.tube.half_widths is not None
-    return Row(
-        verdict=str(result.verdict),
-        seconds=seconds,
-        rate=float(found.file.rate / T),
-        omega=float(gains.bandwidth / T),
-        adaptation_rate=float(gains.adaptation_rate) * float(max(inputs)) ** 2,
-        half_widths=tuple(
-            float(units.of(named.get(name, ""))) * result.tube.half_widths[name] for name in spec.states
-        ),
+    result = json.loads((folder / "certificate.json").read_text())["result"]
+    gains = result[DISTANCE.key]["least_adaptation"]
+    widths = ", ".join(
+        f"{name} {float(units.of(named.get(name, ''))) * float(width):.3g}"
+        for name, width in result["tube"]["half_widths"].items()
     )
+    inputs = max(units.of(named.get(name, "")) for name in spec.inputs)
+    return [
+        spec.name,
+        units.name,
+        f"{float(Fraction(str(result['metric']['rate'])) / T):.3g}",
+        f"{float(gains['bandwidth']) / float(T):.4g}",
+        f"{float(gains['adaptation_rate']) * float(inputs) ** 2:.4g}",
+        widths,
+        *times,
+        ended,
+    ]
 
 
 def main(arguments: list[str]) -> None:
     """Prints the table, a row as soon as it is known."""
     count = int(arguments[arguments.index("--units") + 1]) if "--units" in arguments else len(UNITS)
+    kept = Path(arguments[arguments.index("--folder") + 1] if "--folder" in arguments else "robots.runs")
+    until = arguments[arguments.index("--until") + 1] if "--until" in arguments else COMMANDS[-1][0]
     names = [word for word in arguments if word in NAMES] or NAMES
-    print("| system | states | units | rate | omega | Gamma | half-widths | verdict | synth, certify (s) |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    heads = ("system", "units", "rate", "omega", "Gamma", "half-widths", *(c[0] for c in COMMANDS), "ended")
+    print("| " + " | ".join(heads) + " |")
+    print("|---" * len(heads) + "|")
     for name in names:
         spec = load(str(FOLDER / f"{name}.yaml"))
-        for units in UNITS[:count]:
-            with tempfile.TemporaryDirectory() as folder:
-                found = row(spec, units, Path(folder))
-            widths = ", ".join(
-                f"{name} {w:.3g}" for name, w in zip(spec.states, found.half_widths, strict=False)
-            )
-            cells = (
-                name,
-                len(spec.states),
-                units.name,
-                f"{found.rate:.3g}",
-                f"{found.omega:.4g}",
-                f"{found.adaptation_rate:.4g}",
-                widths,
-                found.verdict,
-                ", ".join(f"{t:.3g}" for t in found.seconds),
-            )
-            print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+        for number, units in enumerate(UNITS[:count], 1):
+            print("| " + " | ".join(row(spec, units, kept / f"{name}-{number}", until)) + " |", flush=True)
 
 
 if __name__ == "__main__":

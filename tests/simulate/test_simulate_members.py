@@ -60,6 +60,27 @@ def test_what_is_drawn_is_proven_to_be_of_the_family(number):
 
 
 @pytest.mark.slow
+def test_a_segment_is_walked_as_an_integrator_of_others_walks_it():
+    """f depends on t: a wrong time, share of u* or defect would be seen."""
+    from scipy.integrate import solve_ivp
+
+    spec = load_text(FAMILY.replace("f: [", "f: [sin(2*t) + ", 1))
+    drawing = drawing_of(spec, build(spec), 1.0)
+    x, u = np.array([[0.1, -0.2], [-0.3, 0.2]]), np.array([[[0.5], [-0.1]], [[-1.0], [0.3]]])
+    p = np.array([[0.01, 0.0], [-0.02, 0.03]])
+    found = drawing.walk(0.7, x, (u[0], u[1]), p, 0.4, 40)
+    for lane in range(2):
+
+        def speed(t, state, lane=lane):
+            own = u[0] + (u[1] - u[0]) * (t - 0.7) / 0.4
+            return drawing.speed(t, state[None], own[lane : lane + 1])[0] + p[lane]
+
+        times = np.linspace(0.7, 1.1, 41)
+        exact = solve_ivp(speed, (0.7, 1.1), x[lane], t_eval=times, rtol=1e-11, atol=1e-12)
+        assert found[lane] == pytest.approx(exact.y.T, abs=1e-8)
+
+
+@pytest.mark.slow
 def test_plans_differ_and_can_be_repeated():
     spec = load_text(FAMILY)
     drawing = drawing_of(spec, build(spec), 1.0)

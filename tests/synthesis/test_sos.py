@@ -40,6 +40,7 @@ from tubecert.synthesis.conic import (
 from tubecert.synthesis.family import metric_family
 from tubecert.synthesis.frame import commuting_frame
 from tubecert.synthesis.gram import gram_form
+from tubecert.synthesis.lifting import lift
 from tubecert.synthesis.polynomial import polynomial_conditions
 from tubecert.synthesis.problem import SynthesisProblem
 from tubecert.synthesis.sos import propose_sos
@@ -169,8 +170,8 @@ def test_coefficients_of_a_polynomial_in_an_angle_and_a_state():
     """What is read off the nodes is the function, everywhere: 2 sin q cos q x^2 + x - 3 cos^2 q on an uneven box."""
     chart = Chart(
         variables=(
-            Variable(name="q", lo=-0.5, hi=1.2, angle=True),
-            Variable(name="x", lo=-1.0, hi=3.0, angle=False),
+            Variable(name="q", lo=-0.5, hi=1.2, angle=1),
+            Variable(name="x", lo=-1.0, hi=3.0, angle=0),
         ),
         degrees=(2, 2),
     )
@@ -214,13 +215,13 @@ def test_degrees_count_angles_once_and_refuse_what_is_no_polynomial():
     x, q = symbol("x"), symbol("q")
     degrees, angles = degrees_of([sin(q) * cos(2 * q) * x**3 + x, ONE + cos(q), ZERO])
     assert [dict(d) for d in degrees] == [{"q": 3, "x": 3}, {"q": 1}, {}]
-    assert angles == {"q"}
+    assert angles == {"q": 1}
     with pytest.raises(NotPolynomialError, match="quotient"):
         degrees_of([x / (1 + x**2)])
     with pytest.raises(NotPolynomialError, match="q enters both"):
         degrees_of([q * sin(q)])
     with pytest.raises(NotPolynomialError, match="reaches pi"):
-        Variable(name="q", lo=-1.0, hi=3.2, angle=True)
+        Variable(name="q", lo=-1.0, hi=3.2, angle=1)
 
 
 # -- Gram forms -------------------------------------------------------------------------------------------------------
@@ -469,6 +470,43 @@ def test_an_angle_is_treated_exactly():
     proposal = propose_sos(asked)
     assert proposal.feasible
     assert verified(asked, proposal, "0.5").verdict == "certified"
+
+
+def test_an_angle_in_degrees_is_an_angle():
+    """sin(71 q/4068) used to be no sine of an angle: sums of squares did not apply, and W moved with sin(q)."""
+    degrees = Q(4068, 71)
+    other = model(("q", "w", "i"), ("4068/71*w", "sin(71/4068*q) + i", "-i"), [["0"], ["0"], ["1"]])
+    wide = ((-degrees, degrees), *BOX_PENDULUM[1:])
+    found = []
+    for system, box in ((PENDULUM, BOX_PENDULUM), (other, wide)):
+        widths = tuple(Q(hi) for _, hi in box)
+        asked = problem(system, box, degree=1, rate=0.501, coordinates="auto", half_widths=widths)
+        assert [g.op for g in asked.family.functions[1:]] == ["sin", "cos"]
+        found.append(propose_sos(asked))
+        assert found[-1].feasible
+    assert found[1].kappa == pytest.approx(found[0].kappa, rel=1e-4)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.sampled_from(["1", "71/4068", "3/7"]), st.lists(st.integers(-5, 5), min_size=1, max_size=3))
+def test_sines_of_multiples_are_polynomials_of_one_angle(unit, counts):
+    q = symbol("q")
+    own = [each(Fraction(unit) * k * q) for k in counts for each in (sin, cos)]
+    lifted = lift(own)
+    angle = float(lifted.units.get("q", 0)) * 0.7
+    names = lifted.circles.get("q", ("s", "c"))
+    values = Tape(lifted.expressions, names).run_floats(
+        [np.array([f(angle)]) for f in (np.sin, np.cos)], (1,)
+    )
+    exact = [f(float(Fraction(unit)) * k * 0.7) for k in counts for f in (np.sin, np.cos)]
+    assert np.ravel(values) == pytest.approx(exact, abs=1e-12)
+
+
+def test_angles_without_a_common_unit_are_left_alone():
+    q = symbol("q")
+    lifted = lift([sin(q), sin(Fraction(137, 100) * q)], opaque=True)
+    assert lifted.units == {"q": 1}
+    assert list(lifted.atoms.values()) == [sin(Fraction(137, 100) * q)]
 
 
 def test_state_dependent_input():

@@ -32,7 +32,7 @@ _NAMES: list[str] = []  # of all kernels
 _UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 KERNELS = (
     "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "machine",
-    "stepping", "compiled",
+    "stepping", "walking", "compiled",
 )  # fmt: skip
 
 

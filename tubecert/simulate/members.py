@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from tubecert.spec import Knots, Spec
 from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
+
+if TYPE_CHECKING:
+    from tubecert.simulate.program import Program
 
 P = TypeVar("P")
 _SEGMENTS: Final = (4, 40)  # of a plan, from corner to corner of u*
@@ -45,7 +48,8 @@ _ROUNDING: Final = 1e-5  # of |x*'|: what a cubic may miss of the dynamics where
 class Drawing:
     """What plans are drawn for: the dynamics, the boxes as arrays (2, n) and (2, m), how long they last in s.
 
-    `replan`: after so many s a plan is given up for a new one; None: never (f is free of t).
+    `drift`, and `program` with its `memory`, are f + B u of states, inputs and t. `replan`: after so many s a plan is
+    given up for a new one; None: never (f is free of t).
     """
 
     model: ControlAffineModel
@@ -54,6 +58,8 @@ class Drawing:
     P: Array
     U: Array
     drift: Tape
+    program: Program
+    memory: Array
     replan: Fraction | None = None
 
     def speed(self, t: float | Array, x: Array, u: Array) -> Array:
@@ -64,18 +70,12 @@ class Drawing:
         self, begin: float, x: Array, u: tuple[Array, Array], p: Array, length: float, steps: int
     ) -> Array:
         """x* (N, steps + 1, n) from `begin` on over a segment of a linear u* and a defect p, by RK4."""
-        dt, path = length / steps, [x]
-        for k in range(steps):
-            t = begin + k * dt
-            at = [u[0] + (u[1] - u[0]) * (k + part) / steps for part in (0.0, 0.5, 1.0)]
-            with np.errstate(all="ignore"):
-                k1 = self.speed(t, x, at[0]) + p
-                k2 = self.speed(t + dt / 2, x + dt / 2 * k1, at[1]) + p
-                k3 = self.speed(t + dt / 2, x + dt / 2 * k2, at[1]) + p
-                k4 = self.speed(t + dt, x + dt * k3, at[2]) + p
-                x = x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            path.append(x)
-        return np.stack(path, axis=1)
+        from tubecert.simulate.walking import Segment, trial, walk
+
+        path = np.empty((len(x), steps + 1, x.shape[1]))
+        path[:, 0] = x
+        walk(self.program, Segment(begin, length, *u, p), trial(self.memory, x.shape[1]), path)
+        return path
 
     def inside(self, path: Array) -> Array:
         """How many of the points of each path (N, K, n) lie in P before it leaves it for the first time."""
@@ -90,6 +90,10 @@ def drawing_of(
     bundle = spec.trajectory.bundle
     if bundle is None:
         raise ValueError("only a family of plans has members")
+    from tubecert.simulate.program import assemble
+
+    drift, names = [row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME)
+    program, memory = assemble(drift, names)
     return Drawing(
         model=model,
         bundle=bundle,
@@ -97,7 +101,9 @@ def drawing_of(
         P=_inner(bundle.x),
         U=_inner(bundle.u, 0.0),
         replan=replan,
-        drift=Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME)),
+        drift=Tape(drift, names),
+        program=program,
+        memory=memory,
     )
 
 

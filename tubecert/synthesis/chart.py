@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from itertools import pairwise
 from math import comb
@@ -31,15 +32,15 @@ class NotPolynomialError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
-    """A state in [lo, hi]; `angle`: it enters by its sine and cosine only."""
+    """A state in [lo, hi]; `angle`: it enters only by the sine and cosine of so many times itself; 0: by itself."""
 
     name: str
     lo: float
     hi: float
-    angle: bool
+    angle: float
 
     def __post_init__(self) -> None:
-        if self.angle and not -np.pi < self.lo <= self.hi < np.pi:
+        if self.angle and not -np.pi < self.angle * self.lo <= self.angle * self.hi < np.pi:
             raise NotPolynomialError(f"the range of the angle {self.name} reaches pi")
 
     def order(self, degree: int) -> int:
@@ -48,18 +49,24 @@ class Variable:
 
     def value(self, u: Array) -> Array:
         """The state at u in [-1, 1]."""
-        return 2 * np.arctan(self._inner(u)) if self.angle else self._inner(u)
+        return 2 * np.arctan(self._inner(u)) / self.angle if self.angle else self._inner(u)
 
     def weight(self, u: Array, degree: int) -> Array:
         """The positive factor that makes it a polynomial in u, at most 1."""
         if not self.angle:
             return np.ones_like(u)
-        most = max(abs(np.tan(self.lo / 2)), abs(np.tan(self.hi / 2)))
+        most = np.abs(self._ends).max()
         return np.asarray(((1 + self._inner(u) ** 2) / (1 + most**2)) ** degree)
 
     def _inner(self, u: Array) -> Array:
-        lo, hi = (np.tan(self.lo / 2), np.tan(self.hi / 2)) if self.angle else (self.lo, self.hi)
+        lo, hi = self._ends
         return np.asarray((lo + hi) / 2 + (hi - lo) / 2 * u)
+
+    @property
+    def _ends(self) -> Array:
+        """Of t, or of the state."""
+        ends = np.array([self.lo, self.hi])
+        return np.asarray(np.tan(self.angle * ends / 2)) if self.angle else ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,8 +161,8 @@ def _tensor(axes: Sequence[Array]) -> Array:
     return np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def degrees_of(expressions: Sequence[Expression]) -> tuple[list[Degrees], frozenset[str]]:
-    """A bound on the degree of each expression in each state (of an angle: in sine and cosine), and the angles.
+def degrees_of(expressions: Sequence[Expression]) -> tuple[list[Degrees], dict[str, Fraction]]:
+    """A bound on the degree of each expression in each state (of an angle: in sine and cosine), and the unit angles.
 
     Raises `NotLiftedError` or `NotPolynomialError` at what is no polynomial.
     """
@@ -179,7 +186,7 @@ def degrees_of(expressions: Sequence[Expression]) -> tuple[list[Degrees], frozen
             degrees[node] = {name: d * int(str(node.value)) for name, d in parts[0].items()}
         else:
             raise NotPolynomialError("a quotient is no polynomial")
-    return [degrees[e] for e in lifted.expressions], frozenset(lifted.circles)
+    return [degrees[e] for e in lifted.expressions], lifted.units
 
 
 def highest(*parts: Degrees) -> dict[str, int]:

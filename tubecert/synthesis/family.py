@@ -18,6 +18,7 @@ from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, sin, s
 from tubecert.expression.matrix import Matrix, identity, multiply, null_space, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.frame import commuting_frame
+from tubecert.synthesis.lifting import unit_angles
 from tubecert.synthesis.pivot_frame import pivot_frame
 
 
@@ -128,13 +129,11 @@ def _chosen(
 
 def _generators(form: Expression, model: ControlAffineModel) -> list[Expression]:
     """The form itself; of an angle, its sine and cosine: the dynamics are polynomials in these."""
-    angles = {
-        node.args[0]
-        for node in topological([*model.f, *(e for row in model.B for e in row)])
-        if node.op in ("sin", "cos", "tan")
-    }
+    entries = [*model.f, *(e for row in model.B for e in row)]
+    angles = {node.args[0] for node in topological(entries) if node.op in ("sin", "cos", "tan")}
     if form.op == "symbol" and any(form in topological([angle]) for angle in angles):
-        return [sin(form), cos(form)]
+        angle = unit_angles(entries).get(str(form.value), Fraction(1)) * form
+        return [sin(angle), cos(angle)]
     return [form]
 
 

@@ -27,7 +27,7 @@ from tubecert.expression import (
 from tubecert.expression.graph import FUNCTIONS
 from tubecert.expression.matrix import Matrix, identity, jacobian, null_space, transpose
 from tubecert.model import ControlAffineModel
-from tubecert.synthesis.lifting import Lifted, at_point, lift
+from tubecert.synthesis.lifting import Lifted, at_point, lift, unit_angles
 
 _DEGREE = 5
 _UNKNOWNS = 900
@@ -72,10 +72,16 @@ def _dictionary(model: ControlAffineModel, degree: int) -> list[Expression]:
     """Products of at most `degree` atoms, the simplest first; states that B moves enter at most linearly."""
     entries = [e for row in model.B for e in row]
     nodes = topological(entries)
-    angles = {name for node in nodes if node.op in ("sin", "cos", "tan") for name in free_symbols(node.args)}
+    units = unit_angles(entries)
+    angles = {
+        name: units.get(name, Fraction(1)) * symbol(name)
+        for node in nodes
+        if node.op in ("sin", "cos", "tan")
+        for name in sorted(free_symbols(node.args))
+    }
     atoms: list[Expression] = []
     for name in sorted(free_symbols(entries)):
-        atoms += [cos(symbol(name)), sin(symbol(name))] if name in angles else [symbol(name)]
+        atoms += [cos(angles[name]), sin(angles[name])] if name in angles else [symbol(name)]
     divisors = dict.fromkeys(node.args[1] for node in nodes if node.op == "div")
     atoms += [ONE / e for e in divisors]
     atoms += [node for node in nodes if node.op in _ATOMS]

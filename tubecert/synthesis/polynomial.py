@@ -147,7 +147,7 @@ def _charts(problem: SynthesisProblem, N: Matrix) -> tuple[Chart, Chart]:
     charts = []
     for degrees in both:
         used = [
-            (Variable(name=name, lo=float(lo), hi=float(hi), angle=name in angles), degrees[name])
+            (Variable(name=name, lo=float(lo), hi=float(hi), angle=float(angles.get(name, 0))), degrees[name])
             for name, (lo, hi) in zip(states, problem.safe_set, strict=True)
             if degrees.get(name, 0)
         ]
