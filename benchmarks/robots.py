@@ -51,6 +51,11 @@ class Units:
         found = self.sizes.get(unit.removesuffix("/s"), Fraction(1))
         return found / self.time if unit.endswith("/s") else found
 
+    def of_inputs(self, spec: Spec) -> Fraction:
+        """The size of the inputs' new units: one for all, as Gamma, |h| and |u| are of all of them together."""
+        named = dict(spec.units)
+        return self.of(named.get(spec.inputs[0], ""))
+
 
 UNITS = (
     Units(name="as written", sizes={}),
@@ -69,7 +74,8 @@ UNITS = (
 def rescaled(spec: Spec, units: Units, folder: Path) -> dict[str, Any]:
     """The same system in other units, as the data of a specification; its plan, if it is a file, goes to `folder`."""
     named = dict(spec.units)
-    sizes = {name: units.of(named.get(name, "")) for name in (*spec.states, *spec.inputs)}
+    sizes = {name: units.of(named.get(name, "")) for name in spec.states}
+    sizes |= dict.fromkeys(spec.inputs, units.of_inputs(spec))
     T, x, u = units.time, [sizes[name] for name in spec.states], [sizes[name] for name in spec.inputs]
     data = canonical(spec)
 
@@ -206,13 +212,12 @@ def row(spec: Spec, units: Units, folder: Path, until: str) -> list[str]:
         f"{name} {float(units.of(named.get(name, ''))) * float(width):.3g}"
         for name, width in result["tube"]["half_widths"].items()
     )
-    inputs = max(units.of(named.get(name, "")) for name in spec.inputs)
     return [
         spec.name,
         units.name,
         f"{float(Fraction(str(result['metric']['rate'])) / T):.3g}",
         f"{float(gains['bandwidth']) / float(T):.4g}",
-        f"{float(gains['adaptation_rate']) * float(inputs) ** 2:.4g}",
+        f"{float(gains['adaptation_rate']) * float(units.of_inputs(spec)) ** 2:.4g}",
         widths,
         *times,
         ended,

@@ -65,8 +65,9 @@ def test_the_generator_writes_the_same_system(robots, name, tmp_path):
     spec = load(str(BENCHMARKS / "robots" / f"{name}.yaml"))
     units = robots.UNITS[2]
     other = load_text(json.dumps(robots.rescaled(spec, units, tmp_path)), str(tmp_path / "spec.yaml"))
-    sizes = np.array([float(units.of(dict(spec.units)[n])) for n in (*spec.states, *spec.inputs)])
-    n = len(spec.states)
+    n, m = len(spec.states), len(spec.inputs)
+    sizes = np.array([float(units.of(dict(spec.units)[name])) for name in spec.states])
+    sizes = np.append(sizes, np.full(m, float(units.of_inputs(spec))))
     rng = np.random.default_rng(1)
     middle = np.array([[float(a), float(b)] for a, b in spec.safe_set]).mean(axis=1)
     point = np.concatenate([middle + 0.1 * rng.random(n), rng.random(len(spec.inputs))])

@@ -3,6 +3,8 @@
 With m pivot rows R of B, B_R invertible, and x_R the states of these rows,
     e_j = d/dx_j + (dB/dx_j) B_R^-1 x_R  for states j that B depends on,  e_i = d/dx_i  for all others,
 commute with every column: [b_k, e_j] = -db_k/dx_j + (dB/dx_j) B_R^-1 (b_k)_R = 0. They are independent everywhere.
+If B_R is the inverse of a mass matrix, B_R^-1 is simpler:
+    (dB/dx_j) B_R^-1 = d(B B_R^-1)/dx_j - B d(B_R^-1)/dx_j.
 Untrusted: `verify` proves C3 for the metric that comes of it. Implements: (CCM_3).
 """
 
@@ -19,14 +21,15 @@ from tubecert.expression.matrix import (
     Matrix,
     adjugate,
     column,
+    combine,
     determinant,
     differentiate,
     identity,
-    matrix,
     multiply,
     transpose,
 )
 from tubecert.model import ControlAffineModel, divide
+from tubecert.synthesis.factors import reduced
 
 _POINTS = 400
 
@@ -50,15 +53,18 @@ def pivot_frames(model: ControlAffineModel) -> Iterator[Matrix]:
     needed = free_symbols(e for row in model.B for e in row)
     if moved & needed:
         return
+    B = reduced(model.B)
     for rows in model.pivots[0]:
-        B_R = [model.B[i] for i in rows]
-        if determinant(B_R) is ZERO:
+        B_R = [B[i] for i in rows]
+        ((size,),) = reduced([[determinant(B_R)]])
+        if size is ZERO:
             continue
-        inverse = divide(adjugate(B_R), determinant(B_R))
-        u = multiply(inverse, column([symbol(model.states[i]) for i in rows]))
+        inverse = reduced(divide(adjugate(B_R), size))
+        gain = reduced(multiply(B, inverse))
+        x_R = column([symbol(model.states[i]) for i in rows])
         fields = [list(row) for row in identity(len(model.states))]  # columns of E as rows
         for j, name in enumerate(model.states):
             if name in needed:
-                turned = multiply(differentiate(model.B, name), u)
-                fields[j] = [a + b for a, (b,) in zip(fields[j], turned, strict=True)]
-        yield transpose(matrix(fields))
+                slope = combine(1, differentiate(gain, name), -1, multiply(B, differentiate(inverse, name)))
+                fields[j] = [a + b for a, (b,) in zip(fields[j], multiply(slope, x_R), strict=True)]
+        yield transpose(reduced(fields))
