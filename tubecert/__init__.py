@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from tubecert.errors import SpecError, TargetError, TubecertError
     from tubecert.library.certification import Certification, Gains, read
     from tubecert.library.certifying import certify
+    from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
     from tubecert.library.designing import Design, Machines, TradeOff, design, machines, trade_off
+    from tubecert.library.driving import Drive, drive
     from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
@@ -29,8 +31,10 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Certification",
+    "Checked",
     "Comparison",
     "Design",
+    "Drive",
     "Exported",
     "Gains",
     "Machines",
@@ -51,8 +55,10 @@ __all__ = [
     "VerifiedMetric",
     "__version__",
     "certify",
+    "check",
     "compare",
     "design",
+    "drive",
     "export",
     "load",
     "machines",
@@ -72,6 +78,8 @@ _HOMES = {
     "Gains": "library.certification",
     "read": "library.certification",
     "certify": "library.certifying",
+    "Checked": "library.checks",
+    "check": "library.checks",
     "Comparison": "library.comparing",
     "compare": "library.comparing",
     "Design": "library.designing",
@@ -80,6 +88,8 @@ _HOMES = {
     "design": "library.designing",
     "machines": "library.designing",
     "trade_off": "library.designing",
+    "Drive": "library.driving",
+    "drive": "library.driving",
     "Swept": "library.sweeping",
     "Exported": "library.exporting",
     "SynthesisedMetric": "library.metrics",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from unittest import mock
@@ -17,16 +18,20 @@ from flint import ctx
 from followed import TEXTS, in_recheck
 from typer.testing import CliRunner
 
+import tubecert as tc
 from tubecert import certificate
 from tubecert.cli.app import app
 from tubecert.errors import TubecertError
 from tubecert.export import compiled as compiled_code
 from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import COMPILERS, compiled, compiler
+from tubecert.export.driven import Driven
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
 from tubecert.export.vectors import vectors
 from tubecert.library.certification import certification_of
+from tubecert.library.driving import Drive
+from tubecert.library.rechecking import code_in
 from tubecert.recheck.balls import exact
 from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.reader import read_code
@@ -99,6 +104,31 @@ def constants_are_read_back(folder, own, given):
     assert alone.difference < 1e-13
 
 
+@pytest.mark.parametrize("wrong", ["difference", "escapes", "told"])
+def test_what_is_driven_is_fine_if_nothing_speaks_against_it(wrong):
+    fine = Driven(
+        runs=2,
+        samples=10,
+        difference=1e-15,
+        scale=2.0,
+        distance=0.1,
+        level=0.3,
+        escapes=(),
+        told=0,
+        step=1e-6,
+        worst=2e-6,
+        precision="double",
+    )
+    good = Drive(found=fine, folder="orbit")
+    assert good.fine
+    assert str(good).startswith("not falsified: orbit drove 2 runs of 10 samples")
+    against = {"difference": 1e-3, "escapes": (1,), "told": 3}
+    bad = Drive(found=replace(fine, **{wrong: against[wrong]}), folder="orbit")
+    assert not bad.fine
+    assert str(bad).startswith("FALSIFIED")
+    assert "falsified" in bad._repr_html_()
+
+
 @needs_cc
 @pytest.mark.slow
 def test_a_certificate_its_code_and_what_is_refused(tmp_path):
@@ -110,13 +140,15 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     assert run.exit_code == 0, run.output
     folder = tmp_path / "orbit.controller"
     own = certification_of(data).certificate
-    found = examined(str(folder), own, text, target.name)
+    found = code_in(str(folder), text, target.name)
     assert found.difference < 1e-13
     assert "ball arithmetic" in str(found)
     constants_are_read_back(folder, own, (text, target.name))
     other = exported(controller_of(own), "python")
     other.save(str(tmp_path / "python"))
     assert examined(str(tmp_path / "python"), own, text, target.name).difference < 1e-13
+    with pytest.raises(TubecertError, match="in Python is not driven"):
+        tc.drive(certification_of(data), tmp_path / "python", runs=1, duration="0.1")
     in_the_loop(target, folder)
     source = folder / "hardware_orbit.c"
     code = source.read_text("utf-8")

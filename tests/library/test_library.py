@@ -230,6 +230,18 @@ def test_findings_show_the_entry():
 # certification
 
 
+def test_a_plan_that_is_no_equilibrium_is_told_before_anything_is_certified():
+    fine = tc.check(DATA)
+    assert fine.fine
+    assert str(fine).endswith("1 specification checked: 1 note")  # u has no unit
+    off = tc.check(changed(trajectory__at=[0.5, 0]))  # -p is left over: no input holds it
+    assert not off.fine
+    assert "TC404" in {item.code for item in off.findings}
+    assert "is no equilibrium" in str(off)
+    assert "is no equilibrium" in off._repr_html_()
+    assert tc.check(changed(trajectory__at=[0.5, 0], trajectory__input=[0.5])).fine
+
+
 @pytest.mark.slow
 def test_certify_says_what_the_command_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -10,10 +10,9 @@ from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import text_of, told, verdict_line
+from tubecert.library.rechecking import code_in, text_of, told, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
-from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.run import BUDGET, Recheck, recheck
 
@@ -38,7 +37,7 @@ def run(given: Given, output: Output) -> ExitCode:
     name = given.certificate
     text = text_of(name)
     note = "" if given.spec is None else _specification(given.spec, text, name)
-    code = "" if given.controller is None else _controller(given.controller, text, name)
+    code = "" if given.controller is None else str(code_in(given.controller, text, name))
     from tubecert.report import progress
     from tubecert.report.terminal import Terminal
 
@@ -58,16 +57,6 @@ def _specification(path: str, text: str, name: str) -> str:
     from tubecert.cli.belonging import belongs
 
     return belongs(document.read(text, name), name, path)
-
-
-def _controller(folder: str, text: str, name: str) -> str:
-    """A sentence that says that the code in a folder is that of the certificate; raises TC711 if it is not."""
-    from tubecert.certificate.file import parse
-    from tubecert.export.examined import examined
-    from tubecert.library.certification import certification_of
-
-    read_certificate(document.read(text, name))
-    return str(examined(folder, certification_of(parse(text.encode(), name)).certificate, text, name))
 
 
 def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:

@@ -32,6 +32,12 @@ class Exported:
         """The hash of the certificate."""
         return self.controller.hash
 
+    def __str__(self) -> str:
+        return f"controller of {self.controller.name}: {', '.join(sorted(self.files))}"
+
+    def __repr__(self) -> str:
+        return f"<Exported: {self}>"
+
 
 def export(
     result: Certification | File,

@@ -56,6 +56,11 @@ class Report:
         text = self.markdown if _suffix(target) in MARKDOWN else self.html
         write_text(target, text, REMEDY)
 
+    def __repr__(self) -> str:
+        from tubecert.report import console
+
+        return f"<Report: a page about {console.name(self.certificate.result)}>"
+
     def _repr_html_(self) -> str:
         """The page in a frame of its own: its style touches nothing around it."""
         style = "width: 100%; height: 45em; border: 1px solid #8884"

@@ -185,7 +185,7 @@ def simulate(
     from tubecert.simulate.certified import adopted, require_tube
 
     found = result if isinstance(result, Certification) else read(result)
-    system = _specification(found) if spec is None else spec_of(spec)
+    system = specification_of(found) if spec is None else spec_of(spec)
     wishes = wishes_of(system, numbers, chosen, gains, plan)
     require_members(system, wishes, str)
     system = adopted(system, found.result)
@@ -194,7 +194,7 @@ def simulate(
     return Simulation(campaign=campaign, compared_with=found.hash)
 
 
-def _specification(found: Certification) -> Spec:
+def specification_of(found: Certification) -> Spec:
     """What was certified; raises `SpecError` if the certificate does not say all of it."""
     try:
         return found.specification.spec

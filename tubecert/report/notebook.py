@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.result import Certificate, Result
+from tubecert.findings import Finding, Severity
 from tubecert.printable import visible
 from tubecert.report import console, reach
+from tubecert.report.findings import summary
 from tubecert.report.html import environment
 from tubecert.report.page import Cell, Page, Table
 from tubecert.report.page_origin import equations
@@ -45,6 +47,13 @@ def of_line(line: str, name: str, style: str, details: Sequence[tuple[str, str]]
     rows = tuple((Cell(text=what), Cell(text=value)) for what, value in details)
     tables = [Table(columns=("", ""), rows=rows)] if rows else []
     return render(Card(verdict=verdict, name=name, style=style, summary=summary, tables=tables))
+
+
+def of_lines(lines: Sequence[str], style: str) -> str:
+    """The card of several lines: the first says what is the matter."""
+    rows = tuple((Cell(text=line),) for line in lines[1:])
+    tables = [Table(columns=("",), rows=rows)] if rows else []
+    return render(Card(verdict=lines[0], name="", style=style, tables=tables))
 
 
 def certificate(certificate: Certificate) -> str:
@@ -92,6 +101,14 @@ def specification(effective: Effective) -> str:
             tables=[Table(columns=("",), rows=tuple(rows))],
         )
     )
+
+
+def findings(name: str, found: Sequence[Finding]) -> str:
+    """The card of a check: every finding with its place, and how many there are."""
+    style = "undecided" if any(item.severity is not Severity.NOTE for item in found) else ""
+    rows = tuple((Cell(text=str(item.severity)), Cell(text=item.message, note=item.help)) for item in found)
+    tables = [Table(columns=("", ""), rows=rows)] if rows else []
+    return render(Card(verdict="checked", name=name, style=style, summary=summary(found, 1), tables=tables))
 
 
 def of_page(page: Page) -> str:
