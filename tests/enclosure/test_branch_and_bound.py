@@ -370,7 +370,7 @@ def test_a_bound_reduced_by_two_per_cent_is_noticed(monkeypatch):
 
 
 def test_settled_boxes_that_are_forgotten_are_noticed(monkeypatch):
-    monkeypatch.setattr(bnb._Search, "_settle", lambda self, bound: None)
+    monkeypatch.setattr(bnb.Search, "_settle", lambda self, bound: None)
     objective, domain, truth = CASES["ripple"]
     with pytest.raises(AssertionError):
         check(supremum(objective, domain, Effort()), truth)

@@ -93,6 +93,18 @@ def test_constants_of_a_window_hold_in_it_and_before(bounded):
 
 
 @pytest.mark.slow
+def test_windows_are_bounded_side_by_side_as_one_by_one(monkeypatch):
+    def windows():
+        question = question_of(load_text(MOVING, "spec.yaml"), Options(gap=F(1, 5)))
+        found = bound(enclose(tube(plan(prove_metric(question)))))
+        return with_windows(found, [F(1, 10), F(1, 20), F(1, 20)]).machine.windows
+
+    at_once = windows()
+    monkeypatch.setattr("tubecert.bounds.parts.Parts._leads", lambda self, own: False)
+    assert windows() == at_once
+
+
+@pytest.mark.slow
 def test_a_part_of_a_plan(bounded):
     whole = bounded.enclosed.tube.plan
     part = during(whole, F(1, 2), F(1))

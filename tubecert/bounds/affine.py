@@ -20,7 +20,7 @@ import numpy as np
 from tubecert.coordinates import Coordinates, Rows, inverse
 from tubecert.enclosure.interval import Array, Interval, down, up
 from tubecert.enclosure.linalg import midrad, norm_bound, spectral_norm, spectral_norm_midrad
-from tubecert.enclosure.objective import Estimate, estimate_of
+from tubecert.enclosure.objective import Estimate, Target, estimate_of
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, derivatives, substitute, symbol
 from tubecert.expression.matrix import Matrix, column
@@ -83,7 +83,7 @@ class NormOverRest:
         self._place = MatrixFunction([column([values[name] for name in self._rest])])
         self._E = np.array([[float(value) for value in row] for row in E])
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The bound at the vertices of the affine part, plus the rest."""
         del target
         e = self._function.expand(lo, hi)

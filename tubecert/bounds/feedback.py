@@ -15,6 +15,7 @@ Implements: theory section 2, feedback gain, closed form.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from functools import partial
 
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import eigenvalues_midrad, midrad, product, spectral_norm_midrad, whitening
-from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.enclosure.objective import Estimate, Objective, Target
 from tubecert.enclosure.pencil import FirstFinite, WeightedPencil, Weights
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO
@@ -38,7 +39,9 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     """du as a supremum over x and mu in (0, largest]; for constant B, C2 must hold at the model's rate."""
     loss = partial(_loss, largest=largest)
     exact = WeightedPencil(
-        [model.F], [model.BBt, model.W], Weights(variables=(MU,), ends=tangents, loss=loss)
+        [model.F],
+        [model.BBt, model.W],
+        Weights(variables=(MU,), ends=tangents, loss=loss, made_of=("tangents", largest)),
     )
     if not (model.constant_input and model.annihilator):
         return exact
@@ -47,7 +50,11 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     F, W = (multiply(transpose(basis), multiply(a, basis)) for a in (model.F, model.W))
     gram = tuple(tuple(ONE if i == j < m else ZERO for j in range(n)) for i in range(n))
     ends = partial(down_to_zero, inputs=m, states=n)
-    split = WeightedPencil([F], [gram, W], Weights(variables=(MU,), ends=ends, loss=loss))
+    split = WeightedPencil(
+        [F],
+        [gram, W],
+        Weights(variables=(MU,), ends=ends, loss=loss, made_of=("down to zero", m, n, largest)),
+    )
     # products may hide from simplification that a variable cancels
     return FirstFinite(exact, split) if set(split.variables) <= set(exact.variables) else exact
 
@@ -106,6 +113,12 @@ class ClosedFormGain:
         nothing = np.zeros((1, 0))
         self._B, *rest = (midrad(value) for value in inputs.at(nothing, nothing))
         self._annihilator: Ball | None = rest[0] if rest else None
+        self._inputs = inputs
+
+    @property
+    def made_of(self) -> Hashable:
+        """All matrices."""
+        return self._function.made_of, self._inputs.made_of
 
     def bound(self, lo: Array, hi: Array) -> Array:
         """An upper bound over each box, (N,); inf where the box is too wide."""
@@ -142,7 +155,7 @@ class ClosedFormGain:
         value = np.sqrt((cross**2 + push**2 / 4) / np.where(valid, smallest, np.nan)) * (1 + 1e-13)
         return np.where(valid & ~np.isnan(value), value, np.inf)
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The bound; it converges linearly, so every variable counts by its width."""
         width = hi - lo
         return Estimate(self.bound(lo, hi), 0.5 * (lo + hi), width, width)

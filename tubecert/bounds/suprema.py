@@ -17,13 +17,15 @@ from tubecert.bounds.affine import NormOverRest
 from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
+from tubecert.bounds.parts import Parts
 from tubecert.coordinates import Coordinates, Fields
-from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import Kinks, LeastInputGain, Lipschitz, Objective, SumOfNorms, size_of
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
+from tubecert.enclosure.questions import Domain
 from tubecert.expression import (
     ONE,
     ZERO,
@@ -62,6 +64,7 @@ class Suprema:
     <= rho cut to `sides` (n,), what |x_i - x*_i| is at most; without, they are those in x and the tube is a ball.
     `time` is the range of t for h (the horizon, or one period of h); the plan brings its own. `gaps`: the relative gaps
     of constants, by name, that are not enclosed to the gap of the effort. `spent` is told what work each search was.
+    `parts`: what is found for several parts of a plan at once, this one among them.
     """
 
     model: ControlAffineModel
@@ -74,6 +77,7 @@ class Suprema:
     sides: tuple[float, ...] | None = None
     gaps: Mapping[str, float] = field(default_factory=dict)
     spent: Spent | None = None
+    parts: Parts | None = None
 
     def effort_for(self, name: str) -> Effort:
         """How hard to try for a constant; one with a gap of its own is as close as few boxes make it."""
@@ -359,16 +363,26 @@ class Suprema:
         effort: Effort | None = None,
         extra: dict[str, Range] | None = None,
     ) -> Supremum:
-        time = self.plan.time.get(TIME, self.time)
-        tube = Tube(
+        chosen, more = effort or self.effort_for(name), extra or {}
+        found = (
+            None
+            if self.parts is None
+            else self.parts.over_tube(self, objective, self._heard(name, chosen), more)
+        )
+        if found is not None:
+            return self._told(name, objective, found)
+        return self._run(name, objective, self.tube(more), chosen)
+
+    def tube(self, extra: Mapping[str, Range]) -> Tube:
+        """The tube as a domain, with further ranges."""
+        return Tube(
             self.plan,
             self.section,
             states=self.model.states,
             inputs=self.model.inputs,
-            time=time,
-            extra={**self.plan.ranges, **dict(self.model.parameters), **(extra or {})},
+            time=self.plan.time.get(TIME, self.time),
+            extra={**self.plan.ranges, **dict(self.model.parameters), **extra},
         )
-        return self._run(name, objective, tube, effort or self.effort_for(name))
 
     def _search_plan(self, name: str, objective: Objective, effort: Effort | None = None) -> Supremum:
         return self._run(name, objective, self.plan.domain, effort or self.effort_for(name))
@@ -379,10 +393,15 @@ class Suprema:
         )
 
     def _run(self, name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
-        if self.report is not None:
-            report = self.report
-            effort = replace(effort, progress=lambda step: report(replace(step, name=name)))
-        found = supremum(objective, domain, effort)
+        return self._told(name, objective, supremum(objective, domain, self._heard(name, effort)))
+
+    def _heard(self, name: str, effort: Effort) -> Effort:
+        if self.report is None:
+            return effort
+        report = self.report
+        return replace(effort, progress=lambda step: report(replace(step, name=name)))
+
+    def _told(self, name: str, objective: Objective, found: Supremum) -> Supremum:
         if self.spent is not None:
             self.spent(name, found.boxes * size_of(objective))
         return found

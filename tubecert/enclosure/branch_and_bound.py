@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,16 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective
 from tubecert.enclosure.processor import require_ieee
+from tubecert.enclosure.questions import (
+    Bound,
+    Contract,
+    Domain,
+    Inside,
+    Priorities,
+    Steps,
+    Values,
+    answered,
+)
 from tubecert.executor import Executor, WorkerError
 from tubecert.progress import Phase, Progress, Step
 from tubecert.verdict import Verdict
@@ -30,32 +40,6 @@ _PROBES: Final = 64  # boxes whose corners are tried as points, per round
 _ALONE: Final = 100_000  # boxes after which a supremum falls apart
 _PARTS: Final = 32
 _Boxes: TypeAlias = tuple[Array, Array, Array]  # lower corners (N, d), upper ones, and a bound (N,) for each
-
-
-class Domain(Protocol):
-    """A set of points, known through boxes."""
-
-    def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
-        """The variables to search over: those needed, then those that the domain itself depends on."""
-        ...
-
-    def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
-        """Boxes (N, d) that cover the domain's projection to `variables`."""
-        ...
-
-    def contract(
-        self, variables: tuple[str, ...], lo: Array, hi: Array
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Smaller boxes with the same points of the domain, and which of them may contain any."""
-        ...
-
-    def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
-        """Thin boxes near the given points, each proven to lie in the domain's projection; shape (P', d)."""
-        ...
-
-    def priorities(self, variables: tuple[str, ...], lo: Array, hi: Array, estimate: Estimate) -> Array:
-        """How much splitting each variable promises, (N, d); <= 0 where it cannot be split."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,8 +83,8 @@ class Decision:
 def decide(objective: Objective, domain: Domain, threshold: float, effort: Effort) -> Decision:
     """Decide whether objective < threshold on the whole domain."""
     with np.errstate(all="ignore"):
-        search = _Search(objective, domain, effort, threshold)
-        found = search.run()
+        search = Search(objective, domain, effort, threshold)
+        found = answered(search.run(), objective, domain)
     if found.below >= threshold:
         return Decision(verdict=Verdict.REFUTED, at=found.at, value=found.below, boxes=found.boxes)
     verdict = Verdict.CERTIFIED if found.above < threshold else Verdict.UNDECIDED
@@ -113,10 +97,15 @@ def supremum(objective: Objective, domain: Domain, effort: Effort) -> Supremum:
     Raises `ValueError` if the domain turns out empty.
     """
     with np.errstate(all="ignore"):
-        return _Search(objective, domain, effort).run()
+        return answered(Search(objective, domain, effort).run(), objective, domain)
 
 
-class _Search:
+class Search:
+    """One search, which asks its objective and its domain what it has to know, and goes on with the answers.
+
+    Whoever runs it answers: so several that are alike can be answered at once, with the same results.
+    """
+
     def __init__(
         self, objective: Objective, domain: Domain, effort: Effort, threshold: float | None = None
     ) -> None:
@@ -139,13 +128,17 @@ class _Search:
         gap = self.effort.gap if self.count > self.effort.cheap else 0.1 * self.effort.gap
         return self.below + max(gap * abs(self.below), self.effort.absolute)
 
-    def run(self) -> Supremum:
+    def run(self) -> Steps[Supremum]:
+        """The supremum.
+
+        Raises `ValueError` if the domain turns out empty.
+        """
         lo, hi = self.domain.boxes(self.variables)
         bound = np.full(len(lo), np.inf)
         self.extent = hi.max(axis=0) - lo.min(axis=0)
-        self._probe(0.5 * (lo + hi))
+        yield from self._probe(0.5 * (lo + hi))
         alone = _ALONE if self.threshold is None else None
-        lo, hi, bound = self.search(lo, hi, bound, alone)
+        lo, hi, bound = yield from self.search(lo, hi, bound, alone)
         if len(lo) and self._goes_on:
             bound = self._apart(lo, hi, bound)
         above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
@@ -160,7 +153,7 @@ class _Search:
             reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
         )
 
-    def search(self, lo: Array, hi: Array, bound: Array, alone: int | None = None) -> _Boxes:
+    def search(self, lo: Array, hi: Array, bound: Array, alone: int | None = None) -> Steps[_Boxes]:
         """Split boxes until none is left, the budget is spent or so many were examined; those that are left."""
         while len(lo) and self._goes_on and (alone is None or self.count < alone):
             order = np.argsort(-bound, kind="stable")
@@ -168,7 +161,7 @@ class _Search:
             # the longer the queue, the more is taken at once: otherwise sorting would cost its square
             while done < min(len(lo), max(_BATCH, len(lo) // 4)) and self._goes_on:
                 take = order[done : done + _BATCH]
-                children.append(self._round(lo[take], hi[take], bound[take]))
+                children.append((yield from self._round(lo[take], hi[take], bound[take])))
                 done += _BATCH
             rest = np.sort(order[done:])
             kept = bound[rest] > self.target
@@ -223,33 +216,35 @@ class _Search:
         refuted = self.threshold is not None and self.below >= self.threshold
         return self.count < self.effort.budget and not refuted
 
-    def _round(self, lo: Array, hi: Array, bound: Array) -> tuple[Array, Array, Array]:
+    def _round(self, lo: Array, hi: Array, bound: Array) -> Steps[_Boxes]:
         """Bound a batch of boxes, settle those at or below the target, split the others."""
-        lo, hi, alive = self.domain.contract(self.variables, lo, hi)
+        yield (cut := Contract(self.variables, lo, hi))
+        lo, hi, alive = cut.answer
         lo, hi, bound = lo[alive], hi[alive], bound[alive]
         self.count += len(alive)
         if not len(lo):
             return lo, hi, bound
-        self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
-        estimate = self._widened(
-            self.objective.upper(lo[:, : self.own], hi[:, : self.own], self.target), lo, hi
-        )
+        yield from self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
+        yield (above := Bound(lo[:, : self.own], hi[:, : self.own], self.target))
+        estimate = self._widened(above.answer, lo, hi)
         bound = np.minimum(bound, estimate.upper)
-        self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
-        priority = self.domain.priorities(self.variables, lo, hi, estimate)
+        yield from self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
+        yield (promise := Priorities(self.variables, lo, hi, estimate))
+        priority = promise.answer
         choice = np.argmax(priority, axis=1) if priority.shape[1] else np.zeros(len(lo), dtype=np.intp)
-        cut = _cuts(lo, hi, choice)
+        middle = _cuts(lo, hi, choice)
         rows = np.arange(len(lo))
         splittable = rows < 0
         if priority.shape[1]:
-            splittable = (lo[rows, choice] < cut) & (cut < hi[rows, choice]) & (priority[rows, choice] > 0)
+            inner = (lo[rows, choice] < middle) & (middle < hi[rows, choice])
+            splittable = inner & (priority[rows, choice] > 0)
         done = (bound <= self.target) | ~splittable
         self._settle(bound[done])
-        lo, hi, bound, cut = (x[~done] for x in (lo, hi, bound, cut))
+        lo, hi, bound, middle = (x[~done] for x in (lo, hi, bound, middle))
         choice = choice[~done]
         rows = np.arange(len(lo))
         left_hi, right_lo = hi.copy(), lo.copy()
-        left_hi[rows, choice], right_lo[rows, choice] = cut, cut
+        left_hi[rows, choice], right_lo[rows, choice] = middle, middle
         return np.concatenate([lo, right_lo]), np.concatenate([left_hi, hi]), np.concatenate([bound, bound])
 
     def _widened(self, estimate: Estimate, lo: Array, hi: Array) -> Estimate:
@@ -272,12 +267,14 @@ class _Search:
     def _settle(self, bound: Array) -> None:
         self.settled = max(self.settled, float(bound.max(initial=-np.inf)))
 
-    def _probe(self, points: Array) -> None:
+    def _probe(self, points: Array) -> Steps[None]:
         """Raise `below` by values at points proven to lie in the domain."""
-        lo, hi = self.domain.inside(self.variables, points)
+        yield (moved := Inside(self.variables, points))
+        lo, hi = moved.answer
         if not len(lo):
             return
-        values = self.objective.lower(lo[:, : self.own], hi[:, : self.own])
+        yield (values_at := Values(lo[:, : self.own], hi[:, : self.own]))
+        values = values_at.answer
         best = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[best] > self.below:
             self.below = float(values[best])
@@ -307,9 +304,9 @@ class _Part:
     def __call__(self, boxes: _Boxes) -> _Held:
         """What the boxes hold."""
         with np.errstate(all="ignore"):
-            search = _Search(self.objective, self.domain, self.effort)
+            search = Search(self.objective, self.domain, self.effort)
             search.below, search.extent = self.below, self.extent
-            _, _, bound = search.search(*boxes)
+            _, _, bound = answered(search.search(*boxes), self.objective, self.domain)
         above = float(max(search.settled, bound.max(initial=-np.inf)))
         return _Held(below=search.below, above=above, at=search.at, boxes=search.count)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array, up
 from tubecert.enclosure.linalg import finite, norm_bound, product, spectral_norm_midrad
-from tubecert.enclosure.objective import Estimate, estimate_of
+from tubecert.enclosure.objective import Estimate, Target, estimate_of
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
 
@@ -24,7 +24,7 @@ class Dependence:
         self._function = MatrixFunction([matrix])
         self.variables = self._function.variables
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The norm is convex in B: that of the affine part at its vertices, plus what the rest adds."""
         e = self._function.expand(lo, hi)
         R = _left_inverse(e.mid[0].mean(axis=1))[:, None]

@@ -6,6 +6,8 @@ floats such that T W T' is nearly the identity. Being linear in v, the bound sta
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, sqrt
@@ -18,7 +20,7 @@ from tubecert.enclosure.linalg import (
     spectral_norm_midrad,
     whitening,
 )
-from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.objective import Estimate, Target
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
 
@@ -29,7 +31,12 @@ class MetricNorm:
         self._function = MatrixFunction([v, W], fixed=fixed)
         self.variables = self._function.variables
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The matrices."""
+        return self._function.made_of
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """|T v| at the vertices plus what the rest adds, over the root of the least eigenvalue of T W T'."""
         e = self._function.expand(lo, hi)
         v, W = e.mid

@@ -5,9 +5,9 @@ Everything here is rigorous except `Estimate.corner`, `caused` and `spread`, whi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from tubecert.enclosure.linalg import (
     whitening,
 )
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
+
+Target: TypeAlias = float | Array
+"""What a box need not be shown to stay below further: a number, or one for every box (N,), all finite or none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +48,7 @@ class Objective(Protocol):
 
     variables: tuple[str, ...]
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """Bounds from above over boxes; a box that can be shown to stay below `target` is given such a bound."""
         ...
 
@@ -60,6 +63,16 @@ def size_of(objective: Objective) -> int:
     return function.size if isinstance(function, MatrixFunction) else 1
 
 
+@runtime_checkable
+class Comparable(Protocol):
+    """An objective that can be told to be the same function as another one, bound by bound."""
+
+    @property
+    def made_of(self) -> Hashable:
+        """What every bound follows from, beside the class."""
+        ...
+
+
 class SumOfNorms:
     """sum_k |G_k(x)| in the spectral norm (of a column: the Euclidean norm)."""
 
@@ -68,7 +81,12 @@ class SumOfNorms:
         self.variables = self._function.variables
         self.is_zero = self._function.is_zero
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The matrices."""
+        return self._function.made_of
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """Norm of the affine part at its vertices plus the norm of the rest."""
         e = self._function.expand(lo, hi)
         value = np.zeros(e.mid[0].shape[:2])
@@ -112,7 +130,13 @@ class _Branches:
         used = {*self._arguments.variables}.union(*(norm.variables for norm in norms))
         self.variables = tuple(sorted(used))
 
-    def upper(self, variables: tuple[str, ...], lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The arguments, and the Jacobian of every choice of signs."""
+        norms = tuple((signs, None if norm is None else norm.made_of) for signs, norm in self._norms)
+        return self._arguments.made_of, norms
+
+    def upper(self, variables: tuple[str, ...], lo: Array, hi: Array, target: Target) -> Estimate:
         """The largest branch of every box; corners are centres, as the Jacobian is not known on a kink."""
         value, caused, spread = np.zeros(len(lo)), np.zeros(lo.shape), np.zeros(lo.shape)
         columns = np.array([variables.index(v) for v in self._arguments.variables], dtype=np.intp)
@@ -161,7 +185,13 @@ class Lipschitz:
         self.variables = tuple(sorted({*self._function.variables, *more}))
         self._columns = [self.variables.index(v) for v in self._function.variables]
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The matrices of every level, and those of the branches."""
+        branches = None if self._branches is None else self._branches.made_of
+        return self._function.made_of, tuple(self._gains), branches
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The smallest of the natural bound, the structural one and that by branches."""
         matrices = self._function.at(lo[:, self._columns], hi[:, self._columns])
         natural, *rest = (spectral_norm(g).hi for g in matrices)
@@ -175,7 +205,7 @@ class Lipschitz:
         return whole if self._branches is None else self._closer(whole, self._branches, (lo, hi), target)
 
     def _closer(
-        self, whole: Estimate, branches: _Branches, box: tuple[Array, Array], target: float
+        self, whole: Estimate, branches: _Branches, box: tuple[Array, Array], target: Target
     ) -> Estimate:
         """The bound by branches, where it is the smaller one; there it is known what to split."""
         own = branches.upper(self.variables, *box, target)
@@ -223,7 +253,7 @@ class LeastInputGain:
         positive = Interval(np.where(scaled.lo[:, 0] > 0, scaled.lo[:, 0], np.nan), scaled.hi[:, -1])
         return (Interval(np.maximum(least.lo, 0.0), least.hi) / positive).sanitised()
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """Minus the smallest value over the box."""
         value = -np.maximum(self._range(lo, hi).lo, 0.0)
         width = hi - lo

@@ -8,8 +8,8 @@ Everything here is rigorous except the guesses, the congruence, and what steers 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from tubecert.enclosure.linalg import (
     quadratic_form,
     whitening,
 )
-from tubecert.enclosure.objective import Estimate, Objective, edges, estimate_of
+from tubecert.enclosure.objective import Comparable, Estimate, Objective, Target, edges, estimate_of
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 from tubecert.expression import ONE, Expression
 from tubecert.expression.matrix import identity
@@ -42,11 +42,13 @@ class Weights:
     its entries. If N <= tau D holds, tau >= 0, for the sums with each of the E ends, it holds over the whole range of
     the variables. At a point, they are within 4e-15 of the exact ones, or those of D are 0.
     `loss(lo, hi)`: how much of D is lost by that, relative, for each variable (N, d); it only steers the search.
+    `made_of`: what tells these weights from others of the same variables.
     """
 
     variables: tuple[str, ...]
     ends: Callable[[Array, Array], Sequence[Array]]
     loss: Callable[[Array, Array], Array]
+    made_of: Hashable = field(default_factory=object)
 
 
 class Pencil:
@@ -61,7 +63,12 @@ class Pencil:
         self._function = MatrixFunction([numerator, denominator], fixed=fixed)
         self._own = self.variables = self._function.variables
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The matrices and their weights."""
+        return self._function.made_of, self._top, None if self._weights is None else self._weights.made_of
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """`target` where N <= target D is proven at once, else the bound that the excess over it gives."""
         own = len(self._own)
         e = self._function.expand(lo[:, :own], hi[:, :own])
@@ -71,10 +78,11 @@ class Pencil:
         numerator = _weighted(weights[:top], e.mid[:top], rad[:top])
         denominator = _weighted(weights[top:], e.mid[top:], rad[top:])
         t = self._frame(hi, e.mid)
-        tested = target if np.isfinite(target) else _guess(t, numerator)
+        known = bool(np.all(np.isfinite(target)))
+        tested = np.reshape(target, (-1, 1)) if known else _guess(t, numerator)
         excess, above = _bound(t, numerator, denominator, tested)
         value = above.max(axis=1)
-        if np.isfinite(target):
+        if known:
             # a T that is singular proves nothing: 0 is an eigenvalue then, and its bound is rounded above 0
             value = np.where((excess <= 0).all(axis=1), np.fmin(target, value), value)
         if self._weights is not None:
@@ -82,14 +90,12 @@ class Pencil:
         # of the ends of the weights, the worst counts for the search
         excess, above = (x.reshape(len(lo), ends, -1).max(axis=1) for x in (excess, above))
         estimate = estimate_of(above, self._caused(t, e, target, weights), e, lo[:, :own], hi[:, :own])
-        worst = np.argmax(
-            np.where(np.isnan(excess), -np.inf, excess) if np.isfinite(target) else above, axis=1
-        )
+        worst = np.argmax(np.where(np.isnan(excess), -np.inf, excess) if known else above, axis=1)
         corner = np.where(e.signs[worst] > 0, hi[:, :own], lo[:, :own])
         corner = np.where(e.signs[worst] == 0, 0.5 * (lo + hi)[:, :own], corner)
         loss = np.zeros((len(lo), 0))
         if self._weights is not None:
-            loss = _scale(target) * self._weights.loss(lo[:, own:], hi[:, own:])
+            loss = np.reshape(_scale(target), (-1, 1)) * self._weights.loss(lo[:, own:], hi[:, own:])
         return Estimate(
             value,
             np.concatenate([corner, 0.5 * (lo + hi)[:, own:]], axis=1),
@@ -124,7 +130,7 @@ class Pencil:
         mid, _ = _weighted(self._ends(hi, hi)[self._top :], mids[self._top :], mids[self._top :])
         return whitening(mid.mean(axis=1))[:, None]
 
-    def _caused(self, t: Array, e: Expansion, target: float, weights: list[Array]) -> Array:
+    def _caused(self, t: Array, e: Expansion, target: Target, weights: list[Array]) -> Array:
         """How much each variable's rest adds to the excess, (d, N)."""
         caused = np.zeros((e.signs.shape[1], len(t)))
         for k, weight in enumerate(weights):
@@ -159,12 +165,21 @@ class FirstFinite:
         self.variables = first.variables
         self._order = [first.variables.index(v) for v in second.variables]
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """Both; what cannot be compared is like itself only."""
+        return tuple(
+            (type(each), each.made_of) if isinstance(each, Comparable) else each
+            for each in (self._first, self._second)
+        )
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The first bound, or the second."""
         found = self._first.upper(lo, hi, target)
         missing = np.isinf(found.upper)
         if missing.any():
-            other = self._second.upper(lo[missing][:, self._order], hi[missing][:, self._order], target)
+            own = target[missing] if isinstance(target, np.ndarray) and target.ndim else target
+            other = self._second.upper(lo[missing][:, self._order], hi[missing][:, self._order], own)
             found.upper[missing] = other.upper
         return found
 
@@ -194,7 +209,12 @@ class SumOfPencils:
         self._function = MatrixFunction([denominator, *numerators])
         self.variables = self._function.variables
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    @property
+    def made_of(self) -> Hashable:
+        """The matrices."""
+        return self._function.made_of
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """For each i a value is guessed at the vertices, and bounded by what +-N_i exceed it."""
         e = self._function.expand(lo, hi)
         filled = _filled(e)
@@ -239,7 +259,7 @@ def scalar(e: Expression, fixed: frozenset[str] = frozenset()) -> Pencil:
 # -- bounds at the vertices ------------------------------------------------------------------------------------
 
 
-def _bound(t: Array, numerator: Ball, denominator: Ball, tau: float | Array) -> tuple[Array, Array]:
+def _bound(t: Array, numerator: Ball, denominator: Ball, tau: Target) -> tuple[Array, Array]:
     """(e, tau'): T (N - tau D) T' <= e I and N <= tau' D at every vertex, each (N, V); inf where nothing is proven."""
     level = np.broadcast_to(np.asarray(tau, dtype=float), numerator[0].shape[:2])
     scale = level[..., None, None]
@@ -311,8 +331,8 @@ def _weighted(weights: Sequence[Array], mids: Sequence[Array], rads: Sequence[Ar
 # -- what steers the search ------------------------------------------------------------------------------------
 
 
-def _scale(target: float) -> float:
-    return abs(target) if np.isfinite(target) else 1.0
+def _scale(target: Target) -> Target:
+    return np.abs(target) if np.all(np.isfinite(target)) else 1.0
 
 
 def _whitened_rest(t: Array, e: Expansion, k: int) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, finite, midrad, product, whitening
-from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.objective import Estimate, Target
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
 
@@ -28,31 +28,32 @@ class ProjectedPencil:
         self._inputs = inputs
         self.variables = tuple(sorted({*self._function.variables, *self._projector.variables}))
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """`target` where Finsler's condition is proven over the box, inf elsewhere."""
+        tau = float(target)
         own = [self.variables.index(v) for v in self._function.variables]
         e = self._function.expand(lo[:, own], hi[:, own])
         centre = [mid.mean(axis=1) for mid in e.mid]
         t = whitening(centre[1])[:, None]
-        s = _multiplier(centre, target, self._inputs)[:, None, None, None]
+        s = _multiplier(centre, tau, self._inputs)[:, None, None, None]
         filled = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
-        mid = e.mid[0] - target * e.mid[1] - s * e.mid[2]
-        size = np.abs(e.mid[0]) + abs(target) * np.abs(e.mid[1]) + s * np.abs(e.mid[2])
+        mid = e.mid[0] - tau * e.mid[1] - s * e.mid[2]
+        size = np.abs(e.mid[0]) + abs(tau) * np.abs(e.mid[1]) + s * np.abs(e.mid[2])
         # mid: two products, two differences, 4 u of `size` (itself short by 4 u); 1e-15 > 9 u. Radii as in `pencil`
-        rad = (filled[0] + abs(target) * filled[1] + s * filled[2]) * (1 + 1e-14) + 1e-15 * size
+        rad = (filled[0] + abs(tau) * filled[1] + s * filled[2]) * (1 + 1e-14) + 1e-15 * size
         excess = eigenvalues_midrad(*congruence(t, mid, rad)).hi[..., -1]
-        proven = (excess <= 0).all(axis=1) if np.isfinite(target) else np.zeros(len(lo), dtype=bool)
+        proven = (excess <= 0).all(axis=1) if np.isfinite(tau) else np.zeros(len(lo), dtype=bool)
         worst = np.argmax(np.where(np.isnan(excess), -np.inf, excess), axis=1)
         signs = np.zeros(lo.shape)
         signs[:, own] = e.signs[worst]
         corner = np.where(signs > 0, hi, np.where(signs < 0, lo, 0.5 * (lo + hi)))
         caused = np.zeros(lo.shape)
         abs_t = np.abs(t)
-        for k, weight in ((0, 1.0), (1, abs(target)), (2, s[..., 0, 0])):
+        for k, weight in ((0, 1.0), (1, abs(tau)), (2, s[..., 0, 0])):
             scaled = abs_t @ e.rest[k] @ np.swapaxes(abs_t, -1, -2)
             caused[:, own] += (weight * scaled.sum(axis=(-2, -1))).max(axis=2).T
         caused = np.where(np.isfinite(caused), caused, np.finfo(float).max)
-        return Estimate(np.where(proven, target, np.inf), corner, caused, caused)
+        return Estimate(np.where(proven, tau, np.inf), corner, caused, caused)
 
     def lower(self, lo: Array, hi: Array) -> Array:
         """Rayleigh quotients of proposed vectors, projected onto the null space with intervals."""

@@ -21,7 +21,7 @@ from tubecert.coordinates import Fields
 from tubecert.enclosure.forms import Form, Forms, contract, least_norm, stacked, thin, unfolded_norm
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import norm_bound, whitening
-from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.objective import Estimate, Target
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, column, differentiate, jacobian
 from tubecert.metric.geodesic import alternating, contracted
@@ -109,7 +109,7 @@ class MetricTensorNorm:
         frame = frame_of(W)
         return frame, self._tensor(frame, others)
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The norm of the affine part at its vertices plus that of the rest."""
         parts = [
             self._upper(lo[i : i + self._most], hi[i : i + self._most]) for i in range(0, len(lo), self._most)

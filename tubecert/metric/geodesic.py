@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.coordinates import Fields
-from tubecert.enclosure.branch_and_bound import Domain, Effort, Supremum, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import (
@@ -33,7 +33,8 @@ from tubecert.enclosure.linalg import (
     spectral_norm_midrad,
     whitening,
 )
-from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.objective import Estimate, Target
+from tubecert.enclosure.questions import Domain
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO
 
@@ -165,7 +166,7 @@ class SymbolNorm:
         norms = [spectral_norm_midrad(_unfold(mid, axes), _unfold(rad, axes)) for axes in rows]
         return Interval(np.min([x.lo for x in norms], axis=0), np.min([x.hi for x in norms], axis=0))
 
-    def upper(self, lo: Array, hi: Array, target: float) -> Estimate:
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The bound over boxes; every variable counts by its width.
 
         For Gamma the smaller of the direct bound and of |Gamma(c)| + |x - c| sup |dGamma|, c the centre.

@@ -5,14 +5,17 @@ In: what is bounded over the whole tube; radii that a search proposes. Out: the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
+from typing import TypeAlias, TypeVar
 
 from tubecert.bounds.constants import BoundConstants, ResidualConstants, WindConstants
 from tubecert.bounds.covariant import CovariantConstants, covariant_constants
 from tubecert.bounds.hardware import hardware_constants
+from tubecert.bounds.parts import Parts
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.bounds.windows import less, part_constants
@@ -21,10 +24,17 @@ from tubecert.conditions.problem import Part
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import printable_above
 from tubecert.expression import number_text
+from tubecert.records import Json
 from tubecert.spec.windows import pad_of, windows_of
 from tubecert.stages.bounded import Bounded, any_such
 from tubecert.stages.machine import ranges_of
 from tubecert.trajectory.during import during
+
+T = TypeVar("T")
+Tube: TypeAlias = tuple[tuple[Fraction, Fraction], Fraction]
+"""A part of the plan, from and to in s, and the radius around it."""
+Over: TypeAlias = tuple[Tube, Suprema, Json]
+"""A tube, what is searched over it, and what that follows from."""
 
 
 def with_windows(bounded: Bounded, radii: Sequence[Fraction], gap: float | None = None) -> Bounded:
@@ -35,21 +45,29 @@ def with_windows(bounded: Bounded, radii: Sequence[Fraction], gap: float | None 
     machine, ends = bounded.machine, windows_of(bounded.question.spec)
     if machine is None or not ends:
         return bounded
-    parts, effort = _tubes(bounded, radii), _effort(bounded, gap)
-    found = [_window(bounded, machine, part, rho, effort) for part, rho in parts]
-    return replace(bounded, machine=replace(machine, windows=tuple(found)))
+    pad, noise = pad_of(machine.asked), machine.asked.noise
+    asked = _tubes(bounded, radii)
+    tubes = [((max(Fraction(0), begin - pad), end), rho) for (begin, end), rho in asked]
+    follows = bounded.enclosed.closely | {
+        "noise": [*map(number_text, noise if isinstance(noise, tuple) else ())],
+        "held": machine.asked.held,
+    }
+    over = _over(bounded, tubes, gap, follows)
+    found = _remembered(bounded, "window", over, partial(_window, bounded, machine))
+    windows = tuple(replace(w, begin=begin) for w, ((begin, _), _) in zip(found, asked, strict=True))
+    return replace(bounded, machine=replace(machine, windows=windows))
 
 
 def with_parts(bounded: Bounded, radii: Sequence[Fraction], gap: float | None = None) -> Bounded:
     """Theorems BW and CW are asked for, in the same way."""
     if not windows_of(bounded.question.spec):
         return bounded
-    effort = _effort(bounded, gap)
-    found = [_part(bounded, part, rho, effort) for part, rho in _tubes(bounded, radii)]
+    over = _over(bounded, _tubes(bounded, radii), gap, {})
+    found = _remembered(bounded, "part", over, partial(_part, bounded))
     return replace(bounded, parts=tuple(found))
 
 
-def _tubes(bounded: Bounded, radii: Sequence[Fraction]) -> list[tuple[tuple[Fraction, Fraction], Fraction]]:
+def _tubes(bounded: Bounded, radii: Sequence[Fraction]) -> list[Tube]:
     """Begin and end of every window, with its radius."""
     parts = list(pairwise(windows_of(bounded.question.spec)))
     if len(radii) != len(parts) or not all(0 < rho <= bounded.enclosed.tube.rho for rho in radii):
@@ -57,14 +75,39 @@ def _tubes(bounded: Bounded, radii: Sequence[Fraction]) -> list[tuple[tuple[Frac
     return list(zip(parts, radii, strict=True))
 
 
-def _effort(bounded: Bounded, gap: float | None) -> Effort:
-    effort = bounded.enclosed.suprema.effort
-    return effort if gap is None else replace(effort, gap=max(effort.gap, gap))
-
-
-def _suprema(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort) -> Suprema:
-    """Over a part of the plan."""
+def _over(bounded: Bounded, tubes: Sequence[Tube], gap: float | None, follows: Json) -> list[Over]:
+    """What is searched over each tube; `follows`: from what constants follow beside it."""
     enclosed = bounded.enclosed
+    effort = enclosed.suprema.effort
+    effort = effort if gap is None else replace(effort, gap=max(effort.gap, gap))
+    found = []
+    for part, radius in tubes:
+        own = {
+            "part": [number_text(t) for t in part],
+            "radius": number_text(radius),
+            "closeness": str(effort.gap),
+        }
+        tube = part, radius
+        found.append((tube, _suprema(bounded, tube, effort), enclosed.tube.ground | follows | own))
+    return found
+
+
+def _remembered(
+    bounded: Bounded, name: str, over: Sequence[Over], compute: Callable[[Tube, Suprema], T]
+) -> list[T]:
+    """What is computed over each tube; what is not known yet, side by side."""
+    memory = bounded.question.memory
+    new = [suprema for _, suprema, ground in over if not memory.knows(name, ground)]
+    together = Parts(bounded.enclosed.tube.plan, new)
+    return [
+        memory.recall(name, ground, partial(compute, tube, replace(suprema, parts=together)))
+        for tube, suprema, ground in over
+    ]
+
+
+def _suprema(bounded: Bounded, tube: Tube, effort: Effort) -> Suprema:
+    """Over a part of the plan."""
+    enclosed, (part, radius) = bounded.enclosed, tube
     return replace(
         enclosed.suprema,
         plan=during(enclosed.tube.plan, *part),
@@ -74,27 +117,15 @@ def _suprema(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction
     ).with_radius(radius)
 
 
-def _part(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort) -> Part:
-    ground = {
-        "part": [number_text(t) for t in part],
-        "radius": number_text(radius),
-        "closeness": str(effort.gap),
-    }
-    return bounded.question.memory.recall(
-        "part",
-        bounded.enclosed.tube.ground | ground,
-        lambda: _known(bounded, part, radius, _suprema(bounded, part, radius, effort)),
-    )
-
-
-def _known(bounded: Bounded, part: tuple[Fraction, Fraction], radius: Fraction, suprema: Suprema) -> Part:
+def _part(bounded: Bounded, tube: Tube, suprema: Suprema) -> Part:
     """Every constant of theorems B and C over a part of the plan."""
     question, problem = bounded.question, bounded.enclosed.problem
     constants = part_constants(suprema, question.start, problem.constants, question.declared_uncertainty)
     wind, residual = _beside(bounded, suprema, constants)
+    (begin, end), radius = tube
     return Part(
-        begin=part[0],
-        end=part[1],
+        begin=begin,
+        end=end,
         radius=radius,
         constants=constants,
         wind=wind,
@@ -116,42 +147,16 @@ def _beside(
     )
 
 
-def _window(
-    bounded: Bounded, machine: Machine, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort
-) -> Window:
-    """One window; what it looks back at is as long as the machine of the specification makes it."""
-    question = bounded.question
-    begin, end = part
-    since = max(Fraction(0), begin - pad_of(machine.asked))
-    noise = machine.asked.noise if isinstance(machine.asked.noise, tuple) else ()
-    found = question.memory.recall(
-        "window",
-        bounded.enclosed.tube.ground
-        | bounded.enclosed.closely
-        | {
-            "noise": [*map(number_text, noise)],
-            "held": machine.asked.held,
-            "part": [number_text(t) for t in (since, end)],
-            "radius": number_text(radius),
-            "closeness": str(effort.gap),
-        },
-        lambda: _bounded(bounded, machine, (since, end), radius, effort),
-    )
-    return replace(found, begin=begin)
-
-
-def _bounded(
-    bounded: Bounded, machine: Machine, part: tuple[Fraction, Fraction], radius: Fraction, effort: Effort
-) -> Window:
-    """Every constant over a part of the plan."""
-    question, problem, since = bounded.question, bounded.enclosed.problem, part[0]
-    suprema = _suprema(bounded, part, radius, effort)
+def _window(bounded: Bounded, machine: Machine, tube: Tube, suprema: Suprema) -> Window:
+    """Every constant over what a window looks back at, which is as long as the machine asked for makes it."""
+    question, problem = bounded.question, bounded.enclosed.problem
+    (since, end), radius = tube
     constants = part_constants(suprema, question.start, problem.constants, question.declared_uncertainty)
     own = hardware_constants(suprema, any_such(machine.asked), bounded.geodesics, constants)
     wind, residual = _beside(bounded, suprema, constants)
     return Window(
         begin=since,
-        end=part[1],
+        end=end,
         since=since,
         radius=radius,
         constants=constants,

@@ -48,10 +48,11 @@ class Section(Protocol):
 
 
 class Ball:
-    """|x - x*| <= rho."""
+    """|x - x*| <= rho; with radii (N,), each row of boxes has its own."""
 
-    def __init__(self, rho: float) -> None:
-        self._rho = rho
+    def __init__(self, rho: float | Array) -> None:
+        self.rho = rho
+        self._rho = np.reshape(rho, (-1, 1))  # of a row, or of all
 
     def cut(self, which: list[int], lo: Array, hi: Array, centre: Interval) -> Cut:
         """Every coordinate, by the gaps between box and plan in all others."""
@@ -80,13 +81,13 @@ class Ball:
         distance = (Interval.exact(moved) - centre) ** 2
         # a sum of at most 32 terms that are bounds already, as in `cut`
         total = distance.hi.sum(axis=1) * (1 + 1e-14)
-        return moved, total <= down(np.square(self._rho))
+        return moved, total <= down(np.square(self._rho[:, 0]))
 
     def crosses(self, which: list[int], lo: Array, hi: Array, centre: Interval) -> NDArray[np.bool_]:
         """By the farthest corner."""
         del which
         far = np.maximum(np.abs(hi - centre.lo), np.abs(lo - centre.hi))
-        crossing: NDArray[np.bool_] = np.sum(far * far, axis=1) > self._rho**2
+        crossing: NDArray[np.bool_] = np.sum(far * far, axis=1) > np.square(self._rho[:, 0])
         return crossing
 
 
