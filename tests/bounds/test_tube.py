@@ -315,11 +315,11 @@ def test_a_cut_of_one_per_cent_too_much_is_noticed(monkeypatch):
     honest = Tube.contract
 
     def contract(self, variables, lo, hi):
-        self._section, section = Ball(0.99 * 0.5), self._section
+        self.section, section = Ball(0.99 * 0.5), self.section
         try:
             return honest(self, variables, lo, hi)
         finally:
-            self._section = section
+            self.section = section
 
     monkeypatch.setattr(Tube, "contract", contract)
     _, _, alive = tube_of("rest", 0.5).contract(

@@ -93,15 +93,18 @@ def test_constants_of_a_window_hold_in_it_and_before(bounded):
 
 
 @pytest.mark.slow
-def test_windows_are_bounded_side_by_side_as_one_by_one(monkeypatch):
-    def windows():
-        question = question_of(load_text(MOVING, "spec.yaml"), Options(gap=F(1, 5)))
-        found = bound(enclose(tube(plan(prove_metric(question)))))
-        return with_windows(found, [F(1, 10), F(1, 20), F(1, 20)]).machine.windows
+def test_windows_are_bounded_side_by_side_as_one_by_one(bounded, monkeypatch):
+    """The same bounds; where a value was found may differ in its last digit, as numpy may round alone and in rows."""
 
-    at_once = windows()
+    def bounds():
+        windows = with_windows(bounded, [F(1, 10), F(1, 20), F(1, 20)], gap=0.2).machine.windows
+        found = [(*w.constants.items(), *w.machine.items()) for w in windows]
+        return [(name, value.below, value.above) for each in found for name, value, _ in each if value]
+
+    at_once = bounds()
+    bounded.question.memory.kept.clear()
     monkeypatch.setattr("tubecert.bounds.parts.Parts._leads", lambda self, own: False)
-    assert windows() == at_once
+    assert bounds() == at_once
 
 
 @pytest.mark.slow

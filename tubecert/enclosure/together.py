@@ -1,7 +1,8 @@
 """Suprema of one objective over several domains, searched side by side.
 
 Most searches have few boxes at a time, so that an evaluation costs what its calls cost. What several of them ask is
-evaluated at once, row by row; each gets the answer, and comes to the result, that it would have alone. Trusted: yes.
+evaluated at once, row by row; each gets the answer, and comes to the result, that it would have alone, but for last
+digits where numpy rounds a row alone in another way than among others: either is a bound. Trusted: yes.
 """
 
 from __future__ import annotations
