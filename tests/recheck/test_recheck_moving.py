@@ -122,8 +122,7 @@ def test_a_longer_horizon_is_not_confirmed():
     "change",
     [
         lambda e: e["system"].update(B=[["0.001*t"], ["1"]]),
-        lambda e: e.update(disturbance={"E": [["1"], ["0"]], "bound": "0"}),
-        lambda e: e["system"]["parameters"].update(c=["1", "2"]),
+        lambda e: e["tube"].update(windows=["1"]),
     ],
 )
 def test_what_no_theorem_covers_is_refused(change):
@@ -246,3 +245,82 @@ def test_knots_know_their_time(tmp_path):
 def test_what_has_no_common_period_needs_a_horizon(h):
     with pytest.raises(SpecError, match="so a trajectory with a horizon is needed"):
         load_text(PERIODIC.replace("0.1*sin(3/2*t)", h))
+
+
+# -- a wind and parameters known by ranges, beside an f that depends on t (theory 4e.4)
+
+UNKNOWN = (
+    PERIODIC.replace("inputs: [u]", "inputs: [u]\n  parameters: {c: [0.8, 1.2]}")
+    .replace('"-x + y + 0.1*sin(2*t)*x", "-y + 0.2*cos(3*t)"', '"-x + y + 0.1*c*sin(2*t)", "-y + c*cos(t)*x"')
+    .replace("sin(3/2*t)", "sin(3*t)")
+    + 'disturbance: {E: [["0.1"], ["1"]], bound: 0.02, rate: 0.5}\nconditions: {decides: B}\n'
+)
+DECLARED = UNKNOWN.replace('h: ["0.1*sin(3*t)"]', "bounds: {h: 0.1, h_x: 0, h_t: 0.3}")
+
+
+def unknown(text=UNKNOWN):
+    return copy.deepcopy(certified(text, conditions="distance"))
+
+
+@pytest.mark.slow
+def test_what_is_not_known_of_f_moves_in_time():
+    """With c = 1 in the middle, h is 0.1 sin 3t + (c - 1) cos(t) x + w and r = (0.1 (c - 1) sin 2t, 0)."""
+    document = unknown()
+    result = document["result"]
+    assert result["claim"]["period"] == "2*pi"
+    rho = float(result["tube"]["rho"])
+    t, x = np.meshgrid(np.linspace(0, 2 * np.pi, 2001), np.linspace(-rho, rho, 41))
+    for name, most in (
+        ("h", 0.02 + max(np.abs(0.1 * np.sin(3 * t) + s * 0.2 * np.cos(t) * x).max() for s in (1, -1))),
+        ("h_t", 0.5 + max(np.abs(0.3 * np.cos(3 * t) - s * 0.2 * np.sin(t) * x).max() for s in (1, -1))),
+        ("h_x", 0.2),
+        ("residual_size", 0.02),
+    ):
+        below, above = value(document, name)
+        assert 0.98 * below <= most <= above * (1 + 1e-9) <= most * 1.02
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+def test_a_declared_rate_of_h_does_not_hide_that_of_f():
+    document = unknown(DECLARED)
+    rho = float(document["result"]["tube"]["rho"])
+    most = 0.3 + 0.5 + 0.2 * rho
+    assert most <= value(document, "h_t")[1] <= 1.01 * most
+    assert failing(examine(document)) == []
+    document["result"]["constants"]["h_t"] |= {"above": 0.8 + 0.19 * rho, "below": 0.0}
+    assert any(name.startswith("h_t") for name, _ in failing(examine(sealed(document))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda e: e["system"].update(f=["-x + y + 0.1*c*sin(2*t)", "-y + c*cos(4*t)*x"]),
+        lambda e: e["system"].update(f=["-x + y + 0.11*c*sin(2*t)", "-y + c*cos(t)*x"]),
+        lambda e: e["system"].update(f=["-x + y + 0.1*c*sin(2*t)", "-y + cos(c*t)*x"]),
+    ],
+    ids=["frequency", "residual", "an unknown frequency"],
+)
+def test_another_unknown_part_is_not_confirmed(change):
+    document = respecified(unknown(), change)
+    try:
+        assert failing(examine(document))
+    except TubecertError as error:  # no period is to be seen
+        assert "period" in str(error)  # noqa: PT017
+
+
+def test_a_part_of_f_that_is_unknown_alone_depends_on_time():
+    """At c = 1, the middle, nothing moves: C2 has no t, h has."""
+    text = UNKNOWN.replace("c*sin(2*t)", "(c - 1)*sin(2*t)").replace("c*cos(t)", "(c - 1)*cos(t)")
+    spec = load_text(text)
+    assert build(spec).time is not None
+    assert returned(text.replace("cos(t)", "cos(c*t)")) == "no period"
+
+
+def returned(text):
+    try:
+        load_text(text)
+    except SpecError as error:
+        return "no period" if "without a period" in str(error) else str(error)
+    return ""

@@ -19,7 +19,7 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Fields
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.pencil import Pencil
-from tubecert.expression import ZERO, Expression, constant, derivatives, is_zero
+from tubecert.expression import ZERO, Expression, constant, derivatives, free_symbols, is_zero
 from tubecert.expression.matrix import Matrix, column, combine, multiply, transpose
 from tubecert.model import TIME
 
@@ -193,7 +193,12 @@ def uncertainty_constants(
     first, slope, by_time = (declared.get(name) for name in ("h", "h_x", "h_t"))
     whole = size("h", total) if first is None else _sum(first, size("h", known))
     lipschitz = suprema.lipschitz(total) if slope is None else _sum(slope, suprema.lipschitz(known))
-    in_time = suprema.norms("h_t", [column(derivatives(total, TIME))]) if by_time is None else by_time
+    if by_time is None:
+        in_time = suprema.norms("h_t", [column(derivatives(total, TIME))])
+    elif TIME in free_symbols(known):
+        in_time = _sum(by_time, suprema.norms("h_t", [column(derivatives(known, TIME))]))
+    else:
+        in_time = by_time
     if blown:
         lipschitz = grown(lipschitz, suprema.norms("h_x", suprema.fields.slopes(blown)))
         in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.made)]))

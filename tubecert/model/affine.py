@@ -199,7 +199,7 @@ def _time_of(spec: Spec) -> Range | None:
 
     The reader takes no f that has neither.
     """
-    if TIME not in free_symbols(term.expression for term in spec.f):
+    if TIME not in free_symbols(term.expression for term in spec.drift or spec.f):
         return None
     if spec.trajectory.horizon is not None:
         return Fraction(0), spec.trajectory.horizon
@@ -210,8 +210,8 @@ def _time_of(spec: Spec) -> Range | None:
 
 
 def moving_parts(spec: Spec) -> list[Expression]:
-    """What may depend on t for all time, h and f, and what must hold for them to be defined."""
-    terms = [*(spec.uncertainty.h or ()), *spec.f]
+    """What may depend on t for all time, h and f of the plant, and what must hold for them to be defined."""
+    terms = [*(spec.uncertainty.h or ()), *(spec.drift or spec.f)]
     owed = (duty.argument for term in terms for duty, _ in term.owed())
     return [*(term.expression for term in terms), *owed]
 

@@ -19,7 +19,7 @@ from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Matrix, Rows, Term, matrix_replaced, number, variable
+from tubecert.recheck.terms import Matrix, Rows, Term, matrix_replaced, names, number, variable
 from tubecert.recheck.tube import Tube
 
 
@@ -75,7 +75,7 @@ class Place:
     @property
     def _clock(self) -> dict[str, Term]:
         """The time in f by the s of the plan: since a knot, or the same for a plan of one part that begins at 0."""
-        if not self.system.varies:
+        if TIME not in names(e for row in self.system.f for e in row):
             return {}
         parts = self.curve.parts
         if self.when is None and all(SINCE in part.values for part in parts):

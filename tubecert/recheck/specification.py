@@ -115,7 +115,7 @@ def read_specification(node: Node) -> Specification:
 
 def _moving(own: Members, found: Specification) -> None:
     """What an f that depends on t goes with: theorems 0, A, B and C along a plan that is not searched for."""
-    alone = found.hardware is None and found.disturbance is None and not (found.plant.ranges or found.windows)
+    alone = found.hardware is None and not found.windows
     known = not isinstance(found.trajectory, Planned) and isinstance(found.metric, Metric)
     if found.trajectory.horizon is None:
         try:

@@ -286,8 +286,6 @@ def _beside_moving(
     """What no theorem is stated for where f depends on t; `waves` is all that does."""
     plan, tube, synthesis = parts
     yield "hardware" in sections, "which certificate H is not stated for"
-    yield "disturbance" in sections, "which is not covered beside a disturbance"
-    yield bool(names.ranges), "which is not covered beside parameters known by ranges"
     yield tube is not None and tube.windows is not None, "which is not covered beside tube.windows"
     yield plan.task is not None, f"and plans of the kind {plan.kind} are not found for that"
     lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
