@@ -244,11 +244,11 @@ def no_radius(self, key, radius):
 
 
 def one_side(self):
-    return list(true_corners(self))[:1]
+    return list(true_vertices(self))[:1]
 
 
 def unmixed(self):
-    return true_corners(replace(self, mixed={}))
+    return true_vertices(replace(self, mixed={}))
 
 
 def half_of_what_is_taken(a, b, scale=1):
@@ -261,17 +261,17 @@ def by_trace(a):
 
 true_written, true_divisor = monomials._written, monomials._divisor
 true_plus = pencils.plus
-true_weight, true_corners, true_positive = Field._weight, expansion.Expansion.corners, is_positive
+true_weight, true_vertices, true_positive = Field._weight, expansion.Expansion.vertices, is_positive
 
 BROKEN = {
     "sin^2 = 2 - cos^2": ("monomials", monomials, "_written", without_cosines),
     "powers of divisors": ("monomials", monomials, "_divisor", one_divisor),
     "no third derivatives": ("expansion", Field, "_weight", no_radius),
     "nothing is left": ("expansion", Field, "_variation", lambda *_: iter(())),
-    "no mixed derivatives": ("norms", expansion.Expansion, "corners", unmixed),
-    "a parabola between its ends": ("norms", expansion, "_CURVED", ((-1.0, 1.0), (1.0, 1.0))),
-    "one corner": ("norms", expansion.Expansion, "corners", one_side),
-    "one corner of a symmetric matrix": ("definiteness", expansion.Expansion, "corners", one_side),
+    "no mixed derivatives": ("norms", expansion.Expansion, "vertices", unmixed),
+    "a parabola between its ends": ("norms", expansion, "CURVED", ((-1.0, 1.0), (1.0, 1.0))),
+    "one corner": ("norms", expansion.Expansion, "vertices", one_side),
+    "one corner of a symmetric matrix": ("definiteness", expansion.Expansion, "vertices", one_side),
     "trace and determinant": ("signs", sys.modules[__name__], "is_positive", by_trace),
     "half of the square": ("least gain", pencils, "plus", half_of_what_is_taken),
     "trace and determinant on a box": ("definiteness", statements, "is_positive", by_trace),

@@ -9,13 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import TypeAlias
 
 from flint import arb_mat
 
 from tubecert.recheck.balls import Ball, between, magnitude
 
-_STRAIGHT = ((-1.0, 0.0), (1.0, 0.0))
-_CURVED = ((-1.0, 1.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 1.0))
+Vertices: TypeAlias = tuple[tuple[float, float], ...]  # pairs (d, s)
+
+STRAIGHT: Vertices = ((-1.0, 0.0), (1.0, 0.0))
+CURVED: Vertices = ((-1.0, 1.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,24 +47,19 @@ class Expansion:
             self.rest,
         )
 
-    def corners(self) -> Iterator[arb_mat]:
-        """The polynomial at vertices whose hull contains all its values."""
-        yield from self._corners(0, self.value, self.steps)
+    def vertices(self) -> Iterator[list[Ball]]:
+        """The entries of the polynomial, row by row, at points whose hull contains all its values."""
+        parts = [self.value, *self.steps, *self.squares.values(), *self.mixed.values()]
+        monomials = _at_vertices(len(self.steps), tuple(self.squares), tuple(self.mixed), CURVED)
+        count = monomials.ncols()
+        coefficients = [x for row in zip(*(part.entries() for part in parts), strict=True) for x in row]
+        found = (arb_mat(len(coefficients) // len(parts), len(parts), coefficients) * monomials).entries()
+        return (found[k::count] for k in range(count))
 
-    def _corners(self, i: int, value: arb_mat, steps: list[arb_mat]) -> Iterator[arb_mat]:
-        """Variable i at each of its vertices; its products with later ones become a part of their steps."""
-        if i == len(steps):
-            yield value
-            return
-        for d, s in _CURVED if i in self.squares else _STRAIGHT:
-            corner = _added(value, d, steps[i])
-            if s:
-                corner = corner + self.squares[i]
-            later = [
-                _added(step, d, self.mixed[i, j]) if (i, j) in self.mixed else step
-                for j, step in enumerate(steps)
-            ]
-            yield from self._corners(i + 1, corner, later)
+    def corners(self) -> Iterator[arb_mat]:
+        """The same as matrices."""
+        shape = self.value.nrows(), self.value.ncols()
+        return (arb_mat(*shape, entries) for entries in self.vertices())
 
     def ranges(self) -> list[Ball]:
         """An enclosure of every entry."""
@@ -74,7 +74,14 @@ class Expansion:
         return found
 
 
-def _added(corner: arb_mat, factor: float, step: arb_mat) -> arb_mat:
-    if factor == 1:
-        return corner + step
-    return corner - step if factor == -1 else corner + step * factor
+@cache
+def _at_vertices(
+    count: int, squared: tuple[int, ...], mixed: tuple[tuple[int, int], ...], curved: Vertices
+) -> arb_mat:
+    """1, d_i, s_i and d_i d_j (rows) at products of vertices (columns): exact numbers."""
+    choices = [curved if i in squared else STRAIGHT for i in range(count)]
+    columns = [
+        [1.0, *(d for d, _ in at), *(at[i][1] for i in squared), *(at[i][0] * at[j][0] for i, j in mixed)]
+        for at in product(*choices)
+    ]
+    return arb_mat([list(row) for row in zip(*columns, strict=True)])

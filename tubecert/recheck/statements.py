@@ -12,6 +12,7 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, Balls, exact, is_indefinite, is_positive, spectral_norm, whitening
 from tubecert.recheck.boxes import Box, Field, Found, Values
+from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Rows, Term
 
@@ -35,27 +36,31 @@ class NormsBelow:
     def over(self, box: Box) -> Found:
         """The norms of the affine part at its corners, and of the rest."""
         found, caused, spread = self._field.expand(box)
-        proven = all(
-            self._is_below(corner, self._limit - rest)
-            for e in found
-            for rest in [self._norms(e.rest)]
-            for corner in e.corners()
-        )
-        return Found(proven, caused, spread)
+        return Found(all(map(self._holds, found)), caused, spread)
 
-    def _is_below(self, corner: arb_mat, limit: Ball) -> bool:
+    def _holds(self, e: Expansion) -> bool:
+        """At every vertex; the rest leaves less room there."""
+        limit = self._limit - self._norms(e.rest)
+        return all(self._is_below(entries, limit) for entries in e.vertices())
+
+    def _is_below(self, entries: list[Ball], limit: Ball) -> bool:
         """One matrix: limit^2 I - G'G > 0; where that fails by little, or there are several, norm by norm."""
         if len(self._shapes) == 1 and limit > 0:
-            G = arb_mat(*self._shapes[0], corner.entries())
-            gram = G.transpose() * G if G.ncols() <= G.nrows() else G * G.transpose()
+            rows, columns = self._shapes[0]
+            if 1 in (rows, columns):  # of a row or a column, one number
+                return bool(sum((x * x for x in entries), start=arb(0)) < limit * limit) or bool(
+                    self._norms(entries) <= limit
+                )
+            G = arb_mat(rows, columns, entries)
+            gram = G.transpose() * G if columns <= rows else G * G.transpose()
             if is_positive(arb_mat(gram.nrows(), gram.nrows(), limit * limit) - gram):
                 return True
-        return bool(self._norms(corner.entries()) <= limit)
+        return bool(self._norms(entries) <= limit)
 
     def bound(self, box: Box) -> Ball:
         """An upper bound on a box."""
         found, _, _ = self._field.expand(box)
-        tops = [self._norms(corner.entries()) + self._norms(e.rest) for e in found for corner in e.corners()]
+        tops = [self._norms(at) + self._norms(e.rest) for e in found for at in e.vertices()]
         return max(tops[1:], key=float, default=tops[0]).max(tops[0]).upper() if _finite(tops) else arb("nan")
 
     def broken(self, point: Sequence[Ball]) -> bool:
@@ -184,7 +189,7 @@ class NotNegative:
     def over(self, box: Box) -> Found:
         """The least corner, minus what the rest can be."""
         found, caused, spread = self._field.expand(box)
-        least = [corner[0, 0] - e.rest[0] for e in found for corner in e.corners()]
+        least = [at[0] - e.rest[0] for e in found for at in e.vertices()]
         proven = all(x > 0 if self._strict else x >= 0 for x in least)
         return Found(proven, caused, spread)
 
