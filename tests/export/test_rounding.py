@@ -15,10 +15,10 @@ from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
 from tubecert.export.compiled import compiled, compiler
 from tubecert.export.folder import exported
-from tubecert.export.followed import UncoveredError
+from tubecert.export.followed import FLOATS, UncoveredError
 from tubecert.export.program import GREATEST, LEAST, Program
-from tubecert.export.reference import execute
-from tubecert.export.rounding import rounding_of, within
+from tubecert.export.reference import _mean_on_pieces, execute
+from tubecert.export.rounding import _Analysis, rounding_of, within
 from tubecert.expression import constant
 from tubecert.model import build
 from tubecert.spec import load_text
@@ -210,16 +210,68 @@ def test_the_mean_of_a_moving_input_is_that_of_its_integral(precision):
         assert found <= float(rounding_of(c, precision).estimate - held)
 
 
-def test_a_plan_through_knots_is_covered_while_its_input_is_held_and_goes_on():
+def through_knots(**values):
+    """The machine of "path", about rounding: a plan through knots, of which several meet one sample."""
     plan = piecewise_plan(build(load_text(PATH)), KNOTS)
     own = recipe(sample_time=Fraction(1, 100), feedback_time=Fraction(1, 100), rounding=(ANY,))
     given = machine(PATH, plan, recipe=own, horizon=Fraction("0.31"), feedback_gain=DU)
-    assert rounding_of(assembled(replace(given, held=True)), "double").input < Fraction(1, 10**11)
-    with pytest.raises(UncoveredError, match="held"):
-        rounding_of(assembled(given), "double")
+    return replace(given, **values)
+
+
+def test_a_plan_through_knots_is_covered_while_its_input_goes_on():
+    given = through_knots()
+    held, played = (rounding_of(assembled(replace(given, held=own)), "double") for own in (True, False))
+    assert held.input < Fraction(1, 10**11)
+    assert held.estimate < played.estimate < Fraction(1, 10**12)
     jumping = piecewise_plan(build(load_text(PATH)), replace(KNOTS, interpolation="hold"))
     with pytest.raises(UncoveredError, match="jumps"):
         rounding_of(assembled(replace(given, plan=jumping, held=True)), "double")
+
+
+def test_knots_that_a_type_cannot_tell_apart_are_not_covered():
+    c = assembled(through_knots())
+    with pytest.raises(UncoveredError, match="between knots"):
+        rounding_of(replace(c, pieces=replace(c.pieces, most=c.pieces.most - 2)), "single")
+
+
+@pytest.mark.parametrize(("precision", "real"), [("single", np.float32), ("double", np.float64)])
+def test_the_mean_of_an_input_through_knots_is_that_of_its_integral(precision, real):
+    """The code's shares and middles, in its type, against the integral over every sample in exact fractions."""
+    c = assembled(through_knots())
+    plan, Ts = c.pieces, c.sample_time
+    analysis = _Analysis(c, FLOATS[precision])
+    bound = analysis._mean_through_knots(plan, analysis._plan()[1][0]).error.max()
+    ends = [*plan.start[1:], c.horizon]
+    worst = 0.0
+    for k in range(1, int(c.horizon / Ts) + 1):
+        begin, end = (k - 1) * Ts, k * Ts
+        exact = Fraction(0)
+        for start, last, (row,) in zip(plan.start, ends, plan.u, strict=True):
+            a, b = max(begin, start), min(end, last)
+            if a < b:
+                exact += (b - a) / Ts * (row[0] + ((a + b) / 2 - start) * row[1])
+        step = real(float(Ts))
+        found = _mean_on_pieces(plan, np.array([real(k - 1) * step]), np.array([real(k) * step]), real)
+        worst = max(worst, abs(float(Fraction(float(found[0, 0])) - exact)))
+    assert 2e-4 * bound < worst <= bound
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on PATH")
+@pytest.mark.slow
+def test_the_float_build_of_a_plan_through_knots_loses_no_more_than_is_said():
+    """Float beside double, compiled, from the same memory at every sample: what is off in q, against r_q."""
+    c = assembled(through_knots())
+    bound = sum(float(rounding_of(c, own).estimate) for own in ("single", "double"))
+    worst = 0.0
+    with compiled(exported(c, precision="single")) as single, compiled(exported(c)) as double:
+        measured = wandering(c, 31, 1, 7)[:, 0].astype(np.float32)
+        single.start(measured[:1]), double.start(measured[:1])
+        for y in measured:
+            one, two = single._states[0], double._states[0]
+            set_to(double, **{name: getattr(one, name) for name in ("q", "feedback", "held", "before")})
+            single.step(y[None]), double.step(y[None])
+            worst = max(worst, abs(one.q[0] - two.q[0]) / float(c.share))
+    assert 1e-4 * bound < worst <= bound
 
 
 @pytest.mark.parametrize("name", ["turning", "predicting_path"])

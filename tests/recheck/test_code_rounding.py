@@ -101,6 +101,11 @@ def undivided():
     return own._Analysis, "_estimated", lambda self, *args: whole(self, *args) * Interval.of(self.c.share)
 
 
+def exact_mean():
+    """The mean of a u* through knots, and u* as it is played, without an error."""
+    return own._Analysis, "_played", lambda self, us, written: [replace(u, error=0 * u.error) for u in us]
+
+
 BUGS = {
     "the unit of the other type": (
         "steep",
@@ -125,6 +130,7 @@ BUGS = {
     "the feedback is exact": ("held_orbit", "double", lambda: exact_program("law")),
     "the estimator is exact": ("steep", "double", lambda: exact_program("estimator")),
     "not over th": ("held_orbit", "double", undivided),
+    "the mean through knots is exact": ("path", "single", exact_mean),
 }
 
 
@@ -158,12 +164,31 @@ def test_single_loses_more_than_double_may():
 
 
 @pytest.mark.slow
-def test_a_held_plan_through_knots_is_followed_piece_by_piece():
-    c = covered("path", held=True)
-    found = bounds(c, replace(in_recheck("path"), held=True), texts(c, "double"))
+@pytest.mark.parametrize("held", [True, False])
+def test_a_plan_through_knots_is_followed_piece_by_piece(held):
+    c = covered("path", held=held)
+    found = bounds(c, replace(in_recheck("path"), held=held), texts(c, "double"))
     theirs = rounding_of(c, "double")
     # a certificate allows for twice the exporter's
     assert all(0.02 < found[each] / float(getattr(theirs, each)) < 2 for each in NAMES)
+
+
+MEANS = {
+    "a middle": ("0.5 * (begin + until)", "0.25 * (begin + until)", "another way"),
+    "a share": ("(until - begin) / length", "(until - begin) * length", "another way"),
+    "a knot": ("START[k + 1] < end ?", "START[k + 1] <= end ?", "another way"),
+    "a piece less": ("j < 3;", "j < 2;", "more pieces"),
+}
+
+
+@pytest.mark.parametrize("change", sorted(MEANS))
+def test_a_mean_that_is_computed_in_another_way_is_refused(change):
+    c = covered("path")
+    header, source = texts(c, "double")
+    old, new, why = MEANS[change]
+    assert source.count(old) == 1
+    with pytest.raises(UnreadError, match=why):
+        bounds(c, in_recheck("path"), (header, source.replace(old, new)))
 
 
 def measured(c, count, precision):

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -68,8 +69,8 @@ class _Analysis:
             raise UncoveredError("geodesics that are computed")
         if controller.predicts:
             raise UncoveredError("the integration of a prediction")
-        if controller.pieces is not None and not (controller.held and controller.pieces.continuous):
-            raise UncoveredError("a plan through knots whose input is not held, or jumps")
+        if controller.pieces is not None and not controller.pieces.continuous:
+            raise UncoveredError("a plan through knots whose input jumps")
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)
         self.eta = Interval.of(real.least)
         self.m, self.n = len(controller.inputs), len(controller.states)
@@ -232,8 +233,8 @@ class _Analysis:
         held = law.feedback + largest_of(size_of(us)) + 2 * self._estimate
         acted = [known_by_size(held, pieces) for _ in range(self.m)]
         given = {"held": acted, "before": acted}
-        if self.c.gauss is not None:
-            given["played"] = self._played(self.c.gauss, us, self._written(law, us))
+        if not self.c.adds_plan:
+            given["played"] = self._played(us, self._written(law, us))
         mean = self._run(self.c.applied, given)["mean"]
         q = [known_by_size(self._estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
@@ -242,28 +243,45 @@ class _Analysis:
         # th and pi are decimals of 50 digits at least
         return largest_of(length_of(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
 
-    def _played(self, gauss: Program, us: Sequence[Followed], written: Interval) -> list[Followed]:
-        """The mean of u* over a sample by Gauss's rule: its error is Ts^6/2016000 times the sixth derivative of u*.
-
-        What acted differs from u* by what is `written` at most.
-        """
-        if self.c.bend is None:
+    def _played(self, us: Sequence[Followed], written: Interval) -> list[Followed]:
+        """The mean of u* over a sample; what acted differs from u* by what is `written` at most."""
+        if self.c.pieces is not None:
+            means = [self._mean_through_knots(self.c.pieces, u) for u in us]
+        elif self.c.gauss is not None and self.c.bend is not None:
+            means = self._mean_by_gauss(self.c.gauss, self.c.bend, us)
+        else:
             raise UncoveredError("the mean of a feedforward that moves within a sample")
+        return [replace(x, error=(Interval.exact(x.error) + written).hi) for x in means]
+
+    def _mean_by_gauss(self, gauss: Program, bend: Program, us: Sequence[Followed]) -> list[Followed]:
+        """Its error is Ts^6/2016000 times the sixth derivative of u*."""
         nodes = [over_pieces(u) for u in us]
         found = self._run(gauss, {"a": nodes, "b": nodes, "c": nodes})["mean"]
-        bends = self._run(self.c.bend, {"t": [self._time(self.c.bend)]})["u"]
+        bends = self._run(bend, {"t": [self._time(bend)]})["u"]
         share = Interval.of(self.c.sample_time**6 / _GAUSS)
         return [
-            Followed(
-                value=x.value,
-                error=(
-                    Interval.exact(x.error)
-                    + share * Interval.exact(over_pieces(bend).value.magnitude)
-                    + written
-                ).hi,
+            replace(
+                x,
+                error=(Interval.exact(x.error) + share * Interval.exact(over_pieces(b).value.magnitude)).hi,
             )
-            for x, bend in zip(found, bends, strict=True)
+            for x, b in zip(found, bends, strict=True)
         ]
+
+    def _mean_through_knots(self, plan: Pieces, u: Followed) -> Followed:
+        """Shares of a sample times u* in their middles: theory (H.43)."""
+        late, passes = self._late(), plan.most
+        knots = [*plan.start, plan.start[-1] + plan.length[-1]]
+        shortest = Interval.of(min(b - a for a, b in pairwise(knots))) - 2 * late
+        sample = Interval.of(self.c.sample_time) + 2 * late
+        # of pieces of this length a sample meets no more than that
+        if not (shortest.lo > 0 and (sample / shortest).hi < passes - 1 and (4 * late).hi < sample.lo):
+            raise UncoveredError("times between knots, in this type: they have no digit that is right")
+        own = over_pieces(u)
+        theta = 2 * (passes + 6) * self.u
+        if not float(theta.hi) < 0.5:
+            raise UncoveredError("the mean of a feedforward through so many knots")
+        lost = theta * own.most + 2 * passes * self.eta * (own.most + 1)
+        return replace(own, error=(2 * Interval.exact(own.error) + lost).hi)
 
     # -- steps
 

@@ -15,7 +15,15 @@ from functools import cached_property
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root
-from tubecert.recheck.code.pieces import jumps, steepest, tables_of
+from tubecert.recheck.code.pieces import (
+    any_of,
+    jumps,
+    mean_of,
+    mean_rounded,
+    require_passes,
+    steepest,
+    tables_of,
+)
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Counter, Machine, Own, State, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, Seen, known
@@ -117,7 +125,7 @@ class _Analysis:
     @cached_property
     def plans(self) -> list[tuple[Numbers, Numbers]]:
         """x* and u* at the samples of every station."""
-        return [self._plan(station) for station in self.stations]
+        return [self._plan(station, self._sampled(station)) for station in self.stations]
 
     def _time(self, station: Station) -> Counter:
         """The number of a sample in a station, and of those before."""
@@ -135,19 +143,23 @@ class _Analysis:
         Ts = self._machine().number(f"{self.code.name.upper()}_SAMPLE_TIME")
         return self.rounded.both("*", self._time(station).converted(), Ts)
 
-    def _plan(self, station: Station) -> tuple[Numbers, Numbers]:
-        """x* and u* at the samples of a station."""
+    def _plan(self, station: Station, t: Seen) -> tuple[Numbers, Numbers]:
+        """x* and u* at times of a station."""
         machine, x, u = self._machine(piece=lambda _: station.piece), _empty(self.n), _empty(self.m)
-        machine.call("on_plan", self._sampled(station), x, u)
+        machine.call("on_plan", t, x, u)
         if "START" not in self.code.tables:
             return numbers(x), numbers(u)
         # a time near a knot may be taken for one of the next piece: x* and u* go on continuously
-        off = numbers([machine.left["on_plan"]["s"]])[0].error
-        off = off + _greatest([own.error for own in numbers(self.tables["START"])])
+        off = numbers([machine.left["on_plan"]["s"]])[0].error + self._begun
         if not off < station.beside:
             raise UnreadError("times have no digit that is right")
         slack = [2 * off * steep + jump for steep, jump in self._apart]
         return _slackened(x, slack[: self.n]), _slackened(u, slack[self.n :])
+
+    @property
+    def _begun(self) -> Ball:
+        """How far a knot is off."""
+        return _greatest([own.error for own in numbers(self.tables["START"])])
 
     @cached_property
     def _apart(self) -> list[tuple[Ball, Ball]]:
@@ -259,10 +271,13 @@ class _Analysis:
             _list(clipped)[:] = [Seen(_around(self.of.radius), self._clipped())] * self.m
 
         def mean(*given: Value) -> None:
-            machine.own("mean_of_plan", *given)
             found = _list(given[-1])
-            off = [a + b for a, b in zip(self._bent(station), played, strict=True)]
-            found[:] = [replace(a, error=a.error + b) for a, b in zip(numbers(found), off, strict=True)]
+            if self.tables:
+                found[:] = self._mean_through(station, numbers([*given[:2]]))
+            else:
+                machine.own("mean_of_plan", *given)
+                found[:] = _slackened(found, self._bent(station))
+            found[:] = _slackened(found, played)
 
         machine = self._machine(**self._known(station), law=law, estimator=estimator, mean_of_plan=mean)
         u = _empty(self.m)
@@ -304,9 +319,33 @@ class _Analysis:
     def _played(self, station: Station) -> list[Ball]:
         """How far each input of `feedforward` is off, over the sample that ends in a station."""
         t = between(larger(station.begin - exact(self.of.sample_time), arb(0)), station.end)
-        found, machine = _empty(self.m), self._machine()
+
+        def on_plan(*given: Value) -> None:  # a sample may meet several pieces
+            _list(given[2])[:] = any_of([u for _, u in self.plans])
+
+        found, machine = _empty(self.m), self._machine(**({"on_plan": on_plan} if self.tables else {}))
         machine.call(f"{self.code.name}_feedforward", self.rounded.rounded(t, arb(0)), found)
         return [own.error for own in numbers(found)]
+
+    @cached_property
+    def _middles(self) -> Numbers:
+        """u* in the middle of two times of any station."""
+        half = Fraction(1, 2)
+        rows = []
+        for station in self.stations:
+            t = self._sampled(station)
+            middle = self.rounded.both("*", known(exact(half)), self.rounded.both("+", t, t))
+            rows.append(self._plan(station, middle)[1])
+        return any_of(rows)
+
+    def _mean_through(self, station: Station, ends: Numbers) -> Numbers:
+        """The mean of a u* through knots over the sample between two times."""
+        passes = mean_of(self.code.functions["mean_of_plan"], self.code.real)
+        late = self._sampled(station).error
+        if any(not own.error <= late for own in ends):
+            raise UnreadError("the ends of a sample are no times of samples")
+        require_passes(passes, self.of.curve, exact(self.of.sample_time), late + self._begun)
+        return [mean_rounded(own, passes, self.kind) for own in self._middles]
 
     def _bent(self, station: Station) -> list[Ball]:
         """The error of Gauss's rule, by the sixth derivative of u*."""

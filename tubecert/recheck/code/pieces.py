@@ -1,4 +1,4 @@
-"""A plan through knots in the code: the numbers that its tables stand for, and what times near a knot are off."""
+"""A plan through knots in the code: its tables, what times near a knot are off, and the mean of u* over a sample."""
 
 from __future__ import annotations
 
@@ -8,13 +8,80 @@ from itertools import pairwise
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, larger, magnitude
-from tubecert.recheck.code.reader import Code
+from tubecert.recheck.code.reader import Code, function_of
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
-from tubecert.recheck.code.seen import KINDS, Rounded, Seen
+from tubecert.recheck.code.seen import KINDS, Kind, Rounded, Seen
+from tubecert.recheck.code.tree import Binary, Function, Loop, Name, Number
 from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.curve import CLOCK, Curve, Part
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import slopes
+
+# what a bound is derived for: every piece that a sample meets, with its share of the sample and u* in its middle
+_MEAN = """
+static void mean_of_plan(real begin, real end, real mean[M])
+{
+    const real length = end - begin;
+    int k = piece(begin), i, j;
+    for (i = 0; i < M; i++) {
+        mean[i] = 0.0%(suffix)s;
+    }
+    for (j = 0; j < %(passes)s; j++) {
+        const real until = k + 1 < PIECES && START[k + 1] < end ? START[k + 1] : end;
+        const real middle = 0.5%(suffix)s * (begin + until) - START[k];
+        const real share = (until - begin) / length;
+        for (i = 0; i < M; i++) {
+            mean[i] = mean[i] + share * (U[k][i][0] + middle * U[k][i][1]);
+        }
+        begin = until;
+        k = begin < end && k + 1 < PIECES ? k + 1 : k;
+    }
+}
+"""
+
+
+def mean_of(own: Function, real: str) -> int:
+    """How many pieces the mean of u* looks at; raises `UnreadError` for a function of another form."""
+    for each in own.body:
+        match each:
+            case Loop("j", _, Binary("<", Name("j"), Number(passes)), _):
+                wanted = _MEAN % {"suffix": "f" if real == "float" else "", "passes": passes}
+                if own == function_of(wanted):
+                    return int(passes)
+    raise UnreadError("the mean of a feedforward through knots is computed in another way")
+
+
+def mean_rounded(u: Seen, passes: int, kind: Kind) -> Seen:
+    """The mean of a `u` in the middles of pieces, of which the shares add to 1: theory (H.43).
+
+    Once the error of u is what u* moves by as times are off, once what u in a middle is off by.
+    """
+    theta = (1 + kind.unit) ** (passes + 3) / (1 - kind.unit) - 1
+    lost = theta * u.most + 2 * passes * kind.least * (u.most + 1)
+    return Seen(u.value, 2 * u.error + lost)
+
+
+def require_passes(passes: int, curve: Curve, sample_time: Ball, off: Ball) -> None:
+    """Raises `UnreadError` unless no sample meets more pieces; times are `off` by so much at most."""
+    sample = sample_time + 2 * off
+    for part in curve.parts:
+        shortest = part.length - 2 * off
+        if not (shortest > 0 and sample / shortest < passes - 1 and 4 * off < sample_time):
+            raise UnreadError("a sample may meet more pieces than the code looks at")
+
+
+def any_of(rows: Sequence[Sequence[Seen]]) -> list[Seen]:
+    """Entry by entry what any of these vectors may be."""
+    found = []
+    for own in zip(*rows, strict=True):
+        value = own[0].value
+        for each in own[1:]:
+            value = value.union(each.value)
+        error = own[0].error
+        for each in own[1:]:
+            error = larger(error, each.error)
+        found.append(Seen(value, error))
+    return found
 
 
 def tables_of(code: Code, curve: Curve) -> dict[str, Vector]:

@@ -95,6 +95,14 @@ def read_code(header: str, source: str) -> Code:
     )
 
 
+def function_of(text: str) -> Function:
+    """One function, alone."""
+    own = _Reader("")
+    own.read(words(text))
+    (found,) = own.functions.values()
+    return found
+
+
 def _preprocessed(text: str) -> tuple[str, dict[str, str]]:
     """What is left for the compiler, with empty lines in place of others, and the macros."""
     left, macros = [], {}

@@ -12,7 +12,7 @@ from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.curve import Curve
 
 _STATIONS = 48  # of a plan of one part
-_BESIDE = Fraction(1, 10**5)  # of a sample time, around the pieces of a plan through knots
+_BESIDE = Fraction(1, 100)  # of a sample time, around the pieces of a plan through knots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
