@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from multiprocessing.process import BaseProcess
+from typing import Protocol, Self, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -55,26 +57,72 @@ class Processes:
 
     def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
         """The results, in the order of the items."""
-        before = set(multiprocessing.active_children())
-        context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
-        pool = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts)
+        with Pool(self.workers) as pool:
+            return pool.map(function, items, ready)
+
+
+class Pool:
+    """The same processes for one `map` after another, until the block ends: they start, and import, once.
+
+    After a piece that fails, or a worker that dies, the next `map` begins with new ones.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+        self._others: set[BaseProcess] = set()  # children that are none of this pool's
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._end()
+
+    def map(self, function: Callable[[T], R], items: Sequence[T], ready: Ready[R] = None) -> list[R]:
+        """The results, in the order of the items."""
+        pool, done = self._started(), False
         try:
             tasks = [pool.submit(function, item) for item in items]
             if ready is not None:
                 places = {task: place for place, task in enumerate(tasks)}
                 for task in as_completed(tasks):
                     ready(places[task], task.result())
-            return [task.result() for task in tasks]
+            found, done = [task.result() for task in tasks], True
+            return found
         except BrokenProcessPool:
             message = (
                 "a worker ended in the middle of its work: killed, or out of memory; fewer --jobs need less"
             )
             raise WorkerError(message) from None
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in set(multiprocessing.active_children()) - before:
-                worker.terminate()
-                worker.join()
+            if not done:
+                self._end()
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            self._others = set(multiprocessing.active_children())
+            context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
+            self._pool = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts)
+        return self._pool
+
+    def _end(self) -> None:
+        if self._pool is None:
+            return
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._pool = None
+        for worker in set(multiprocessing.active_children()) - self._others:
+            worker.terminate()
+            worker.join()
+
+
+@contextmanager
+def held(executor: Executor | None) -> Iterator[Executor | None]:
+    """The executor for several `map`s: processes stay until the block ends."""
+    if isinstance(executor, Processes):
+        with Pool(executor.workers) as pool:
+            yield pool
+    else:
+        yield executor
 
 
 @dataclass(frozen=True, slots=True)

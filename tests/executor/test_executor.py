@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from tubecert.executor import Processes, Serial, WorkerError, chosen
+from tubecert.executor import Processes, Serial, WorkerError, chosen, held
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -76,6 +76,26 @@ def test_a_worker_that_dies_is_told(function):
     with pytest.raises(WorkerError, match="killed, or out of memory"):
         Processes(2).map(function, range(4))
     assert nobody_is_left()
+
+
+def who(item: int) -> int:
+    return os.getpid()
+
+
+@pytest.mark.slow
+def test_processes_that_are_held_stay_until_one_fails_and_none_is_left():
+    with held(Processes(1)) as pool:
+        first = pool.map(who, range(2)) + pool.map(who, range(2))
+        assert len(set(first)) == 1
+        assert first[0] != os.getpid()
+        with pytest.raises(ZeroDivisionError):
+            pool.map(failing, range(3))
+        assert nobody_is_left()
+        assert pool.map(who, [0]) != first[:1]
+    assert nobody_is_left()
+    with held(None) as nothing, held(Serial()) as alone:
+        assert nothing is None
+        assert alone == Serial()
 
 
 def test_an_interruption_ends_the_workers():

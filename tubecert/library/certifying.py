@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from tubecert import certificate, pipeline
-from tubecert.executor import Executor
+from tubecert.executor import Executor, held
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
 from tubecert.library.asked import (
@@ -103,9 +103,10 @@ def certified(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
-    result = pipeline.certify(
-        spec, options, progress, deadline=deadline, advise=True, told=told, workers=workers
-    )
+    with held(workers) as kept:
+        result = pipeline.certify(
+            spec, options, progress, deadline=deadline, advise=True, told=told, workers=kept
+        )
     run = {
         "command": command,
         "started": started.isoformat(timespec="seconds"),
