@@ -117,9 +117,3 @@ def test_a_surrogate_that_lies_certifies_nothing(lie, monkeypatch):
     found = search(spec, held(spec), measure_of(spec), Options())
     assert found.best is None
     assert all(each.size is None for each in found.candidates)
-
-
-def test_where_inputs_act_otherwise_from_state_to_state_there_is_no_constant_metric():
-    spec = load_text(CART.replace("B: [[0], [1]]", 'B: [[0], ["1 + 0.1*z"]]'))
-    with pytest.raises(ValueError, match="B depends on the state"):
-        search(spec, held(spec), measure_of(spec), Options())

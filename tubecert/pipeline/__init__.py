@@ -11,7 +11,8 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `reasons` | why a verdict about gains is what it is |
 | `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
-| `design`, `trade`, `metric_search`, `width` | the narrowest tube, what a tube asks of a machine, a metric for it |
+| `design`, `trade`, `width` | the narrowest tube, what a tube asks of a machine |
+| `metric_search`, `joint` | a metric for a machine: constant, and one that moves |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 

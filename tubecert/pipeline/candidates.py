@@ -66,7 +66,7 @@ def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> 
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
-    machine, measure = _machine(question, end), outputs or measure_of(question.spec)
+    machine, measure = machine_section(question, end), outputs or measure_of(question.spec)
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
@@ -117,9 +117,9 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def _machine(question: Question, end: Ending) -> HardwareData | None:
+def machine_section(question: Question, end: Ending) -> HardwareData | None:
     """The section of certificate H, if that alone is what decides."""
-    if deciding(question) != (HARDWARE.key,):
+    if deciding(question) != (HARDWARE.key,) or not end.sections:
         return None
     found = next(section for section in end.sections if section.name is HARDWARE).data()
     return found if isinstance(found, HardwareData) else None

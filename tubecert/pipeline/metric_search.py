@@ -1,5 +1,7 @@
 """The metric of a design: candidates by a surrogate of theorem H, of which the best few are certified in full.
 
+Where W has to move with the state, or may and few states make it affordable, these are where the weights of sums of
+squares begin (`joint`).
 In: a specification, with or without a metric. Out: metrics as metric files, with how narrow a tube is proven with each.
 Untrusted: a metric is proven before anything is certified with it.
 """
@@ -22,6 +24,7 @@ from tubecert.expression import Expression, derivative
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.climb import slow_scale
+from tubecert.pipeline.joint import Joint, Judged, at_point
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.progress import Phase, Progress, Step
 from tubecert.search.metrics import Proposed, Sampled, Surrogate, metrics, sampled_slopes
@@ -32,6 +35,7 @@ from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.trajectory.make import plan_of
 
 _CERTIFIED: Final = 3  # candidates that are certified in full
+_MOVING: Final = 2  # the same, of those that move
 _DIGITS: Final = Context(prec=5)
 _GAP: Final = Fraction(1, 20)
 _ROOM: Final = 1.3  # of the tube in which a candidate is certified, over what the surrogate says
@@ -71,32 +75,32 @@ def search(
     options: Options,
     progress: Progress | None = None,
 ) -> Found:
-    """Constant metrics for the machine of a specification; `scaled` is it with a tube so many times as wide.
+    """Metrics for the machine of a specification; `scaled` is it with a tube so many times as wide.
 
-    `ValueError` where there can be none: the inputs act differently from state to state.
+    `ValueError` where there can be none: the machine is not given, or no family of metrics moves with B.
     """
     model = build(replace(spec, metric=None, synthesis=None))
-    if not model.constant_input:
-        raise ValueError(
-            "B depends on the state: a constant metric would need inputs that act alike everywhere"
-        )
     rough = replace(options, gap=max(options.gap, _GAP), metric=None)
     memory = Memory()
-    own = certify(spec, rough, progress, memory) if spec.metric is not None else None
     course = _course(spec, model)
     system = sampled_system(spec, model, course)
 
     def worth(widths: Array) -> float:
         return measure.of(dict(zip(spec.states, widths, strict=True)), float(np.linalg.norm(widths)))
 
-    surrogate = Surrogate(system, worth)
-    given = [] if spec.metric is None else [_at_centre(build(spec), course)]
+    own = certify(spec, rough, progress, memory) if spec.metric is not None else None
+    given = [] if spec.metric is None else [(_at_centre(build(spec), course), float(spec.metric.rate))]
     tell(progress, "metrics for the machine")
-    proposed = metrics(surrogate, given, float(slow_scale(model, spec)))
-    trial = Trial(spec=spec, scaled=scaled, measure=measure, options=rough, progress=progress)
+    surrogate = Surrogate(system, worth)
+    proposed = metrics(surrogate, [W for W, _ in given], float(slow_scale(model, spec)))
     likely = [each for each in proposed if isfinite(each.widths[0])][:_CERTIFIED]
+    starts = [*given, *((each.W, each.rate) for each in likely)]
+    trial = Trial(spec=spec, scaled=scaled, measure=measure, options=rough, progress=progress)
+    weights = Joint(spec=spec, model=model, measure=measure, options=rough, progress=progress)
+    moving = weights.run(starts, course.mean(axis=0))
+    still = [trial(each, worth(each.widths)) for each in likely if model.constant_input]
     return Found(
-        candidates=tuple(trial(each, worth(each.widths)) for each in likely),
+        candidates=(*still, *map(trial.again, moving[:_MOVING])),
         own=None if own is None else size_of(own, measure),
     )
 
@@ -125,6 +129,11 @@ class Trial:
             if isinstance(prove_metric(question_of(held, self.options)), ProvenMetric):
                 return Candidate(text=text, told=told, size=self._size(held, told))
         return Candidate(text=_text(proposed, _LOWER[-1]), told=told, size=None)
+
+    def again(self, judged: Judged) -> Candidate:
+        """A metric of the search over weights, in a tube of the size that it should need, or as asked."""
+        held = with_metric_text(self.spec, judged.text, "<searched>")
+        return Candidate(text=judged.text, told=judged.size, size=self._size(held, judged.size))
 
     def _size(self, held: Spec, told: float) -> float | None:
         asked = {name: float(width) for name, width in self.spec.tube.half_widths}
@@ -190,7 +199,7 @@ def sampled_system(spec: Spec, model: ControlAffineModel, centres: Array) -> Sam
         slopes=slopes,
         near=near,
         bends=bends,
-        B=np.array([[float(e.fraction) for e in row] for row in model.B]),
+        B=at_point(model.B, model, centres.mean(axis=0)),
         wind=gusts * wind,
         noise=np.array(noise, dtype=float),
         h=h,
@@ -227,7 +236,4 @@ def _uncertainty(spec: Spec, model: ControlAffineModel, centres: Array) -> tuple
 
 def _at_centre(model: ControlAffineModel, centres: Array) -> Array:
     """The metric in the middle of the plan, (n, n)."""
-    n = len(model.states)
-    tape = Tape([e for row in model.W for e in row], model.states)
-    middle = centres.mean(axis=0)
-    return tape.run_floats(list(middle[:, None]), (1,)).reshape(n, n)
+    return at_point(model.W, model, centres.mean(axis=0))

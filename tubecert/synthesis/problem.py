@@ -25,6 +25,9 @@ class SynthesisProblem:
       measured by its size in these coordinates;
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
+    With a `target` T (n, n), in the states' own units, E T E' takes the place of I, E being the family's frame: W is to
+    be as near to it as the conditions permit, kappa says how near, and 1 is equality. Only sums of squares know of it.
+
     I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
     the rate of `model` are not used. Above `limit` the answer is of no use, and after so many `rounds` none is asked
     for. `sharp`: kappa is wanted to .1 %. `progress` is told a route's steps.
@@ -39,6 +42,7 @@ class SynthesisProblem:
     solver: str = "clarabel"
     coordinates: Choice = "identity"
     half_widths: tuple[Fraction, ...] = ()
+    target: Array | None = field(default=None, repr=False, compare=False)
     rounds: int | None = None
     sharp: bool = False
     progress: Progress | None = field(default=None, repr=False)
