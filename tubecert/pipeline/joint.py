@@ -34,8 +34,8 @@ from tubecert.spec import Spec
 from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
+from tubecert.synthesis.decimals import digits_below
 from tubecert.synthesis.family import FamilyError, MetricFamily, metric_family, suggested
-from tubecert.synthesis.ladder import digits_below
 from tubecert.synthesis.problem import SynthesisProblem
 from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
 from tubecert.synthesis.sos import propose_sos
