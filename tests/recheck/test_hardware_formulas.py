@@ -21,16 +21,9 @@ from tubecert.conditions.problem import Wind
 from tubecert.enclosure.constant import Constant
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import Numbers, Setting, WindNumbers
-from tubecert.recheck.digital import (
-    Bent,
-    Digital,
-    Evaluation,
-    Losses,
-    MachineNumbers,
-    Promise,
-    loop,
-    proposed,
-)
+from tubecert.recheck.digital import Evaluation, loop
+from tubecert.recheck.proposal import proposed
+from tubecert.recheck.recipe import Bent, Digital, Losses, MachineNumbers, Promise
 from tubecert.recheck.specified.hardware import Arcs
 from tubecert.spec import Picard
 

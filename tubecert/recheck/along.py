@@ -14,8 +14,9 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.conditions import Setting
-from tubecert.recheck.digital import Digital, Evaluation, Loop, MachineNumbers, Promise
+from tubecert.recheck.digital import Evaluation, Loop
 from tubecert.recheck.filtering import Distance
+from tubecert.recheck.recipe import Digital, MachineNumbers, Promise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,9 +6,9 @@ horizon), on which set the metric is one, from which start, against which uncert
 
 from __future__ import annotations
 
-from tubecert.recheck.certificate import Claim, Plans, Result, Wind
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated
+from tubecert.recheck.result import Claim, Plans, Result, Wind
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.trajectory import AnyPlan, Resting
 from tubecert.recheck.times import period_of

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.recheck import clearances, inputs
-from tubecert.recheck.certificate import Geodesics, Result, TubeSection
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.kinds.table import KINDS, LETTERS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
+from tubecert.recheck.result import Geodesics, Result, TubeSection
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.specified.metric import Metric, Wanted

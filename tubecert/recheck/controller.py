@@ -17,14 +17,14 @@ from flint import arb, arb_mat, ctx
 
 from tubecert.recheck.arcs import Geometry
 from tubecert.recheck.balls import Ball, exact, length
+from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
-from tubecert.recheck.claims import Case
 from tubecert.recheck.curve import CLOCK, Part
-from tubecert.recheck.digital import Digital
 from tubecert.recheck.document import read
 from tubecert.recheck.kinds.hardware import OfMachines
 from tubecert.recheck.kinds.hardware_section import HardwareSection
 from tubecert.recheck.program import Program
+from tubecert.recheck.recipe import Digital
 from tubecert.recheck.terms import names
 
 BITS = 200

@@ -13,8 +13,7 @@ from flint import arb
 
 from tubecert.recheck import metric, uncontrollable
 from tubecert.recheck.balls import Ball, exact, is_indefinite
-from tubecert.recheck.certificate import Result
-from tubecert.recheck.claims import Case
+from tubecert.recheck.case import Case
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.examination import Claim
@@ -22,6 +21,7 @@ from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
+from tubecert.recheck.result import Result
 from tubecert.recheck.specified.metric import Metric
 from tubecert.recheck.specified.trajectory import AnyPlan
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix

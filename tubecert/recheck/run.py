@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
-from tubecert.recheck.certificate import Certificate, read_certificate
-from tubecert.recheck.claims import Case, of_certified, of_every
+from tubecert.recheck.case import Case
+from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.claims import of_certified, of_every
 from tubecert.recheck.clock import time_is_up, within
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import read
 from tubecert.recheck.examination import Claim, Memory
 from tubecert.recheck.metric import stated
 from tubecert.recheck.orientation import NOT_EXAMINED
+from tubecert.recheck.result import Certificate
 
 BUDGET = 200_000
 Report = Callable[[str, int, int], None]  # the claim that is examined now, how many are done, of how many

@@ -12,12 +12,12 @@ from tubecert.recheck import covariant
 from tubecert.recheck.along import Passed, Window, along
 from tubecert.recheck.balls import Ball, exact, larger, root
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.digital import Bent, Digital, MachineNumbers, Promise, Stretch
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import all_of, at_most
 from tubecert.recheck.kinds.window_section import PROOF, WindowSection
 from tubecert.recheck.kinds.windows import Windows, above, claims_of_inputs, claims_of_states, within_tube
 from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.recipe import Bent, Digital, MachineNumbers, Promise, Stretch
 from tubecert.recheck.specified.hardware import Hardware
 from tubecert.recheck.specified.numbers import Range
 

@@ -12,7 +12,7 @@ from tubecert.recheck.balls import exact, root
 from tubecert.recheck.clipping import clips
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome, prove
-from tubecert.recheck.digital import Digital, Loop, loop, proposed
+from tubecert.recheck.digital import Loop, loop
 from tubecert.recheck.document import Node
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import all_of, at_most, margin_at_least, not_shown_to_hold
@@ -29,6 +29,8 @@ from tubecert.recheck.kinds.machine import agrees, promise
 from tubecert.recheck.kinds.window_section import read_stretches
 from tubecert.recheck.kinds.windows import claims_of_constants, covers
 from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.proposal import proposed
+from tubecert.recheck.recipe import Digital
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.numbers import Range
 from tubecert.recheck.statements import NotNegative

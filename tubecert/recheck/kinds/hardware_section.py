@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from fractions import Fraction
 
-from tubecert.recheck.digital import Losses
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.kind import VERDICTS, Section
 from tubecert.recheck.kinds.window_section import WindowSection, read_range, read_windows
+from tubecert.recheck.recipe import Losses
 from tubecert.recheck.specified.numbers import Range
 
 SHARES = (

@@ -11,11 +11,11 @@ from typing import ClassVar, Generic, TypeVar
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.digital import MachineNumbers
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.place import Place
+from tubecert.recheck.recipe import MachineNumbers
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Hardware
 from tubecert.recheck.specified.numbers import Range

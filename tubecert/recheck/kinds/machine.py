@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.digital import Digital, Promise
 from tubecert.recheck.kinds.bounds import all_of
 from tubecert.recheck.kinds.hardware_section import (
     OF_MACHINE,
@@ -13,6 +12,7 @@ from tubecert.recheck.kinds.hardware_section import (
 )
 from tubecert.recheck.kinds.kind import Ground
 from tubecert.recheck.metric import stated
+from tubecert.recheck.recipe import Digital, Promise
 from tubecert.recheck.specified.hardware import Hardware
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.digital import Stretch
 from tubecert.recheck.document import Node
+from tubecert.recheck.recipe import Stretch
 from tubecert.recheck.specified.numbers import Range
 
 PROOF = ("level", "floor", "speed", "bias", "ripple")
