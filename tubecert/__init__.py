@@ -16,13 +16,15 @@ if TYPE_CHECKING:
     from tubecert.library.certifying import certify
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
-    from tubecert.library.designing import Design, Machines, TradeOff, design, machines, trade_off
+    from tubecert.library.designing import design, machines, trade_off
+    from tubecert.library.designs import Design, Machines, TradeOff
     from tubecert.library.driving import Drive, drive
     from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.rechecking import Rechecked, recheck
-    from tubecert.library.simulating import Simulation, simulate
+    from tubecert.library.simulating import simulate
+    from tubecert.library.simulation import Simulation
     from tubecert.library.specification import Specification, load, specification
     from tubecert.library.sweeping import Swept, sweep
     from tubecert.progress import Phase, Step, Unit
@@ -82,9 +84,9 @@ _HOMES = {
     "check": "library.checks",
     "Comparison": "library.comparing",
     "compare": "library.comparing",
-    "Design": "library.designing",
-    "Machines": "library.designing",
-    "TradeOff": "library.designing",
+    "Design": "library.designs",
+    "Machines": "library.designs",
+    "TradeOff": "library.designs",
     "design": "library.designing",
     "machines": "library.designing",
     "trade_off": "library.designing",
@@ -98,7 +100,7 @@ _HOMES = {
     "verify": "library.metrics",
     "Rechecked": "library.rechecking",
     "Report": "library.pages",
-    "Simulation": "library.simulating",
+    "Simulation": "library.simulation",
     "Specification": "library.specification",
     "load": "library.specification",
     "specification": "library.specification",

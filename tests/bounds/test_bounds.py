@@ -15,7 +15,7 @@ from tubecert.bounds.compute import bound_constants, least_radius, time_range
 from tubecert.bounds.start import KnownStart
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.expression import graph, symbol
+from tubecert.expression import calculus, graph, symbol
 from tubecert.model import build, time_period
 from tubecert.spec import load
 from tubecert.trajectory import Plan
@@ -513,7 +513,7 @@ def test_an_infimum_raised_by_two_per_cent_is_noticed(three, three_truth, name):
 
 
 def wrong_rule(op):
-    honest = graph._slope
+    honest = calculus._slope
 
     def slope(e, d):
         if e.op != op:
@@ -529,7 +529,7 @@ def wrong_rule(op):
 
 @pytest.mark.parametrize("op", ["pow", "mul"])
 def test_a_broken_derivative_rule_is_noticed(three, three_truth, op, monkeypatch):
-    monkeypatch.setattr(graph, "_slope", wrong_rule(op))
+    monkeypatch.setattr(calculus, "_slope", wrong_rule(op))
     model = three_state()
     suprema = replace(three[0], model=model)
     broken = {"f_x": suprema.norms("f_x", [model.f_x]), "M_x": suprema.metric_slope()}
@@ -539,7 +539,7 @@ def test_a_broken_derivative_rule_is_noticed(three, three_truth, op, monkeypatch
 
 @pytest.mark.slow
 def test_a_broken_sine_rule_is_noticed(two, two_truth, monkeypatch):
-    monkeypatch.setattr(graph, "_slope", wrong_rule("sin"))
+    monkeypatch.setattr(calculus, "_slope", wrong_rule("sin"))
     model = two_state_model()
     suprema = Suprema(model, moving(), RHO_TWO, time_range(Fraction(5), None), EFFORT)
     with pytest.raises(AssertionError):

@@ -10,7 +10,8 @@ from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from tubecert.enclosure import interval as iv
-from tubecert.enclosure.interval import PI, Interval, down, fraction_bounds, up
+from tubecert.enclosure.interval import PI, Interval, fraction_bounds
+from tubecert.enclosure.outward import down, up
 
 SETTINGS = settings(max_examples=150, deadline=None)
 DENORMAL = 5e-324

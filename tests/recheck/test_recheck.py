@@ -18,7 +18,7 @@ import tubecert.conditions.derived
 import tubecert.conditions.kernels
 import tubecert.conditions.rates
 import tubecert.enclosure.interval
-import tubecert.expression.graph
+import tubecert.expression.calculus
 import tubecert.model
 from tubecert import certificate, pipeline, spec
 from tubecert.cli.app import app
@@ -180,14 +180,14 @@ def without_rate(self):
     return self.drift_form
 
 
-true_slope = tubecert.expression.graph._slope
+true_slope = tubecert.expression.calculus._slope
 true_sine = tubecert.enclosure.interval.sin
 true_kernel = tubecert.conditions.derived.tight_kernel
 true_supremum = tubecert.conditions.kernels._supremum
 true_segment = tubecert.bounds.start.KnownStart.distance
 
 BUGS = {
-    "derivative of sin": (tubecert.expression.graph, "_slope", half_slope, "h_t"),
+    "derivative of sin": (tubecert.expression.calculus, "_slope", half_slope, "h_t"),
     "interval sine": (tubecert.enclosure.interval, "sin", narrow_sine, "h"),
     "filter error": (tubecert.conditions.rates, "filter_error", half_filter_error, "A: derived"),
     "kernel J": (tubecert.conditions.derived, "tight_kernel", small_kernel, "A: derived"),

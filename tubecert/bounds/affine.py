@@ -18,9 +18,10 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.coordinates import Coordinates, Rows, inverse
-from tubecert.enclosure.interval import Array, Interval, down, up
+from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad, norm_bound, spectral_norm, spectral_norm_midrad
 from tubecert.enclosure.objective import Estimate, Target, estimate_of
+from tubecert.enclosure.outward import down, up
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, derivatives, substitute, symbol
 from tubecert.expression.matrix import Matrix, column

@@ -17,7 +17,8 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.interval import Array, Interval, down, fraction_bounds, sqrt, up
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
+from tubecert.enclosure.outward import down, up
 from tubecert.model import TIME
 from tubecert.spec import Obstacle
 from tubecert.trajectory import Plan

@@ -12,9 +12,10 @@ import numpy as np
 
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.hardware import HardwareSuprema
+from tubecert.bounds.lipschitz import substituted
 from tubecert.bounds.machines import COVARIANT as TABLE
 from tubecert.bounds.machines import CovariantConstants
-from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.covariant import Geometry

@@ -17,9 +17,10 @@ import numpy as np
 
 from tubecert.bounds.constants import BoundConstants, Constant
 from tubecert.bounds.feedforward import rate_of
+from tubecert.bounds.lipschitz import substituted
 from tubecert.bounds.machines import HARDWARE as TABLE
 from tubecert.bounds.machines import HardwareConstants
-from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.whitened import Whitened, whitened
 from tubecert.bounds.wind import joined
 from tubecert.enclosure.branch_and_bound import Effort, Supremum

@@ -15,7 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tubecert.bounds.suprema import Suprema, substituted
+from tubecert.bounds.lipschitz import substituted
+from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import supremum
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.domain import BoxDomain

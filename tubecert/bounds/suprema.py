@@ -5,11 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -17,29 +16,24 @@ from tubecert.bounds.affine import NormOverRest
 from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
+from tubecert.bounds.lipschitz import lipschitz_constant, substituted
 from tubecert.bounds.parts import Parts
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
-from tubecert.enclosure.objective import Kinks, LeastInputGain, Lipschitz, Objective, SumOfNorms, size_of
+from tubecert.enclosure.objective import LeastInputGain, Objective, SumOfNorms, size_of
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
 from tubecert.enclosure.questions import Domain
 from tubecert.expression import (
     ONE,
     ZERO,
     Expression,
-    constant,
     derivatives,
     free_symbols,
-    rebuild,
-    substitute,
-    symbol,
-    topological,
 )
-from tubecert.expression import sqrt as sqrt_of
-from tubecert.expression.matrix import Matrix, column, constants, identity, jacobian, multiply, transpose
+from tubecert.expression.matrix import Matrix, column, constants, identity, multiply, transpose
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.progress import Progress
 from tubecert.trajectory import Plan
@@ -51,7 +45,6 @@ _FEW = 20_000  # boxes
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
 _WORTH = 30_000  # boxes after which such a constant stays as it is
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
-_SIGNS = 4  # absolute values of which all branches are looked at
 _COARSE, _ROUGH = 0.1, 1e-2  # from that gap on the metric, too, need not be known sharply
 Spent = Callable[[str, int], None]
 
@@ -208,7 +201,7 @@ class Suprema:
         """A Lipschitz constant of entries in the states, whatever their kinks."""
         if not free_symbols(entries) & set(self.model.states):
             return Constant.exactly(0.0)
-        return self._constant(self._over_tube("h_x", _lipschitz(entries, fields or self.fields)))
+        return self._constant(self._over_tube("h_x", lipschitz_constant(entries, fields or self.fields)))
 
     def uncertainty(self, fields: Fields | None = None) -> tuple[Constant, Constant, Constant]:
         """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks.
@@ -311,22 +304,19 @@ class Suprema:
 
     def half_widths(self) -> tuple[Constant, ...]:
         """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
-        found = []
-        for i, name in enumerate(self.model.states):
-            entry = Pencil([[self.model.W[i][i]]], [[ONE]])
-            effort = None if self.coordinates is None else self._fine  # it is no part of a ball
-            found.append(self._root(self._over_tube(f"half width of {name}", entry, effort)))
-        return tuple(found)
+        W = self.model.W
+        return tuple(self._width(name, W[i][i]) for i, name in enumerate(self.model.states))
 
     def output_widths(self) -> tuple[Constant, ...]:
         """sup sqrt(c'W c) for every output c'x: |c'(x - x*)| <= that times the distance."""
-        found = []
-        for output in self.model.outputs:
-            c = constants([output.row])
-            entry = Pencil(multiply(multiply(c, self.model.W), transpose(c)), [[ONE]])
-            effort = None if self.coordinates is None else self._fine
-            found.append(self._root(self._over_tube(f"half width of {output.name}", entry, effort)))
-        return tuple(found)
+        rows = ((output.name, constants([output.row])) for output in self.model.outputs)
+        return tuple(
+            self._width(name, multiply(multiply(c, self.model.W), transpose(c))[0][0]) for name, c in rows
+        )
+
+    def _width(self, name: str, square: Expression) -> Constant:
+        effort = None if self.coordinates is None else self._fine  # it is no part of a ball
+        return self._root(self._over_tube(f"half width of {name}", Pencil([[square]], [[ONE]]), effort))
 
     def widths(self) -> dict[str, Constant]:
         """What a length in the metric is at most in every state and output, by name."""
@@ -427,61 +417,3 @@ class Suprema:
         if isinstance(self.section, Ellipsoid) and which:  # the others are such that the point lies in it
             x = origin + self.section.completed(which, (x - origin)[None, which])[0]
         return Witness(t=t, x=tuple(map(float, x)))
-
-
-def substituted(rows: Matrix, values: dict[str, Expression]) -> Matrix:
-    """A matrix with variables replaced."""
-    width = len(rows[0])
-    flat = substitute([e for row in rows for e in row], values)
-    return tuple(tuple(flat[i : i + width]) for i in range(0, len(flat), width))
-
-
-def _lipschitz(h: tuple[Expression, ...], fields: Fields) -> Lipschitz:
-    """The objective |h_x|, with every norm in h taken apart into a level of its own."""
-    states = fields.states
-    plain: dict[Expression, Expression] = {}  # each node with placeholders for the norms below it
-    back: dict[str, Expression] = {}  # placeholder -> the norm it stands for
-    arguments: list[tuple[Expression, ...]] = []
-    for node in topological(h):
-        args = tuple(plain[arg] for arg in node.args)
-        plain[node] = node if args == node.args else rebuild(node, args)
-        if plain[node].op == "norm":
-            name = f"norm#{len(back)}"
-            back[name] = node
-            arguments.append(args)
-            plain[node] = symbol(name)
-    names = list(back)
-    levels = []
-    for depth, entries in enumerate([*arguments, tuple(plain[e] for e in h)]):
-        gains = [substituted(column(derivatives(entries, name)), back) for name in names[:depth]]
-        levels.append((fields.by_state(substituted(jacobian(entries, states), back)), gains))
-    return Lipschitz(fields.by_state(jacobian(h, states)), levels, _kinks(h, fields))
-
-
-def _kinks(h: tuple[Expression, ...], fields: Fields) -> Kinks | None:
-    """The branches of an h with a few absolute values; None where it has none, or many."""
-    signs: dict[str, Expression] = {}
-    plain: dict[Expression, Expression] = {}
-    for node in topological(h):
-        args = tuple(plain[arg] for arg in node.args)
-        if node.op == "norm" and len(args) == 1:
-            name = f"sign#{len(signs)}"
-            signs[name] = node.args[0]
-            plain[node] = symbol(name) * args[0]
-        elif node.op == "norm":  # as a root it may be differentiated more than once where it is not 0
-            plain[node] = sqrt_of(sum((arg * arg for arg in args), start=ZERO))
-        else:
-            plain[node] = node if args == node.args else rebuild(node, args)
-    if not 0 < len(signs) <= _SIGNS:
-        return None
-    slopes = fields.by_state(jacobian(tuple(plain[e] for e in h), fields.states))
-    every = {chosen: _branch(slopes, signs, chosen) for chosen in product((1, -1), repeat=len(signs))}
-    return Kinks(arguments=column(list(signs.values())), branches=every)
-
-
-def _branch(slopes: Matrix, signs: Iterable[str], chosen: tuple[int, ...]) -> Matrix | None:
-    """The slopes with signs chosen; None where a divisor is 0 then, as x + abs(x) is for x < 0."""
-    try:
-        return substituted(slopes, dict(zip(signs, map(constant, chosen), strict=True)))
-    except ZeroDivisionError:
-        return None

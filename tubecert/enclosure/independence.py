@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array, up
+from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import finite, norm_bound, product, spectral_norm_midrad
 from tubecert.enclosure.objective import Estimate, Target, estimate_of
+from tubecert.enclosure.outward import up
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
 
 

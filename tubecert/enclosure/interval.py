@@ -15,77 +15,19 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tubecert.enclosure.outward import INFINITE, NEGATIVE, down, number_above, number_below, up
+
 Array = NDArray[np.float64]
 
 # numpy's and libm's elementary functions are documented to 4 ulp; 16 units of 2**-53 relative are 8 to 16 ulp.
 _LIBRARY_ERROR: Final = 16 * 2.0**-53
-_UNIT: Final = 2.0**-52
-_LEAST: Final = 2.0**-1074
-_GREATEST: Final = float(np.finfo(np.float64).max)
-_MOST: Final = 2.0**972  # two units in the last place of the greatest number
 _TINY: Final = 1e-300  # covers gradual underflow of library functions
 _LARGEST_ANGLE: Final = 1e6  # beyond it the quadrant test below would need more than double precision
 
 
-_INFINITE: Final = np.array(np.inf)
-_NEGATIVE: Final = np.array(-np.inf)
 _UNKNOWN: Final = np.array(np.nan)
 # as arrays: a number of Python's costs numpy as much as the operation
 _ZERO: Final = np.array(0.0)
-_UNIT_ARRAY: Final = np.array(_UNIT)
-_LEAST_ARRAY: Final = np.array(_LEAST)
-_MOST_ARRAY: Final = np.array(_MOST)
-_GREATEST_ARRAY: Final = np.array(_GREATEST)
-_LOWEST_ARRAY: Final = np.array(-_GREATEST)
-
-
-def down(x: ArrayLike) -> Array:
-    """A float64 below x, one or two units in the last place; below inf the greatest number."""
-    value = np.asarray(x, dtype=np.float64)
-    if value.size == 1:
-        return _like(value, _below(value.item()))
-    step = _step(value)
-    np.minimum(np.subtract(value, step, out=step), _GREATEST_ARRAY, out=step)
-    return step
-
-
-def up(x: ArrayLike) -> Array:
-    """A float64 above x, one or two units in the last place; above -inf the least number.
-
-    |x| 2**-52 is at least one unit in the last place, exactly as long as it is no subnormal number; there the least
-    positive number makes up for its rounding. A fifth of the time of `nextafter`.
-    """
-    value = np.asarray(x, dtype=np.float64)
-    if value.size == 1:
-        return _like(value, _above(value.item()))
-    step = _step(value)
-    np.maximum(np.add(value, step, out=step), _LOWEST_ARRAY, out=step)
-    return step
-
-
-def _step(x: Array) -> Array:
-    """What arrays are moved by, in an array of its own."""
-    step: Array = np.abs(x)
-    step *= _UNIT_ARRAY
-    step += _LEAST_ARRAY
-    np.minimum(step, _MOST_ARRAY, out=step)
-    return step
-
-
-def _like(array: Array, number: float) -> Array:
-    """The number in the shape of an array with one entry."""
-    found: Array = np.array(number, ndmin=array.ndim)[()]
-    return found
-
-
-def _below(x: float) -> float:
-    """`down` of one number, which needs no array: to the bit the same."""
-    return _GREATEST if x == np.inf else x - (abs(x) * _UNIT + _LEAST)
-
-
-def _above(x: float) -> float:
-    """`up` of one number."""
-    return -_GREATEST if x == -np.inf else x + (abs(x) * _UNIT + _LEAST)
 
 
 class Interval:
@@ -152,7 +94,7 @@ class Interval:
     def sanitised(self) -> Interval:
         """The same with NaN bounds opened to infinity."""
         bad = np.isnan(self.lo) | np.isnan(self.hi)
-        return Interval(np.where(bad, _NEGATIVE, self.lo), np.where(bad, _INFINITE, self.hi))
+        return Interval(np.where(bad, NEGATIVE, self.lo), np.where(bad, INFINITE, self.hi))
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Elementwise lo <= x <= hi."""
@@ -234,7 +176,7 @@ def _numbers(a: Interval, b: Interval) -> bool:
 def _number(lo: float, hi: float, a: Interval, b: Interval) -> Interval:
     """What is computed from two such intervals, rounded outward, in their shape."""
     axes = max(a.lo.ndim, a.hi.ndim, b.lo.ndim, b.hi.ndim)
-    return Interval(np.array(_below(lo), ndmin=axes), np.array(_above(hi), ndmin=axes))
+    return Interval(np.array(number_below(lo), ndmin=axes), np.array(number_above(hi), ndmin=axes))
 
 
 def _ends(function: np.ufunc, a: Interval, b: Interval) -> tuple[Array, Array]:
@@ -284,7 +226,11 @@ def _power_of_number(x: float, n: int, *, upward: bool) -> float:
     """The same of one number that is not NaN."""
     value = magnitude = abs(x)
     for _ in range(n - 1):
-        value = _above(value * magnitude) if upward == (x >= 0) else max(0.0, _below(value * magnitude))
+        value = (
+            number_above(value * magnitude)
+            if upward == (x >= 0)
+            else max(0.0, number_below(value * magnitude))
+        )
     return value if x >= 0 else -value
 
 

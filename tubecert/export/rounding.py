@@ -22,7 +22,8 @@ import numpy as np
 from tubecert.conditions.hardware import Rounding
 from tubecert.coordinates import inverse
 from tubecert.enclosure import interval
-from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt, up
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
+from tubecert.enclosure.outward import up
 from tubecert.export.blocks import LEAST_SIZE
 from tubecert.export.controller import Controller, Pieces
 from tubecert.export.followed import (

@@ -5,7 +5,8 @@ yes.
 
 | module | what it does |
 |---|---|
-| `graph` | the hash-consed graph, exact folding, derivatives |
+| `graph` | the hash-consed graph, exact folding |
+| `calculus` | other variables put in, derivatives |
 | `lookup` | functions given by tables |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
@@ -14,6 +15,7 @@ yes.
 | `zero` | proves that an expression vanishes identically |
 """
 
+from tubecert.expression.calculus import derivative, derivatives, free_symbols, rebuild, substitute
 from tubecert.expression.graph import (
     ONE,
     PI,
@@ -23,16 +25,11 @@ from tubecert.expression.graph import (
     coefficient,
     constant,
     cos,
-    derivative,
-    derivatives,
     exp,
-    free_symbols,
     norm,
     power,
-    rebuild,
     sin,
     sqrt,
-    substitute,
     symbol,
     tan,
     topological,

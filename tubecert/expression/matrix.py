@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from tubecert.expression.graph import ONE, ZERO, Expression, constant, derivatives
+from tubecert.expression.calculus import derivatives
+from tubecert.expression.graph import ONE, ZERO, Expression, constant
 
 Matrix = tuple[tuple[Expression, ...], ...]
 Rows = Sequence[Sequence[Expression]]

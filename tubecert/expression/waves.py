@@ -8,7 +8,8 @@ from fractions import Fraction
 from functools import reduce
 from math import gcd, lcm
 
-from tubecert.expression.graph import Expression, derivative, free_symbols, rebuild, symbol, topological
+from tubecert.expression.calculus import derivative, free_symbols, rebuild
+from tubecert.expression.graph import Expression, symbol, topological
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 | `certification`, `certifying` | a certificate as a value; how one is made |
 | `metrics` | metrics found, or decided |
 | `workers` | who helps: processes, or a cluster |
-| `simulating`, `rechecking`, `pages` | what can be done with a certificate |
+| `simulating`, `simulation`, `rechecking`, `pages` | what can be done with a certificate |
 | `comparing` | certificates side by side |
 | `sweeping` | many values of some keys |
-| `designing`, `trading` | the best tube for a machine, and what a tube asks of one |
+| `designing`, `designs`, `trading` | the best tube for a machine, and what a tube asks of one |
 | `figures` | the tube and the trade-off, drawn into axes |
 """

@@ -5,15 +5,11 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, cast
 
-import numpy as np
-
 from tubecert.certificate.result import Result
-from tubecert.digits import near
-from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.executor import Executor, Serial
 from tubecert.expression import suggestion
@@ -23,122 +19,25 @@ from tubecert.library.asked import Named, one_of
 from tubecert.library.certification import Certification, read
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
+from tubecert.library.simulation import Simulation
 from tubecert.library.specification import File, Specifiable, spec_of
 from tubecert.printable import visible
 from tubecert.progress import Progress
-from tubecert.records import Json
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
 from tubecert.trajectory.make import plan_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tubecert.simulate.campaign import Campaign
     from tubecert.simulate.loops import Controller
     from tubecert.simulate.members import Drawing
-    from tubecert.simulate.runs import Runs
     from tubecert.simulate.setting import Setting
-    from tubecert.simulate.told import Summary
 
 _HERE: Final = Serial()
 EXTRA: Final = ("numba", "llvmlite", "matplotlib")
 RUNS: Final = 100
 MEMBERS: Final = 20  # random plans of a family
 SEED: Final = 0
-OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Simulation:
-    """What was simulated, and whether it falsified anything: that it did not proves nothing.
-
-    `campaign` has every run; `summary` is what `summary.json` holds; `compared_with` the hash of the certificate.
-    """
-
-    campaign: Campaign = field(repr=False)
-    compared_with: str
-
-    @property
-    def outcome(self) -> str:
-        """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        from tubecert.simulate.told import outcome
-
-        return outcome(self.campaign)
-
-    @property
-    def falsified(self) -> bool:
-        """Whether a promise of the certificate was broken, or a loop that adapts left the tube."""
-        return self.outcome in OUTCOMES
-
-    @property
-    def summary(self) -> Json:
-        """Everything that was found, as plain data."""
-        return self._found().to_json()
-
-    def _found(self) -> Summary:
-        from tubecert.simulate.summary import summary
-
-        return summary(self.campaign, self.compared_with)
-
-    @property
-    def controllers(self) -> tuple[str, ...]:
-        """The loops that were simulated."""
-        return tuple(item.loop.controller for item in self.campaign.drawn)
-
-    def run(self, controller: str) -> Runs:
-        """The run of a loop under the uncertainty that is drawn: times `t` (K,) in s, `x` (1, K, n), `u` (1, K, m), ...
-
-        Raises `KeyError` for a loop that was not simulated.
-        """
-        for item in self.campaign.drawn:
-            if item.loop.controller == controller:
-                return item.runs
-        raise KeyError(controller)
-
-    def states(self, controller: str) -> Array:
-        """The states (K, n) of that run."""
-        return np.asarray(self.run(controller).x[0])
-
-    def figure(self, name: str = "states") -> Figure:
-        """A figure: `states`, `plane`, `inputs`, `tube_use` or `monte_carlo`; draw into its axes what you like.
-
-        Raises `KeyError` for a name that is none, or of which there is nothing to draw.
-        """
-        from tubecert.simulate.figures import drawn
-
-        found = drawn(name, self.campaign)
-        if found is None:
-            raise KeyError(f"{name}: nothing was simulated that it shows")
-        return found
-
-    def save(self, folder: File) -> list[str]:
-        """Write data, tables, figures and the summary into a folder, as the command does; their names.
-
-        Raises `TargetError`.
-        """
-        from tubecert.simulate.output import prepared, write
-
-        with prepared(os.fspath(folder)):
-            return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
-
-    def __str__(self) -> str:
-        from tubecert.report import simulation
-
-        return simulation.verdict_line(self._found()).plain
-
-    def __repr__(self) -> str:
-        return f"<Simulation: {self}>"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        style = "falsified" if self.falsified else ""
-        reach, attacks = self.campaign.setting.reach, self.campaign.attacks
-        rows = [
-            (item.loop.controller, f"largest d/dbar {near(item.greatest / reach, 4)}") for item in attacks
-        ]
-        return notebook.of_line(str(self), self.campaign.setting.spec.name, style, rows)
 
 
 def simulate(

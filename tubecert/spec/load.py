@@ -9,10 +9,11 @@ from typing import Final
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, capped
 from tubecert.spec import codes
+from tubecert.spec.boxes import read_box, read_units
 from tubecert.spec.document import MappingNode, Scalar, compose
 from tubecert.spec.hardware import limits_of, read_disturbance, read_hardware
 from tubecert.spec.limits import read_limits
-from tubecert.spec.names import Names, read_box, read_names, read_units
+from tubecert.spec.names import Names, read_names
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.outputs import with_outputs
 from tubecert.spec.override import Setting, put

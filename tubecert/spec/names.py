@@ -20,15 +20,14 @@ from tubecert.expression import (
     constant,
     free_symbols,
     is_name,
-    suggestion,
     symbol,
     topological,
 )
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
-from tubecert.spec.instead import glued
 from tubecert.spec.lookup import read_lookup
-from tubecert.spec.reader import Field, Scope
+from tubecert.spec.reader import Field
+from tubecert.spec.scope import Scope
 from tubecert.spec.types import Output
 
 TIME: Final = "t"
@@ -362,55 +361,7 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
     return names
 
 
-def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:
-    """Units of states, inputs and outputs, as printed."""
-    units: list[tuple[str, str]] = []
-    if field is None:
-        return ()
-    for key, node in field.pairs("of names to units") or []:
-        unit = field.child(key, node).text("a unit")
-        known = [*names.lengths, *names.inputs]
-        if key.text not in known:
-            message = f"{key.text[:60]} is neither a state nor an input"
-            help = glued(key.text, known) or suggestion(key.text, known)
-            key_field(field, key).fail(codes.UNKNOWN_KEY, message, help)
-        elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
-            field.child(key, node).fail(
-                codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters"
-            )
-        elif unit is not None:
-            units.append((key.text, unit))
-    return tuple(units)
-
-
-def read_box(field: Field, names: Names) -> tuple[tuple[Fraction, Fraction], ...] | None:
-    """The safe set, in the order of the states."""
-    entries = field.mapping(required=names.states)
-    if entries is None:
-        return None
-    sides = [_side(entries.get(name), names) for name in names.states]
-    kept = tuple(side for side in sides if side)
-    return kept if len(kept) == len(names.states) else None
-
-
-def _side(field: Field | None, names: Names) -> tuple[Fraction, Fraction] | None:
-    ends = field.items(2, "numbers") if field else None
-    if field is None or ends is None:
-        return None
-    lower = ends[0].number(
-        names.values, side="above"
-    )  # inward: the set that is asked for contains the one that counts
-    upper = ends[1].number(names.values, side="below")
-    if lower is None or upper is None:
-        return None
-    if lower >= upper:
-        field.fail(
-            codes.RANGE, f"{field.path}: the lower end must be below the upper end", "write [lower, upper]"
-        )
-        return None
-    return lower, upper
-
-
 def key_field(field: Field, key: Scalar) -> Field:
+    """The key itself, to point at."""
     """A key, to report about it."""
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)

@@ -7,23 +7,17 @@ problem.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from tubecert.expression import (
     MAX_LENGTH,
-    MAX_NUMBER_EXPONENT,
     Expression,
     ExpressionError,
-    Lookup,
-    Obligation,
-    Parsed,
     Side,
-    full_text,
     longest_text,
-    parse,
     parse_constant,
     parse_number,
     suggestion,
@@ -33,13 +27,12 @@ from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
 from tubecert.spec.instead import EXAMPLES, OTHER_WORDS, glued, of_key, of_value
+from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
 
-Parameters = Mapping[str, Expression]
 T = TypeVar("T")
 
-_GREATEST: Final = Fraction(10) ** MAX_NUMBER_EXPONENT  # floats end at 1e308, and lose digits below 1e-308
 
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
@@ -47,61 +40,6 @@ _CODE_OF_KIND = {
     "limit": codes.LIMIT,
     "value": codes.EXPRESSION,
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scope:
-    """The names that an expression may use here, and why other names of the file may not occur.
-
-    `owed` is what the use of a definition owes; one that owes nothing is there as well.
-    """
-
-    symbols: Mapping[str, Expression]
-    tables: Mapping[str, Lookup] = field(default_factory=dict)
-    refused: Mapping[str, str] = field(default_factory=dict)
-    kinks: bool = False
-    owed: Mapping[str, tuple[Obligation, ...]] = field(default_factory=dict)
-
-    def parse(self, text: str) -> Parsed:
-        """The expression of a text; raises `ExpressionError`."""
-        parsed = parse(
-            text,
-            symbols=self.symbols,
-            tables=self.tables,
-            kinks=self.kinks,
-            refused=self.refused,
-            owed=self.owed,
-        )
-        if self.owed:
-            self._check_written_out(parsed)
-        return parsed
-
-    def _check_written_out(self, parsed: Parsed) -> None:
-        """What definitions stand for is written out in certificates, and must be an expression of the grammar there."""
-        parts = [parsed.expression, *(owed.argument for owed in parsed.obligations)]
-        try:
-            if sum(map(longest_text, parts)) > 8 * MAX_LENGTH:
-                raise ExpressionError("it is longer than that", kind="limit")
-            text = full_text(parsed.expression, parsed.obligations)
-            parse(text, symbols=self.symbols, tables=self.tables, kinks=self.kinks)
-        except ExpressionError as error:
-            raise ExpressionError(
-                f"with its definitions written out the expression is too large ({error.message})",
-                help=f"an expression may have {MAX_LENGTH} characters, definitions written out",
-                kind="limit",
-            ) from None
-
-
-MODERATE: Final = "choose units in which the numbers are moderate"
-
-
-def out_of_range(value: Fraction) -> str | None:
-    """What is wrong with the size of a number: it must be a float, give or take a rounding, and not a subnormal one."""
-    if abs(value) > _GREATEST:
-        return f"beyond 1e{MAX_NUMBER_EXPONENT}"
-    if 0 < abs(value) < 1 / _GREATEST:
-        return f"nearer to 0 than 1e-{MAX_NUMBER_EXPONENT}"
-    return None
 
 
 class Reader:

@@ -19,7 +19,8 @@ from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
 from tubecert.files import read
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
-from tubecert.spec.reader import MODERATE, Field, out_of_range
+from tubecert.spec.reader import Field
+from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.source import PLAN, Mark, Source, decoded
 
 MAX_COLUMNS: Final = 200

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.domain import BoxDomain, Range
-from tubecert.enclosure.interval import Array, Interval, down, up
+from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.objective import Estimate
+from tubecert.enclosure.outward import down, up
 from tubecert.expression import free_symbols
 from tubecert.model import TIME
 from tubecert.trajectory import Plan

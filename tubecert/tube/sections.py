@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.coordinates import Coordinates, Rows
-from tubecert.enclosure.interval import Array, Interval, down, fraction_bounds, sqrt, up
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
+from tubecert.enclosure.outward import down, up
 from tubecert.spec.algebra import is_positive_semidefinite
 
 Cut = tuple[Array, Array, NDArray[np.bool_]]
