@@ -404,7 +404,7 @@ def test_documented_library_error_is_covered():
 
 def unsafe(name, monkeypatch):
     monkeypatch.setattr(iv, name, np.asarray)
-    monkeypatch.setattr(iv, {"up": "_above", "down": "_below"}[name], float)
+    monkeypatch.setattr(iv, {"up": "number_above", "down": "number_below"}[name], float)
 
 
 @pytest.mark.parametrize("name", ["up", "down"])
