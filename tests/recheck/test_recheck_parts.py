@@ -116,8 +116,29 @@ def swapped(*names):
     return change
 
 
+def limited(value, *path):
+    """What is told of the limits of the input in the windows of a kind."""
+
+    def change(result, key):
+        own = result["inputs"][0]["windows"]
+        if path:
+            own[key][path[0]] = value
+        else:
+            own[key] = value
+
+    return change
+
+
 W = ("windows",)
 FORGED = {
+    "a window beyond the limits": limited("undecided", 1),
+    "limits of a window that there is not": limited(["certified"] * 4),
+    "limits of fewer windows": limited(["certified"] * 2),
+    "limits in other words": limited("yes", 1),
+    "limits with what has no windows": lambda result, key: result["inputs"][0]["windows"].update(
+        {"rates": ["certified"]}
+    ),
+    "limits that a window leaves": lambda result, key: result["inputs"][0].update(limits=[-1, 3]),
     "no windows in the section": gone(*W),
     "no windows in the recipe": of_proof(gone(*W)),
     "no window": put([], *W),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from tubecert.enclosure.constant import Constant
@@ -53,17 +53,24 @@ class InputBoundData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputData:
-    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
+    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key.
+
+    `windows`: by the key of a kind that has windows, the verdict in each.
+    """
 
     input: str
     limits: tuple[Fraction, Fraction]
     verdict: Verdict
     plan: PlanInputData
     bounds: Mapping[str, InputBoundData]
+    windows: Mapping[str, tuple[Verdict, ...]] = field(default_factory=dict)
 
     def use(self, kinds: Iterable[str]) -> float | None:
         """The share of its limits that it uses at most: 0 in the middle, 1 at a limit; None without bounds."""
-        low, high = self.limits
         found = [self.bounds[key] for key in kinds if key in self.bounds]
-        ends = [Fraction(end) for bound in found for end in (bound.least, bound.greatest)]
-        return float(max(abs(2 * end - low - high) for end in ends) / (high - low)) if ends else None
+        return max((self.share((bound.least, bound.greatest)) for bound in found), default=None)
+
+    def share(self, found: tuple[float, float]) -> float:
+        """The share of its limits that a range uses."""
+        low, high = self.limits
+        return float(max(abs(2 * Fraction(end) - low - high) for end in found) / (high - low))

@@ -97,6 +97,10 @@ class DistanceSection(Section[DistanceRecipe]):
         """What an input with limits does in the loop, by the proof; in windows, in any of them."""
         return bound_of(own, self.proof, self.windows)
 
+    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
+        """The range of an input in each window."""
+        return () if self.proof is None else tuple(w.inputs[name] for w in self.windows if name in w.inputs)
+
     @property
     def split(self) -> Checked[DistanceRecipe] | None:
         """The gains of least bandwidth."""

@@ -162,6 +162,12 @@ class HardwareSection(Section[HardwareRecipe]):
         shares = InputShares(feedback=printable_above(self.told.feedback), adaptation=adaptation)
         return InputBound(least=found[0], greatest=found[1], shares=shares)
 
+    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
+        """The range of an input in each window."""
+        return (
+            () if self.proof is None else tuple(w.inputs[name] for w in self._windows() if name in w.inputs)
+        )
+
     def _inputs(self, recipe: HardwareRecipe, known: Told) -> Mapping[str, tuple[float, float]]:
         """What every input does, in any window."""
         windows = zip(self.machine.windows, self.told_in_windows, strict=False)

@@ -55,6 +55,11 @@ class Section(ABC, Generic[R]):
         """What an input with limits does in the loop, by the proof; None if there is none."""
         return None if self.proof is None else own.bound(self.proof.input_shares)
 
+    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
+        """The range of an input in each window; empty where nothing is proven in windows."""
+        del name
+        return ()
+
     @property
     def shortfalls(self) -> tuple[Shortfall, ...]:
         """What is missing."""

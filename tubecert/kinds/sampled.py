@@ -74,6 +74,10 @@ class SampledSection(Section[SampledRecipe]):
         """What an input with limits does in the loop, by the proof; in windows, in any of them."""
         return bound_of(own, self.proof, self.windows)
 
+    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
+        """The range of an input in each window."""
+        return () if self.proof is None else tuple(w.inputs[name] for w in self.windows if name in w.inputs)
+
     @property
     def pair(self) -> Checked[SampledRecipe] | None:
         """The gains that the verdict is about."""

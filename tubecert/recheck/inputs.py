@@ -43,11 +43,12 @@ class Limited:
     least: Enclosure
     greatest: Enclosure
     bounds: Mapping[str, InputBound]
+    windows: Mapping[str, tuple[str, ...]]
 
 
 def read_limited(node: Node) -> Limited:
     """One of `result.inputs`."""
-    own = node.closed("input", "limits", "verdict", "plan", "bounds")
+    own = node.closed("input", "limits", "verdict", "plan", "bounds", optional=("windows",))
     low, high = own["limits"].pair()
     plan = own["plan"].closed("least", "greatest")
     bounds = own["bounds"].closed(optional=KEYS)
@@ -58,7 +59,17 @@ def read_limited(node: Node) -> Limited:
         least=enclosure(plan["least"]),
         greatest=enclosure(plan["greatest"]),
         bounds={key: found for key in KEYS if (found := bounds.get(key, _bound)) is not None},
+        windows=own.get("windows", _windows) or {},
     )
+
+
+def _windows(node: Node) -> dict[str, tuple[str, ...]]:
+    own = node.closed(optional=KEYS)
+    return {key: found for key in KEYS if (found := own.get(key, _verdicts)) is not None}
+
+
+def _verdicts(node: Node) -> tuple[str, ...]:
+    return tuple(each.word(*VERDICTS) for each in node.entries())
 
 
 def _bound(node: Node) -> InputBound:
@@ -94,6 +105,19 @@ def agrees(
             yield inside, f"{own.name} is not within its limits by {key}"
             told = by is not None and _follows(own, bound, ranges(key, by))
             yield told, f"the bound of {own.name} by {key} is not what it consists of"
+        for key, along in own.windows.items():
+            yield (
+                along == _along(own, sections.get(key)),
+                f"{own.name}: the verdicts in the windows of {key} are not what the ranges there give",
+            )
+
+
+def _along(own: Limited, section: Section | None) -> tuple[str, ...]:
+    """The verdict on the limits in each window of a section; the ranges there are examined with the kind."""
+    low, high = own.limits
+    found = () if section is None else section.windows
+    ranges = [window.inputs[own.name] for window in found if own.name in window.inputs]
+    return tuple("certified" if low <= a and b <= high else "undecided" for a, b in ranges)
 
 
 def ranges(key: str, section: Section) -> Mapping[str, Range] | None:

@@ -127,6 +127,8 @@ def input_lines(result: Result, own: InputData) -> Iterator[str]:
             f"{own.input} {stays} {reaches}{where}; {limits}: {used(own, key)} used (the plan is in {plan}, feedback "
             f"adds {up(bound.feedback)}{adapts})"
         )
+        if (when := windows.nearest(own, windows.windows_of(result.sections.get(key)))) is not None:
+            yield f"{own.input} by window{where}: {when}"
     if not told:
         yield f"{own.input} is in {plan} on the plan; {limits}; nothing is proven of it in the loop"
     if own.verdict is Verdict.REFUTED:

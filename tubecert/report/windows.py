@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result
 from tubecert.digits import down, up
 from tubecert.kinds import Name
@@ -90,14 +91,16 @@ def blocks(
             ),
         )
     )
+    limited = bool(result.inputs) and any(w.inputs for w, _ in known)
     yield Table(
-        columns=("time", "radius", "half-widths", "inputs"),
+        columns=("time", "radius", "half-widths", "inputs", *(["limits"] if limited else [])),
         rows=tuple(
             (
                 Cell(text=between(w)),
                 Cell(text=up(radius), kind="number"),
                 Cell(text=half_widths(result, w.half_widths)),
                 Cell(text=inputs(result, w.inputs)),
+                *([Cell(text=limits(result, w.inputs))] if limited else []),
             )
             for w, radius in known
         ),
@@ -109,6 +112,31 @@ def of_gains_blocks(result: Result) -> Iterator[Block]:
     """The tubes of B and of C along the plan."""
     for name, own in of_gains(result):
         yield from blocks(result, own, f"along-{name.key}", f"The tube along the plan with {name}")
+
+
+def limits(result: Result, ranges: Mapping[str, tuple[float, float]]) -> str:
+    """How much of its limits every input uses that has some: `u 83 %`; if beyond them, that they are not proven."""
+    return ", ".join(
+        f"{own.input} {_used(own, ranges[own.input])}" for own in result.inputs if own.input in ranges
+    )
+
+
+def _used(own: InputData, found: tuple[float, float]) -> str:
+    share = own.share(found)
+    return f"{up(100 * share, 3)} %" + ("" if share <= 1 else ", not proven to stay within them")
+
+
+def nearest(own: InputData, windows: Sequence[WindowData]) -> str | None:
+    """When an input with limits is nearest to them, and in how many windows it is not proven to keep them."""
+    known = [(w, own.share(w.inputs[own.input])) for w in windows if own.input in w.inputs]
+    if len(known) < 2:
+        return None
+    window, most = max(known, key=lambda item: item[1])
+    beyond = sum(share > 1 for _, share in known)
+    told = (
+        f"most {between(window)} ({up(100 * most, 3)} %), least {down(100 * min(s for _, s in known), 3)} %"
+    )
+    return told + (f"; beyond its limits in {beyond} of {len(known)} windows" if beyond else "")
 
 
 def half_widths(result: Result, widths: Mapping[str, float]) -> str:

@@ -64,6 +64,11 @@ class Judged:
             input=own,
             bounds={key: bound for key, bound in found.items() if bound is not None},
             verdict=own.verdict([found[key] for key in self.deciding]),
+            windows={
+                key: own.along(ranges)
+                for key, section in self.sections.items()
+                if (ranges := section.input_along(own.name))
+            },
         )
 
     def derived(self) -> dict[str, tuple[Constant, Meaning]]:

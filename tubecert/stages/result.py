@@ -259,6 +259,7 @@ def _input_data(found: JudgedInput) -> InputData:
             )
             for key, bound in found.bounds.items()
         },
+        windows=dict(found.windows),
     )
 
 

@@ -14,6 +14,7 @@ from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP, Claim
+from tubecert.recheck.kinds.window_section import WindowSection
 from tubecert.recheck.place import Place
 from tubecert.recheck.recipe import MachineNumbers
 from tubecert.recheck.specification import Specification
@@ -36,10 +37,11 @@ class Shortfall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """The section of a kind, read."""
+    """The section of a kind, read; `windows`: what it tells of each, where it has them."""
 
     verdict: str
     shortfalls: tuple[Shortfall, ...]
+    windows: tuple[WindowSection, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
