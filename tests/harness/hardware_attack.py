@@ -190,7 +190,7 @@ def filled(setting: Setting, loop: Loop, seed: int, empty: Batch) -> Batch:
                 shares=shares(seen),
                 windows=tuple(by_window(loop, runs)),
                 broken=tuple(sorted(set(_broken(seen)))),
-                error=seen.error / setting.least_radius,
+                error=seen.error / setting.rho,
             )
         )
     return replace(found, seconds=time.process_time() - started)

@@ -504,6 +504,17 @@ def test_disturbances_are_what_they_say():
     assert 0 < clipped < 9
 
 
+def test_errors_are_measured_in_the_coordinates_of_the_tube():
+    """A narrow tube in one state asked for its own accuracy of all states, in whatever unit these are."""
+    S = np.array([[30.0, 0.0], [2.0, 0.5]])
+    still = Disturbance.from_expressions(wavy_h(), TWO, 1)
+    plain, own = (integrate(problem("ccm", P=P), START, still, tolerance=1e9) for P in (None, S.T @ S))
+    assert own.x == pytest.approx(plain.x, abs=1e-13)
+    change = own.error[0] / plain.error[0]
+    assert np.linalg.norm(S, -2) < change < np.linalg.norm(S, 2)
+    assert change > 2
+
+
 def test_bad_arguments_are_refused():
     gains = LoopGains(bandwidth=10.0, projection_radius=1.0)
     for options in (

@@ -117,11 +117,12 @@ class Ellipsoid:
         self._spread, self._rho, self._sides = coordinates.spread, rho, sides
         self._square = math.nextafter(float(rho * rho), math.inf)
         self._forms: dict[tuple[int, ...], _Form] = {}
+        whole = [ceiling(exact(rho) * root(exact(row[i]))) for i, row in enumerate(self._spread)]
+        self._extents = [min(reach, ceiling(exact(side))) for reach, side in zip(whole, sides, strict=True)]
 
     def extent(self, state: int) -> float:
         """The half-width, or what the ellipsoid leaves."""
-        whole = ceiling(exact(self._rho) * root(exact(self._spread[state][state])))
-        return min(whole, ceiling(exact(self._sides[state])))
+        return self._extents[state]
 
     def _form(self, which: Sequence[int]) -> _Form:
         key = tuple(which)

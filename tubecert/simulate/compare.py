@@ -81,9 +81,9 @@ class Comparison:
 
 def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison:
     """The comparison of runs with the tube, and with a promise if there is one."""
-    usable = runs.error <= USABLE * setting.least_radius
+    usable = runs.error <= USABLE * setting.rho
     stopped = {item.lane for item in runs.failures}
-    slack = 1 + _EXACT + np.where(usable, runs.error, 0.0) / setting.least_radius
+    slack = 1 + _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
     bounds = {"distance": setting.reach, "deviation": setting.rho}
     bounds |= dict(promise.bounds) if promise else {}
     uses = {name: _use(runs, name, bounds.get(name), usable) for name in SHOWN} if usable.any() else {}

@@ -36,7 +36,7 @@ def integrate(
     *,
     tolerance: float,
 ) -> Runs:
-    """N runs from x0 (N, n) under a disturbance of N lanes, to an error of about `tolerance` in |x|.
+    """N runs from x0 (N, n) under a disturbance of N lanes, to an error of about `tolerance` in |S x|, P = S'S.
 
     A lane that cannot be integrated so far has a larger `error` than asked for, and `unresolved` says from when on; it
     is given up as soon as halving its steps no longer helps, which is so where the loop itself amplifies every
@@ -147,7 +147,7 @@ class _Lanes:
     ) -> NDArray[np.bool_]:
         """Takes the finer runs, estimates their errors, and says which lanes are done."""
         coarser = self.found
-        apart = np.sqrt(np.sum((finer.x - coarser.x[lanes]) ** 2, axis=2))
+        apart = self._length(finer.x - coarser.x[lanes])
         change = apart.max(axis=1)
         change = np.where(np.isnan(change), np.inf, change)
         failed, before = finer.status != 0, coarser.status[lanes] != 0
@@ -163,6 +163,12 @@ class _Lanes:
         self.unresolved[lanes] = np.where(beyond.any(axis=1), first, np.nan)
         done = np.where(failed, before & agree, change <= tolerance)
         return np.asarray(done | self._hopeless(lanes, number))
+
+    def _length(self, z: Array) -> Array:
+        """|S z| of the last axis, in the coordinates of the tube."""
+        P = self.problem.P
+        square = np.sum(z**2 if P is None else z * (z @ P), axis=-1)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
     def _hopeless(self, lanes: NDArray[np.intp], number: int) -> NDArray[np.bool_]:
         """Whether smaller steps do not help: a change that stays, or a lane that is stopped at every level."""

@@ -147,7 +147,7 @@ def _sample_table(campaign: Campaign, attack: Attack) -> tuple[list[str], Array]
         "xtilde": worst.xtilde.value,
         "sigma_error": worst.sigma_error.value,
         "h": worst.h.value,
-        "error_over_rho": runs.error / setting.least_radius,
+        "error_over_rho": runs.error / setting.rho,
     }
     return list(columns), np.stack(list(columns.values()), axis=1)
 

@@ -53,7 +53,7 @@ class Runs:
     distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a
     is then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is
     0. `least` and `greatest` (N, m) are of every input, over all steps. After a lane was stopped its values are nan.
-    `error` (N,) is the largest difference in |x| to the run with steps twice as long, an estimate of the error and
+    `error` (N,) is the largest difference in |S x| to the run with steps twice as long, an estimate of the error and
     mostly far above it; it is inf for a lane that was stopped. `unresolved` (N,) is the first output time at which that
     difference exceeds the tolerance, nan where it never does.
     """

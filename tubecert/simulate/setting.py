@@ -117,11 +117,6 @@ class Setting:
         return self.certified.S
 
     @property
-    def least_radius(self) -> float:
-        """|x - x*| below this is |S (x - x*)| <= rho."""
-        return self.rho / float(np.linalg.norm(self.S, 2))
-
-    @property
     def greatest_radius(self) -> float:
         """|x - x*| is at most this where |S (x - x*)| <= rho."""
         return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
@@ -133,8 +128,8 @@ class Setting:
 
     @property
     def tolerance(self) -> float:
-        """The error of |x| that the integrator is asked for."""
-        return _TOLERANCE * self.least_radius
+        """The error of |S x| that the integrator is asked for."""
+        return _TOLERANCE * self.rho
 
     @property
     def half_widths(self) -> Array:
