@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import constant
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
@@ -53,7 +54,7 @@ def test_what_is_written_is_what_was_proven(name, monkeypatch):
     found = synthesise(SPEC, WANTED, Options())
     if found.verdict == "certified":  # then the file is proven by itself
         model = build(found.spec)
-        proof = verify_metric(model, found.spec.safe_set, ladder.Effort())
+        proof = verify_metric(model, found.spec.safe_set, Effort())
         assert proof.verdict == "certified"
     else:
         assert found.file is None
@@ -61,7 +62,7 @@ def test_what_is_written_is_what_was_proven(name, monkeypatch):
 
 def test_a_proof_knows_what_it_is_about():
     model = build(SPEC)
-    proof = verify_metric(model, SPEC.safe_set, ladder.Effort())
+    proof = verify_metric(model, SPEC.safe_set, Effort())
     assert proof.is_about(model, SPEC.safe_set)
     assert proof.is_about(build(load(str(Path(SPEC.path)))), SPEC.safe_set)
     smaller = tuple((lo / 2, hi) for lo, hi in SPEC.safe_set)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tubecert import certificate, pipeline
-from tubecert.bounds.hardware import _rate_of
+from tubecert.bounds.feedforward import rate_of
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import constant, symbol
@@ -131,7 +131,7 @@ def test_the_defect_falls_with_the_order_of_the_method():
 
 def test_the_steepest_input_is_at_an_end_of_a_piece():
     data = knots(uneven=True)
-    found = _rate_of(data)
+    found = rate_of(data)
     times = np.linspace(0, 2, 401)
     u = np.array([float(exactly(data, Fraction(float(t)))[-1]) for t in times])
     sampled = float(np.abs(np.diff(u) / np.diff(times)).max())
