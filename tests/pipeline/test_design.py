@@ -7,14 +7,17 @@ from fractions import Fraction
 
 import pytest
 from rechecked import certified, examine, failing
-from systems import SCALAR
+from systems import IN_WINDOWS, SCALAR
 
-from tubecert.claims.advice import EaseHardware, LessenCause
+from tubecert.certificate.result import Result
+from tubecert.claims.advice import EaseHardware, LessenCause, TakeWindows
 from tubecert.pipeline import Options, certify
 from tubecert.pipeline.design import narrowest, needed_of
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.spec import load_text
+from tubecert.spec.windows import more_windows
 from tubecert.verdict import Verdict
+from tubecert.words.advice import advice
 
 RADIUS = Measure(units={})
 H = Options(conditions="hardware")  # where nothing rests on the other kinds
@@ -68,6 +71,38 @@ def test_a_loop_that_does_not_serve_says_what_fills_it_and_which_machine_would()
     serving = text.replace("rate: 2,", f"sample_time: {easier.value},")
     assert certify(load_text(serving), Options()).verdict is Verdict.CERTIFIED
     assert failing(examine(certified(text, conditions="H"))) == []
+
+
+@pytest.mark.slow
+def test_a_plan_that_moves_may_be_proven_in_windows_and_that_is_said():
+    text = IN_WINDOWS.replace(", windows: [0.3, 0.9]", "").replace("rate: 500", "rate: 8")
+    document = certified(text, conditions="H", gap=Fraction(1, 5))
+    found = Result.from_json(document["result"])
+    assert found.verdict is Verdict.UNDECIDED
+    (offer,) = (each for each in found.reason.relax if isinstance(each, TakeWindows))
+    assert offer.windows == 7  # of 2 s, two samples of 125 ms and the delay each
+    assert "tube.windows: 7 may do" in advice(found.reason.relax)
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "windows"),
+    [
+        (lambda text: text, 20),
+        (lambda text: text.replace("rho_a: 0.1}", "rho_a: 0.1, windows: 7}"), 20),
+        (lambda text: text.replace("rho_a: 0.1}", "rho_a: 0.1, windows: 30}"), 60),
+        (lambda text: text.replace("rate: 500", "rate: 25"), 20 + 4),
+        (lambda text: text.replace("rate: 500", "rate: 1"), None),
+        (lambda text: text.replace("rate: 500", "sample_time: largest"), None),
+        (lambda text: text.replace("bound: 0.01", "bound: largest"), None),
+        (lambda text: SCALAR, None),
+    ],
+)
+def test_how_many_windows_might_do(change, windows):
+    text = change(IN_WINDOWS.replace(", windows: [0.3, 0.9]", ""))
+    if windows == 24:  # as many as there is room for, once there are 20 or more
+        text = text.replace("rho_a: 0.1}", "rho_a: 0.1, windows: 20}")
+    assert more_windows(load_text(text)) == windows
 
 
 @pytest.mark.slow

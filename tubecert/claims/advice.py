@@ -40,6 +40,14 @@ class EaseHardware(Relax):
     value: Fraction
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakeWindows(Relax):
+    """In so many windows of time, with smaller constants in each, certificate H may be proven; it is not tried."""
+
+    tag: ClassVar[str] = "take_windows"
+    windows: int
+
+
 HardwareCause = Literal[
     "plan",
     "feedforward",

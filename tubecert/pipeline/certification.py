@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from tubecert.certificate.result import Result
-from tubecert.claims.advice import MendPlan
+from tubecert.claims.advice import MendPlan, TakeWindows
 from tubecert.claims.family import Reason
+from tubecert.claims.gains import ConditionHolds
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
-from tubecert.kinds import RATES
+from tubecert.kinds import HARDWARE, RATES
 from tubecert.kinds.table import kinds_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
@@ -25,6 +26,7 @@ from tubecert.search.coordinates import Wish, propose
 from tubecert.search.machines import PARTS
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
+from tubecert.spec.windows import more_windows
 from tubecert.stages.bounded import Bounded, bound
 from tubecert.stages.judged import Judged, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
@@ -34,6 +36,13 @@ from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tub
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
 
+_OF_THE_WHOLE = (
+    "initial_distance",
+    "bounded",
+    "wind_bound",
+    "gain_unmatched",
+    "gain_range",
+)  # windows do not help
 NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
 
 
@@ -127,10 +136,24 @@ def explain(judged: Judged) -> Explanation:
         for key in dict.fromkeys([*printed, *judged.deciding])
         for reason in reasons(judged.sections[key], explained[key])
     ]
+    told = [_in_windows(judged, reason) for reason in told]
     return Explanation(
         reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded), *input_reasons(judged)],
         elasticities={key: _told(each.slopes) for key, each in explained.items() if each.slopes is not None},
     )
+
+
+def _in_windows(judged: Judged, reason: Reason) -> Reason:
+    """Where certificate H is not proven, and the plan has parts, that it might be in windows."""
+    claim, windows = reason.claim, more_windows(judged.question.spec)
+    of_machine = (
+        isinstance(claim, ConditionHolds)
+        and claim.section == HARDWARE.key
+        and claim.condition not in _OF_THE_WHOLE
+    )
+    if reason.verdict is Verdict.CERTIFIED or not of_machine or windows is None:
+        return reason
+    return replace(reason, relax=(*reason.relax, TakeWindows(windows=windows)))
 
 
 def _told(slopes: Mapping[str, float]) -> dict[str, float]:

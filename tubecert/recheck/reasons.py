@@ -224,6 +224,7 @@ _RELAX: Mapping[str, Form] = {
     "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
     "halve_hardware": ({"part": _PART, "factor": Node.number}, {}),
     "ease_hardware": ({"part": _PART, "value": Node.decimal}, {}),
+    "take_windows": ({"windows": Node.count}, {}),
     "lessen_cause": ({"cause": _CAUSE, "share": Node.number}, {}),
     "turn_knob": (
         {"knob": _KNOB, "now": Node.decimal, "value": Node.decimal},

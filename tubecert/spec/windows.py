@@ -17,6 +17,7 @@ from tubecert.spec.types import Disturbance, Hardware, Spec, Trajectory, Tube
 
 KEY: Final = "windows"
 MOST: Final = 200
+_USUAL: Final = 20
 
 
 def with_windows(tube: Tube | None, entries: Mapping[str, Field], names: Names) -> Tube | None:
@@ -136,6 +137,21 @@ def pad_of(machine: Hardware) -> Fraction:
     if Ts is None or delay is None:
         raise ValueError("windows need a machine of which every number is given")
     return 2 * max(Ts, machine.feedback_time or Ts) + delay
+
+
+def more_windows(spec: Spec) -> int | None:
+    """How many windows H might be tried in: 20, or twice as many as there are; None where there can be no more."""
+    machine, plan, tube, wind = spec.hardware, spec.trajectory, spec.tube, spec.disturbance
+    if machine is None or plan.horizon is None or plan.kind in ("equilibrium", "any") or tube.auto:
+        return None
+    if machine.largest is not None or machine.arithmetic is not None or machine.geodesic is not None:
+        return None
+    if wind is not None and wind.bound is None:
+        return None
+    now = max(1, len(windows_of(spec)) - 1)
+    most = min(MOST, int(plan.horizon / pad_of(machine)))
+    found = min(most, max(_USUAL, 2 * now if now >= _USUAL else 0))
+    return found if found > now else None
 
 
 def windows_of(spec: Spec) -> tuple[Fraction, ...]:

@@ -41,6 +41,7 @@ from tubecert.claims.advice import (
     ReduceRadii,
     ShrinkSafeSet,
     ShrinkTube,
+    TakeWindows,
     TurnKnob,
 )
 from tubecert.claims.family import Relax
@@ -59,7 +60,8 @@ def advice(items: Sequence[Relax]) -> str:
     plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
     causes = _filled([item for item in items if isinstance(item, LessenCause)])
     others = [item for item in items if not isinstance(item, _SAID_APART)]
-    return "; ".join(filter(None, (halvings, turns, _alternatives(others), causes, *plans)))
+    windows = [_windows(item) for item in items if isinstance(item, TakeWindows)]
+    return "; ".join(filter(None, (halvings, turns, _alternatives(others), *windows, causes, *plans)))
 
 
 def _alternatives(items: Sequence[Relax]) -> str:
@@ -70,7 +72,7 @@ def _alternatives(items: Sequence[Relax]) -> str:
     return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
-_SAID_APART = (HalveConstant, HalveHardware, LessenCause, TurnKnob, MendPlan)
+_SAID_APART = (HalveConstant, HalveHardware, LessenCause, TurnKnob, MendPlan, TakeWindows)
 _TRIED = (HigherDegree, AskForRateUpTo, ShrinkSafeSet)
 
 
@@ -92,6 +94,13 @@ def _easier(item: EaseHardware) -> str:
     unit = " s" if item.part in ("sample_time", "delay") else ""
     rate = f" ({near(1 / item.value, 4)} Hz)" if item.part == "sample_time" else ""
     return f"bring {PARTS[item.part]} down to {near(item.value, 4)}{unit}{rate}, which is proven to serve"
+
+
+def _windows(item: TakeWindows) -> str:
+    return (
+        f"tube.windows: {item.windows} may do without a better machine (not tried): "
+        "in each part of the plan constants are smaller"
+    )
 
 
 def _filled(items: Sequence[LessenCause]) -> str:
