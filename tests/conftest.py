@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from functools import cache
 
 import pytest
 import shared
@@ -43,6 +44,17 @@ def interruptible():
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def commands_made_once():
+    """typer makes the tree of all commands anew for every line that a test types: longer than most of them run."""
+    import typer.main
+    import typer.testing
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.testing, "_get_command", cache(typer.main.get_command))
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

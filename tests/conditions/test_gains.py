@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from machines import alive_machine
-from test_hardware import SETTLED, recipe, with_gain
+from test_hardware import proving, recipe, with_gain
 
 from tubecert.bounds.constants import GainConstants
 from tubecert.conditions import hardware
@@ -45,7 +45,7 @@ def test_more_of_it_costs_more():
 
 
 def test_a_gain_that_may_vanish_or_acts_elsewhere_proves_nothing():
-    own, problem = SETTLED[NAME], with_gain(alive_machine())
+    own, problem = proving(NAME), with_gain(alive_machine())
     assert isinstance(check(problem, own), Proof)
     for gain, claim in (
         (GainConstants(error=Constant(below=0.0, above=1.0), matched=True), "gain_range"),

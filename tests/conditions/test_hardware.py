@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 
 import mpmath as mp
@@ -227,15 +228,16 @@ def decimal(value):
     return F(mp.nstr(value * (1 + mp.mpf("1e-10")), 18))
 
 
-SETTLED = {
-    name: settled(problem, recipe(**{"level": F("0.8"), "floor": F("0.2")} | changes))
-    for name, (problem, changes) in FORMS.items()
-}
+@cache
+def proving(name):
+    """A recipe that proves the theorem at a form."""
+    problem, changes = FORMS[name]
+    return settled(problem, recipe(**{"level": F("0.8"), "floor": F("0.2")} | changes))
 
 
 @pytest.mark.parametrize("name", FORMS)
 def test_a_proof_needs_every_side_condition(name):
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     assert isinstance(check(problem, own), Proof), check(problem, own).margins
     for field in ("bias", "ripple", "prediction", "speed"):
         if getattr(own, field) is not None:
@@ -248,7 +250,7 @@ def test_a_proof_needs_every_side_condition(name):
 @pytest.mark.parametrize("name", FORMS)
 def test_the_least_level_is_that_of_the_oracle(name):
     """At the oracle's own max(d0, f0, d1, sup D) the theorem ends."""
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     need = needed(given(problem, own))
     margin = margins_hardware(problem, own)[1]
     assert float(margin.lo) == pytest.approx(
@@ -271,7 +273,7 @@ def values_of(constants):
     "name", ["plain", "prediction", "a flat metric", "a slow feedback out of step", "wind"]
 )
 def test_more_of_any_constant_needs_no_less(name):
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     least = float(margins_hardware(problem, own)[1].lo)
     known = values_of(problem.machine.constants)
     for field, value in known.items():
@@ -321,7 +323,7 @@ def test_without_time_noise_and_wind_it_is_theorem_B_with_e_0():
 def test_the_scale_of_the_metric_does_not_matter(name):
     """W -> W/c^2: distances and what is measured by the metric grow by c; Y, S, N and the margins stay."""
     c = F(8)
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     tube, machine = problem.constants, problem.machine
     k = float(c)
     scaled = {
@@ -371,7 +373,7 @@ def test_the_scale_of_the_metric_does_not_matter(name):
 )
 def test_no_solution_of_the_comparison_equation_exceeds_the_closed_form(name):
     """D' = -lambda D + R(t), with both saw-teeth as they are, integrated exactly from step to step."""
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     for Ts, scale in ((own.sample_time, 1), (own.sample_time * 40, 40)):
         slow = replace(
             own,
@@ -430,14 +432,14 @@ def integrated(g, q):
     ids=str,
 )
 def test_it_is_stated_for_machines_only(change):
-    problem, own = FORMS["plain"][0], SETTLED["plain"]
+    problem, own = FORMS["plain"][0], proving("plain")
     assert not isinstance(check(problem, replace(own, **change)), Proof)
     assert not all(margin.lo > 0 for margin in margins_hardware(problem, replace(own, **change)))
 
 
 def test_a_delay_is_at_most_one_sample():
     problem, T = FORMS["plain"][0], F(1001, 10**6)
-    late = replace(SETTLED["plain"], delay=T)
+    late = replace(proving("plain"), delay=T)
     possible = replace(late, sample_time=T, feedback_time=T)
     assert margins_hardware(problem, settled(problem, possible))[1].lo > 0
     assert margins_hardware(problem, settled(problem, late))[1].lo == -np.inf
@@ -452,7 +454,7 @@ def test_the_rate_of_noise_is_in_units_of_noise():
 
 
 def test_the_noise_has_to_fit_into_dbar_beside_the_level():
-    problem, own = FORMS["plain"][0], SETTLED["plain"]
+    problem, own = FORMS["plain"][0], proving("plain")
     level = margins_hardware(problem, own)[0]
     assert float(level.lo) == pytest.approx(1 - (0.8 + 0.00125) / (0.9**0.5 * 0.9), abs=1e-12)
 
@@ -474,7 +476,7 @@ def test_the_noise_has_to_fit_into_dbar_beside_the_level():
     ids=str,
 )
 def test_a_proof_is_about_the_machine_that_is_asked_for(asked, change):
-    own = SETTLED["plain"]
+    own = proving("plain")
     given_before = {"delay": F(1, 2000), "noise": F(1, 1000), "held": True}
     problem = asking(FORMS["plain"][0], **given_before)
     assert hardware.THEOREM.is_about(problem, own)
@@ -485,7 +487,7 @@ def test_a_proof_is_about_the_machine_that_is_asked_for(asked, change):
 
 def test_curved_geodesics_that_may_not_be_unique_prove_nothing():
     problem = alive_machine(values={"symbols": 1.2, "symbols_slope": 0.3})
-    assert margins_hardware(problem, SETTLED["plain"])[1].lo == -np.inf
+    assert margins_hardware(problem, proving("plain"))[1].lo == -np.inf
 
 
 def test_the_clip_is_a_box_or_a_ball():
@@ -517,7 +519,7 @@ def test_it_needs_what_it_contains():
 
 
 def test_the_budget_adds_up():
-    problem, own = FORMS["wind"][0], SETTLED["wind"]
+    problem, own = FORMS["wind"][0], proving("wind")
     told = hardware.told(problem, own)
     x = evaluated(plant(problem, own.clip_radius), loop_of(own))
     whole = sum(getattr(told.budget, item.name) for item in fields(told.budget))

@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 from machines import covariant_constants, hardware_constants, windy
 from problems import constants as tube_constants
-from test_hardware import FORMS, SETTLED, settled, values_of
+from test_hardware import FORMS, proving, settled, values_of
 
 from tubecert.bounds.constants import TABLE
 from tubecert.conditions.hardware import margins_hardware
@@ -51,7 +51,7 @@ def changed(constants, make, sizes):
 )
 def test_units_of_inputs_and_time_do_not_matter(name, sizes):
     """By the units that the constants state; factors are powers of two, so that every number stays exact."""
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     machine, wind = problem.machine, problem.wind
     asked = replace(
         machine.asked,
@@ -106,7 +106,7 @@ def with_machine(problem, own, **values):
 
 @pytest.mark.parametrize("name", ["plain", "a flat metric", "prediction", "covariant"])
 def test_a_later_input_and_more_noise_need_more_and_tend_to_what_none_needs(name):
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     for key, most in (("delay", F(1, 1000)), ("noise", F(1, 500))):
         sizes = (most / 10**12, most / 10**9, most / 4, most / 2, most)
         found = [needed(*with_machine(problem, own, **{key: size})) for size in sizes]
@@ -116,7 +116,7 @@ def test_a_later_input_and_more_noise_need_more_and_tend_to_what_none_needs(name
 
 @pytest.mark.parametrize("name", ["plain", "a flat metric", "covariant"])
 def test_more_wind_needs_more_and_tends_to_what_none_needs(name):
-    problem, own = FORMS[name][0], SETTLED[name]
+    problem, own = FORMS[name][0], proving(name)
     calm = needed(problem, own)
     sizes = (F(1, 10**12), F(1, 100), F(1, 50))
     found = [needed(windy(problem, size), replace(own, wind=size)) for size in sizes]
