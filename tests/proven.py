@@ -6,22 +6,31 @@ Not for tests that put something broken in the producer's place: what it makes w
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pytest
 from shared import once
 
 from tubecert import certificate, pipeline
 from tubecert.certificate.result import Result
+from tubecert.pipeline import certification
+from tubecert.search.proposers import Explained, Proposer
 from tubecert.spec import load_text
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
 
-def proven(text: str, **options: Any) -> Any:
-    """The certificate of a specification, as a reader of the file finds it."""
-    return json.loads(_made(text, pipeline.Options(**options))[1])
+def proven(text: str, *, bare: bool = False, **options: Any) -> Any:
+    """The certificate of a specification, as a reader of the file finds it.
+
+    `bare`: what is claimed, without curves, gains beside those that decide and advice, which take longer than the rest.
+    """
+    return json.loads(_made(text, pipeline.Options(**options), bare)[1])
 
 
 def shipped(name: str, **options: Any) -> Any:
@@ -31,13 +40,28 @@ def shipped(name: str, **options: Any) -> Any:
 
 def result(text: str, **options: Any) -> Result:
     """The result itself, for what is made of it before there is a file."""
-    return _made(text, pipeline.Options(**options))[0]
+    return _made(text, pipeline.Options(**options), False)[0]
 
 
 @cache
-def _made(text: str, options: pipeline.Options) -> tuple[Result, str]:
+def _made(text: str, options: pipeline.Options, bare: bool) -> tuple[Result, str]:
     def make() -> tuple[Result, str]:
-        found = pipeline.certify(load_text(text, "spec.yaml"), options)
+        with _bare() if bare else nullcontext():
+            found = pipeline.certify(load_text(text, "spec.yaml"), options)
         return found, certificate.dump(certificate.seal(found.to_json(), {}))
 
-    return once(make, "proven", text, options)
+    return once(make, "proven", text, options, bare)
+
+
+@contextmanager
+def _bare() -> Iterator[None]:
+    """Nothing is looked for beside what is proven, and nothing is explained."""
+    asked = certification._asked
+
+    def unexplained(proposer: Proposer) -> Explained:
+        return Explained(slopes=None if proposer.slopes is None else {})
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(certification, "_asked", lambda question: replace(asked(question), curve=False))
+        patch.setattr(certification, "_explained", lambda judged, key, proposer: unexplained(proposer))
+        yield

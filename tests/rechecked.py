@@ -22,14 +22,14 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 Document = dict[str, Any]
 
 
-def certified(text: str, **options: object) -> Document:
-    """The certificate of a specification; by default with all conditions."""
-    return proven.proven(text, **{"conditions": "all", **options})
+def certified(text: str, *, bare: bool = True, **options: object) -> Document:
+    """The certificate of a specification, of what is claimed alone; by default with all conditions."""
+    return proven.proven(text, bare=bare, **{"conditions": "all", **options})
 
 
 def shipped(name: str) -> Document:
-    """The certificate of a shipped configuration."""
-    return certified((CONFIGS / f"{name}.yaml").read_text("utf-8"))
+    """The certificate of a shipped configuration, as users have it."""
+    return certified((CONFIGS / f"{name}.yaml").read_text("utf-8"), bare=False)
 
 
 def digest(data: object) -> str:

@@ -168,6 +168,7 @@ def test_points_called_inside_are_inside(which):
         assert np.all(np.abs(y) <= sides[which])
 
 
+@pytest.mark.slow
 def test_the_domain_is_sharp_in_every_direction():
     """sup c'x over the ellipsoid is rho |S^-T c|, whichever states c involves."""
     at_rest = constant_plan([Fraction(0)] * 3, [Fraction(0)], None)
@@ -228,6 +229,7 @@ def test_half_widths_of_a_constant_metric_are_exact():
     assert found.sides[0] <= Fraction(3, 20)
 
 
+@pytest.mark.slow
 def test_half_widths_are_those_of_the_domain_itself():
     """(1.7), by samples: no W_ii of the domain is above what its half-widths allow, nor M below a."""
     own = model()

@@ -45,6 +45,7 @@ def values_of(rows, names, at):
     return tape.run_floats([np.float64(v) for v in at], ()).reshape(len(rows), -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("S", [None, [["1", "0.2", "0"], ["0", "2", "-0.3"], ["0", "0", "0.5"]]])
 def test_the_plant_is_f_and_B_with_an_h_behind_a_gain(S):
     """(H.32): f(x, theta) + B(x, theta)(u + h0) = f + B u* + B (I + Delta)(u - u* + h) + r, at any input."""

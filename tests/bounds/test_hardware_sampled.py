@@ -250,6 +250,7 @@ def test_a_plan_through_knots(interpolation):
     assert still.input_rate() == Constant.exactly(0.0)
 
 
+@pytest.mark.slow
 def test_every_plan_of_a_family():
     own = model_of()
     P = ((Fraction(-1, 10), Fraction(1, 10)), (Fraction(0), Fraction(1, 5)))

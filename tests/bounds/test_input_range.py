@@ -87,6 +87,7 @@ def test_of_a_family_it_is_the_box():
     assert Fraction(least.below) <= Fraction("0.1") <= Fraction(greatest.above)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=6),

@@ -29,6 +29,7 @@ def points(box, count=40):
         yield tuple(low + Fraction(float(p)) * (high - low) for p, (low, high) in zip(part, box, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["flat", "curved"])
 def test_no_start_of_the_box_is_further_away(case):
     model, box = (two_state(), FLAT) if case == "flat" else (three_state(), CURVED)

@@ -183,6 +183,7 @@ def test_further_ranges_are_searched_too():
     assert found.below <= 3 <= found.above
 
 
+@pytest.mark.slow
 def test_a_smaller_tube_has_smaller_suprema():
     sums = [
         supremum(SumOfNorms([((x,), (y,), (z,))]), tube_of("wild", rho), Effort()) for rho in (0.1, 0.2, 0.4)

@@ -98,6 +98,7 @@ def _pencil(s):
     return Pencil(s.model.BBt, s.model.W)
 
 
+@pytest.mark.slow
 def test_a_field_of_the_state_is_sampled():
     E = [["cos(x1)", "x2"], ["1 + x1**2", "0.3"]]
     found = wind_constants(s := suprema(E), beta(s))

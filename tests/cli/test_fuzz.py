@@ -47,6 +47,7 @@ def dying(first, last, options, pipe):
     pipe.send((last, "peak", 50.0))
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_a_failure_and_the_rest_goes_on(monkeypatch):
     monkeypatch.setattr(fuzz, "work", dying)
     report = fuzz.run(fuzz.options_of(["--cases", "5", "--jobs", "1"]))

@@ -136,6 +136,7 @@ def test_a_signal_leaves_nothing_behind(folder, number, code, said, where):
     assert not list(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_a_signal_while_modules_are_imported():
     for name in ("typer", "numpy"):
         before = f"""

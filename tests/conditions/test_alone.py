@@ -49,6 +49,7 @@ def test_the_bound_is_that_of_the_closed_form():
     assert found.judgement.ultimate_radius == pytest.approx(0.24, rel=1e-12)
 
 
+@pytest.mark.slow
 @given(st.floats(0, 1.9), st.floats(0, 2), st.floats(0, 1), st.floats(0.01, 20), st.booleans())
 def test_it_is_above_the_solution_of_the_comparison_equation(d0, h, delta, T, endless):
     of = problem(None if endless else repr(T), initial_distance=d0, h=h, plan_defect_metric=delta)

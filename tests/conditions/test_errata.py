@@ -91,6 +91,7 @@ def tracking_gap(K, *, step=4e-6):
     return gap, largest
 
 
+@pytest.mark.slow
 def test_the_bound_between_plan_and_reference_is_false():
     """M = B = 1, x* = 0, lambda = 1, f = -2 x - K bump(x), h = 0: (26a)-(26c) hold, |x_r - x| > rho_a."""
     omega, Gamma, rho_a, x0, Dh = 20.0, 27983.0, 0.05, 0.8, 0.1

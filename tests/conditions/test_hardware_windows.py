@@ -335,6 +335,7 @@ def test_a_radius_of_its_own_limits_the_level():
     assert not isinstance(check(problem, recipe({}, {}, {})), Proof)
 
 
+@pytest.mark.slow
 def test_the_search_looks_below_the_level_of_the_whole_tube():
     """Where the metric is larger in the windows levels could be higher there, but none is proven above dbar.
 

@@ -243,6 +243,7 @@ def test_renaming_the_variables_changes_nothing_beyond_the_gap(order):
     assert second.below <= first.above
 
 
+@pytest.mark.slow
 def test_polynomials_against_a_grid():
     rng = np.random.default_rng(5)
     grid = np.stack([g.ravel() for g in np.meshgrid(*[np.linspace(-1, 1, 201)] * 2)])

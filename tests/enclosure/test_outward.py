@@ -128,6 +128,7 @@ def test_weights_of_the_denominator_lie_below_it():
             assert min(s0, s1, w0, w1) >= 0
 
 
+@pytest.mark.slow
 def test_ranges_down_to_zero_are_bounded_by_their_two_ends():
     """For all mu in (0, h]; and where the cross terms alone count the bound is attained."""
     rng = np.random.default_rng(11)

@@ -116,6 +116,7 @@ def test_progress_goes_on_and_ends_with_all_boxes(short):
 numbers = st.integers(-8, 8).map(lambda k: number(str(k / 4)))
 
 
+@pytest.mark.slow
 @given(st.lists(numbers, min_size=8, max_size=8), st.integers(1, 200), st.integers(1, 9))
 @settings(max_examples=15, deadline=None)
 def test_random_searches_enclose_their_supremum(c, alone, parts):
@@ -183,6 +184,7 @@ def test_processes_and_one_that_is_killed(short, tmp_path):
     assert found == own
 
 
+@pytest.mark.slow
 def test_a_tube_is_sent_as_well(short):
     objective, tube = SumOfNorms([[[x], [y], [read("x*y/10")]]]), circle(0.5)
     own = supremum(objective, tube, EFFORT)

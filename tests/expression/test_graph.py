@@ -168,6 +168,7 @@ def test_simplification_keeps_the_value(text: str, point: dict[str, Fraction]) -
         assert close(value(read(text), point), by_sympy(text, point))
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(text=texts())
 def test_text_parses_back_to_the_same_expression(text: str) -> None:

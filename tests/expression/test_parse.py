@@ -317,6 +317,7 @@ def test_random_expressions_are_accepted(text: str) -> None:
     assert read(to_text(parsed.expression)).expression is parsed.expression
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(
     text=st.text(alphabet="xyt0123.e+-*/() ,^sincoqr", max_size=30)

@@ -97,6 +97,7 @@ def test_a_claim_agrees_with_the_values(text: str, point: dict) -> None:  # type
             assert abs(value(e, point)) < mpmath.mpf(10) ** -40
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(a=texts(smooth=True, leaves=4), b=texts(smooth=True, leaves=4))
 def test_the_product_rule_is_proven_for_trigonometric_polynomials(a: str, b: str) -> None:

@@ -86,6 +86,7 @@ def test_what_does_not_print_is_named():
     assert harmless("##[a] ##vso[b] # ## c") == r"#\x23[a] #\x23vso[b] # ## c"
 
 
+@pytest.mark.slow
 @given(st.recursive(FOREIGN, lambda inner: st.lists(inner) | st.dictionaries(FOREIGN, inner), max_leaves=8))
 def test_printable_json_says_the_same(data):
     text = printable_json(json.dumps(data, indent=1, ensure_ascii=False))
@@ -215,6 +216,7 @@ def test_the_line_to_copy_is_one_command_of_the_shell(render):
 MARKUP = st.text(st.sampled_from("#*-+=_~`<>|[]()!&$\\ \t1.2)a:/w@\n") | st.characters(), max_size=30)
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(MARKUP)
 def test_markdown_shows_a_text_as_it_is(text):

@@ -317,6 +317,7 @@ def test_a_metric_that_is_not_positive_is_refused(entry):
     assert np.linalg.eigvalsh(np.array(numbers))[0] <= 1e-15
 
 
+@pytest.mark.slow
 def test_a_metric_that_vanishes_at_one_point_is_not_certified():
     proof = verdict_of(two_state([["1", "0"], ["0", "(x1 - 1/3)**2"]]), BOX_TWO, Effort(budget=20_000))
     assert isinstance(proof.failed, MetricDefinite)
@@ -373,6 +374,7 @@ def test_scaling_the_metric_changes_no_rate(factor):
     assert proof.upper_on_set.above * float(factor) == pytest.approx(plain.upper_on_set.above, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_permuted_states_change_no_rate():
     order = (2, 0, 1)
     model = three_state()
@@ -430,6 +432,7 @@ def test_an_input_that_depends_on_the_state_is_projected_out():
     assert isinstance(refused.failed, MetricContraction)
 
 
+@pytest.mark.slow
 def test_finslers_lemma_agrees_with_the_moving_annihilator(monkeypatch):
     from tubecert.metric import verify
 

@@ -190,6 +190,7 @@ def digits(count: int) -> Iterator[None]:
 REFUTED = [each for each in TABLE if each["verdict"] == "refuted" and "at" in each.get("reason", {})]
 
 
+@pytest.mark.slow
 def test_the_table_is_about_the_files():
     assert sorted(Path(each["file"]).name for each in TABLE) == [path.name for path in FILES]
     for each in TABLE:

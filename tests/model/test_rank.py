@@ -114,6 +114,7 @@ def test_the_rank_of_a_large_B_has_a_budget(n: int, m: int, half: str) -> None:
     assert found.verdict == ("certified" if half != "1" else "undecided")
 
 
+@pytest.mark.slow
 def test_a_dependence_of_many_columns_is_shown_with_its_point() -> None:
     """A point of few digits, evaluated exactly, where nothing was written out."""
     plant = affine(9, 7)

@@ -265,6 +265,7 @@ def test_a_wrong_plan_has_its_defect_measured_and_costs_gain_or_the_certificate(
     assert badly["distance"]["shortfalls"][0]["condition"] == "plan_defect"
 
 
+@pytest.mark.slow
 def test_a_tube_that_leaves_the_safe_set_is_refuted_with_time_and_point():
     result = run(edited(ORBIT, ("  x2: [-6, 6]", "  x2: [-6, 1.6]")))
     assert result["verdict"] == "refuted"

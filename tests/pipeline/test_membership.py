@@ -109,6 +109,7 @@ def family(tmp_path):
     return tmp_path / "any.yaml"
 
 
+@pytest.mark.slow
 def test_a_table_is_told_to_belong_or_why_not(tmp_path, family):
     done = run("check", "--family", family, table(tmp_path, sampled(0.9, 1.0, 41)))
     assert (done.exit_code, "is a plan of the family" in done.output) == (0, True), done.output

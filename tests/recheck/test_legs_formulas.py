@@ -93,6 +93,7 @@ SHARES = st.lists(st.sampled_from([0.2, 0.5, 1.0]), min_size=1, max_size=3)
 SPEEDS = st.integers(1, 60).map(Fraction)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=5)
 @given(SHARES, st.data())
 def test_both_readings_agree(shares, data):

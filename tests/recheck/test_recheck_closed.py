@@ -170,6 +170,7 @@ def test_why_a_claim_is_for_all_time(h, why, period):
     assert failing(examine(document)) == []
 
 
+@pytest.mark.slow
 def test_an_uncertainty_without_a_period_needs_a_horizon():
     def grows(effective):
         effective["uncertainty"]["h"] = ["0.1*sin(t) + 0.05*x + 0*t + 1e-9*t"]

@@ -190,6 +190,7 @@ def test_half_widths_must_fit_the_safe_set(document):
     assert first_refusal(faulty(document, change)) == "the tube lies in the safe set"
 
 
+@pytest.mark.slow
 def test_half_widths_that_were_asked_for_are_kept(document):
     def asked(width):
         def change(result):
@@ -222,6 +223,7 @@ def test_an_inverse_is_exact(rows):
         assert sum(rows[i][k] * T[k][j] for k in range(3)) == (i == j)
 
 
+@pytest.mark.slow
 @given(
     MATRICES,
     st.lists(st.floats(-1, 1), min_size=6, max_size=6),

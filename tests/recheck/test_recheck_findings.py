@@ -132,6 +132,7 @@ def test_what_is_drawn_of_a_plan_lies_on_it():
     assert "what is drawn of the plan lies on it" in names(examine(sealed(document), 20))
 
 
+@pytest.mark.slow
 def test_margins_drawn_around_the_gains_are_proven():
     """A figure shows them: they must not be better than they are."""
     for section, key in (("conditions_26", "26a"), ("distance", "margin")):
@@ -192,6 +193,7 @@ def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
         assert not geodesics.unique(place, tight * Fraction(9998, 10000)).holds
 
 
+@pytest.mark.slow
 def test_what_was_asked_of_a_synthesis_survives_reading():
     """The reader of reports knew no `synthesis.asked`: every certificate with a synthesis was an internal error."""
     document = certified(SMALL.replace(GIVEN, "metric: {synthesise: {rate: 0.5}}"), conditions="distance")

@@ -81,6 +81,7 @@ def tube():
     return Tube(curve, Round(Fraction(1, 5)), ("x", "y"), ("u",), {"t": (Fraction(0), Fraction(2))})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("more", "holds"), [(Fraction(1, 1000), True), (Fraction(-1, 1000), False)])
 def test_recheck_cuts_boxes_where_a_sign_changes(bound, more, holds):
     """|dh/dt| is largest, 0.03*0.5, at t = pi/2 and x* + (0.2, 0), where |y| has its kink."""

@@ -262,6 +262,7 @@ def test_windows_of_a_specification_are_those_of_the_section(honest):
     assert not any(item.outcome(None).holds for item in claims)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_no_level_is_beyond_that_of_the_whole_tube(honest, share):
     """Half-widths of the whole tube rest on d < dbar of the whole, however large the metric is in a window."""

@@ -22,6 +22,7 @@ def test_a_curve_of_h_is_short():
     assert unconfirmed(sealed(document))
 
 
+@pytest.mark.slow
 def test_determinants_are_not_made_minor_by_minor():
     n = 9
     rows = [
@@ -42,6 +43,7 @@ def test_determinants_are_not_made_minor_by_minor():
     assert at[0].is_finite()
 
 
+@pytest.mark.slow
 def test_a_determinant_that_is_too_long_is_refused():
     rows = [[variable(f"a{i}_{j}") for j in range(14)] for i in range(14)]
     with pytest.raises(ValueError, match="too long"):

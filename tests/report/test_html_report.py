@@ -17,6 +17,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import margins_26, problem_of
+from proven import result as certified_result
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
@@ -27,7 +28,7 @@ from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
 from tubecert.digits import percent, up
 from tubecert.expression import to_text
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Options
 from tubecert.records import from_json
 from tubecert.report import html, markdown
 from tubecert.report.figures_axes import Axis, Chart, _hexagon, number
@@ -62,21 +63,21 @@ def sealed(result):
 def orbit():
     """A real certificate with a plan that moves, an obstacle beside the tube, and units."""
     text = ORBIT + "\nobstacles:\n  - {states: [x2, x1], disc: {center: [3, 3], radius: 1/2}}\n"
-    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()).to_json())))
+    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
 
 
 @pytest.fixture(scope="module")
 def regulated():
     """A real certificate of three states at an equilibrium."""
-    result = certify(load(str(CONFIGS / "three_state.yaml")), Options()).to_json()
-    return json.loads(certificate.dump(sealed(result)))
+    text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8")
+    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
 
 
 @pytest.fixture(scope="module")
 def outside():
     """A real refusal with a witness: the tube leaves the safe set."""
     text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8").replace("rho_a: 0.01", "rho_a: 0.09")
-    return json.loads(certificate.dump(sealed(certify(load_text(text), Options()).to_json())))
+    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
 
 
 @pytest.fixture(params=["orbit", "regulated", "outside", *MADE])
@@ -567,6 +568,7 @@ def test_markdown_says_the_same(any_certificate):
     assert "<svg" not in text
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(HOSTILE)
 def test_markdown_tables_keep_their_columns(text):

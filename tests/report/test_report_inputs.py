@@ -45,10 +45,12 @@ def test_the_report_says_where_an_input_stays_and_what_takes_it_there():
     assert "feedback adds 0, adaptation adds 0.1001)" in shown
 
 
+@pytest.mark.slow
 def test_without_limits_it_has_no_such_section():
     assert "Inputs" not in told(ONE)
 
 
+@pytest.mark.slow
 def test_what_is_used_is_told_of_the_middle_of_the_limits():
     """[0.1, 0.3] in [0, 0.8]: 0.3 from the middle, which is 0.4 from the limits."""
     result = certificate_of(ONE + "limits: {u: [0, 0.8]}\n").result
@@ -57,6 +59,7 @@ def test_what_is_used_is_told_of_the_middle_of_the_limits():
     assert result.inputs[0].use([]) is None
 
 
+@pytest.mark.slow
 def test_a_plan_beyond_its_limits_is_told_as_such():
     shown = told(ONE + "limits: {u: [0.3, 0.8]}\n")
     assert "the plan itself has u* = 0.2, below 0.3" in shown
@@ -64,6 +67,7 @@ def test_a_plan_beyond_its_limits_is_told_as_such():
     assert "plan with more room to the limits" in shown
 
 
+@pytest.mark.slow
 def test_an_input_that_may_go_too_far_is_told_with_what_takes_it_there():
     shown = told(ONE + "limits: {u: [-1, 0.25]}\n")
     assert "undecided limits of u: it may reach 0.3" in shown
@@ -82,6 +86,7 @@ def test_the_page_has_a_row_for_every_loop():
     assert "The input u stays within its limits, on the plan and in the loop." in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("locked", "findings"), [("[0.29, 0.31]", 0), ("[0, 0.2]", 1)])
 def test_the_largest_share_can_be_locked(locked, findings):
     text = ONE + f"limits: {{u: [-1, 1]}}\nexpect: {{verdict: certified, inputs: {locked}}}\n"
@@ -91,6 +96,7 @@ def test_the_largest_share_can_be_locked(locked, findings):
     assert len(compared(load_text(text), found)) == findings
 
 
+@pytest.mark.slow
 def test_a_lock_without_limits_is_not_met():
     text = ONE + "expect: {inputs: [0, 1]}\n"
     (finding,) = compared(load_text(text), outcome(certificate_of(text).result))

@@ -23,6 +23,7 @@ conditions: {decides: B}
 """
 
 
+@pytest.mark.slow
 def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
     sealed = proven(WINDY)
     result = Certificate.from_json(sealed).result

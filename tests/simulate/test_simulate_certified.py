@@ -109,6 +109,7 @@ def test_simulate_and_recheck_have_one_judge():
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC604")
 
 
+@pytest.mark.slow
 def test_simulation_is_no_part_of_the_system_and_obstacles_are():
     spec = load(str(CONFIGS / "two_state.yaml"))
     _, result = certified("two_state", "0.4")
@@ -305,6 +306,7 @@ def test_what_simulation_needs_is_there_or_told(part):
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
 
 
+@pytest.mark.slow
 def test_half_widths_keep_their_states_through_a_file(tmp_path):
     """A file has its keys in alphabetical order, whatever the order of the states."""
     text = FLAT.replace("[p, v]", "[v, p]").replace(

@@ -54,6 +54,7 @@ def test_a_key_that_is_set_is_as_if_the_file_said_so(words: list[str], old: str,
     assert canonical(read(TWO, *words)) == canonical(load_text(edited)) != canonical(load_text(TWO))
 
 
+@pytest.mark.slow
 @given(st.fractions(min_value=Fraction(1, 1000), max_value=1000, max_denominator=10**6))
 def test_numbers_are_read_exactly(value: Fraction) -> None:
     spec = read(TWO, f"tube.epsilon={value}")

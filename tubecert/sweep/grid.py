@@ -55,7 +55,8 @@ class Axis:
             _refuse(setting, "the ends of the range are equal", "one value is given by --set")
         inner = _factors(first, last, number) if log else _steps(first, last, number)
         texts = (parts[0], *inner, parts[1])
-        if len(set(texts)) < number:
+        values = [first, *map(parse_number, inner), last]
+        if not all(a < b if first < last else a > b for a, b in itertools.pairwise(values)):
             _refuse(setting, "the values of the range are not apart", "give fewer of them, or a list")
         return cls(path=setting.path, texts=texts, log=log)
 
