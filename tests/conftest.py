@@ -57,6 +57,15 @@ def commands_made_once():
         yield
 
 
+@pytest.fixture
+def barely():
+    """For tests of what is proven: no curves and no explanations, which take longer than the rest."""
+    import proven
+
+    with proven.barely():
+        yield
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_the_tests(request, tmp_path_factory):
     """Plans and checks that the user has kept have no part in tests; what one process of a run keeps, all may read.

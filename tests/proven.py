@@ -28,7 +28,7 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 def proven(text: str, *, bare: bool = False, **options: Any) -> Any:
     """The certificate of a specification, as a reader of the file finds it.
 
-    `bare`: what is claimed, without curves, gains beside those that decide and advice, which take longer than the rest.
+    `bare`: without curves, gains beside those that decide and advice, which take longer than all the rest.
     """
     return json.loads(_made(text, pipeline.Options(**options), bare)[1])
 
@@ -38,15 +38,15 @@ def shipped(name: str, **options: Any) -> Any:
     return proven((CONFIGS / f"{name}.yaml").read_text(encoding="utf-8"), **options)
 
 
-def result(text: str, **options: Any) -> Result:
+def result(text: str, *, bare: bool = False, **options: Any) -> Result:
     """The result itself, for what is made of it before there is a file."""
-    return _made(text, pipeline.Options(**options), False)[0]
+    return _made(text, pipeline.Options(**options), bare)[0]
 
 
 @cache
 def _made(text: str, options: pipeline.Options, bare: bool) -> tuple[Result, str]:
     def make() -> tuple[Result, str]:
-        with _bare() if bare else nullcontext():
+        with barely() if bare else nullcontext():
             found = pipeline.certify(load_text(text, "spec.yaml"), options)
         return found, certificate.dump(certificate.seal(found.to_json(), {}))
 
@@ -54,8 +54,8 @@ def _made(text: str, options: pipeline.Options, bare: bool) -> tuple[Result, str
 
 
 @contextmanager
-def _bare() -> Iterator[None]:
-    """Nothing is looked for beside what is proven, and nothing is explained."""
+def barely() -> Iterator[None]:
+    """What is certified meanwhile is what decides: no curves, no gains beside it, nothing is explained."""
     asked = certification._asked
 
     def unexplained(proposer: Proposer) -> Explained:

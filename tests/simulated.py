@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from proven import barely
 from shared import once
 
 from tubecert import pipeline
@@ -37,7 +38,12 @@ def certified(name: str, epsilon: str | None = None) -> tuple[Spec, Result]:
     """A specification and its result."""
     spec = load_text(FLAT) if name == "flat" else load(str(CONFIGS / f"{name}.yaml"))
     options = pipeline.Options(epsilon=None if epsilon is None else Fraction(epsilon))
-    result = once(lambda: pipeline.certify(spec, options), "simulated", name, epsilon)
+
+    def make() -> Result:
+        with barely():
+            return pipeline.certify(spec, options)
+
+    result = once(make, "simulated", name, epsilon)
     return adopted(spec, result), result
 
 

@@ -526,6 +526,7 @@ def test_a_cache_from_elsewhere_decides_nothing(certified, monkeypatch, tmp_path
     assert len(certified) == 4
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_without_the_cache_no_plan_is_taken_from_it_either(monkeypatch):
     text = SPEC.replace(

@@ -33,6 +33,7 @@ def scaled(text=SCALAR):
     return at
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_the_best_is_certified_and_no_size_beside_it_is_better():
     at = scaled()
@@ -50,6 +51,7 @@ def test_the_best_is_certified_and_no_size_beside_it_is_better():
     assert needed > Fraction(99, 100), "it is narrowed to what it needs"
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_machine_that_keeps_no_tube_has_no_design():
     found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1/10")), H, RADIUS)
@@ -73,6 +75,7 @@ def test_a_loop_that_does_not_serve_says_what_fills_it_and_which_machine_would()
     assert failing(examine(certified(text, conditions="H"))) == []
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_plan_that_moves_may_be_proven_in_windows_and_that_is_said():
     text = IN_WINDOWS.replace(", windows: [0.3, 0.9]", "").replace("rate: 500", "rate: 8")

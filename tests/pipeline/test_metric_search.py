@@ -80,6 +80,7 @@ def test_units_of_a_state_do_not_change_what_the_surrogate_says():
     assert Surrogate(other, own.measure)(S @ W @ S).widths[0] == pytest.approx(own(W).widths[0], rel=1e-9)
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_design_finds_a_metric_for_its_machine_and_rechecks(tmp_path, monkeypatch):
     for module, name, value in (

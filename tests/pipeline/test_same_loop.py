@@ -44,7 +44,7 @@ tube: {{half_widths: {{p: 1/5}}}}
 @cache
 def found(**options):
     """Gains by kind and name, the section of certificate 0, and the half-widths."""
-    result = proven(loop(**options), conditions="all")["result"]
+    result = proven(loop(**options), bare=True, conditions="all")["result"]
     gains = {
         (kind, name): result["proof"][kind][name]
         for kind, name in product(("conditions_26", "distance", "sampled"), TAKEN)

@@ -32,6 +32,7 @@ def written(path, text=SCALAR):
     return path
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_the_cheapest_machine_is_proven_for_the_tube_that_was_asked_for(tmp_path):
     spec, target = written(tmp_path / "s.yaml"), tmp_path / "d.json"
@@ -60,6 +61,7 @@ def test_the_cheapest_machine_is_proven_for_the_tube_that_was_asked_for(tmp_path
     assert more > Fraction(1, 100) or certify(load_text(text), Options()).verdict is Verdict.UNDECIDED
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_on_a_front_every_dot_is_a_certificate_and_a_wider_tube_allows_more(tmp_path, monkeypatch):
     monkeypatch.setattr(trade, "_FARTHEST", 1)
@@ -97,6 +99,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path, arguments, says):
     assert not (tmp_path / "x.json").exists()
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 @settings(max_examples=2, deadline=None)
 @given(

@@ -37,7 +37,7 @@ MOVING = (
 
 
 def found(text: str = MOVING):
-    return proven.proven(text)["result"]["hardware"]
+    return proven.proven(text, bare=True)["result"]["hardware"]
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ GAINS = {"distance": "least_adaptation", "sampled": None}
 
 
 def found(text: str = GAINS_IN_WINDOWS):
-    return proven.proven(text, **ROUGHLY)["result"]
+    return proven.proven(text, bare=True, **ROUGHLY)["result"]
 
 
 @pytest.mark.slow
@@ -107,7 +107,9 @@ def test_beside_a_machine_only_what_decides_has_windows(decides, has):
 
 @pytest.mark.slow
 def test_they_are_told_and_drawn(tmp_path):
-    (tmp_path / "c.json").write_text(json.dumps(proven.proven(GAINS_IN_WINDOWS, **ROUGHLY)), "utf-8")
+    (tmp_path / "c.json").write_text(
+        json.dumps(proven.proven(GAINS_IN_WINDOWS, bare=True, **ROUGHLY)), "utf-8"
+    )
     page = tc.report(tc.read(tmp_path / "c.json"))
     told = page.markdown
     for letter in ("B", "C"):
@@ -125,7 +127,7 @@ def test_they_are_told_and_drawn(tmp_path):
 @pytest.mark.slow
 def test_no_run_leaves_the_level_of_its_window():
     spec = load_text(GAINS_IN_WINDOWS)
-    setting = setting_of(spec, proven.result(GAINS_IN_WINDOWS, **ROUGHLY), F(2))
+    setting = setting_of(spec, proven.result(GAINS_IN_WINDOWS, bare=True, **ROUGHLY), F(2))
     loop = loop_of(setting, "l1", Choice())
     sample = monte_carlo(setting, loop, 6, 1)
     assert sample is not None

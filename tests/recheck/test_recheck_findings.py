@@ -136,7 +136,7 @@ def test_what_is_drawn_of_a_plan_lies_on_it():
 def test_margins_drawn_around_the_gains_are_proven():
     """A figure shows them: they must not be better than they are."""
     for section, key in (("conditions_26", "26a"), ("distance", "margin")):
-        document = certified(SMALL)
+        document = certified(SMALL, bare=False)
         margins = document["result"][section]["margins_around"][key]
         k = next(k for k, value in enumerate(margins) if value is not None)
         margins[k] += 0.01

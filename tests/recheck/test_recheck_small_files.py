@@ -16,7 +16,7 @@ from tubecert.recheck.terms import number, variable
 @pytest.mark.slow
 def test_a_curve_of_h_is_short():
     """For each of its points a recipe is searched for: 30 ms, and as many of them as a file holds."""
-    document = copy.deepcopy(certified(SMALL + "hardware: {rate: 500}\n", conditions="hardware"))
+    document = copy.deepcopy(certified(SMALL + "hardware: {rate: 500}\n", bare=False, conditions="hardware"))
     section = document["result"]["hardware"]
     section["curve"] = [section["curve"][0]] * 3_000
     assert unconfirmed(sealed(document))

@@ -13,6 +13,8 @@ import pytest
 from flint import ctx
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 from test_hardware_formulas import BENT, own_reading, problems, same
 
 from tubecert.conditions.hardware import windows as producer
@@ -170,14 +172,16 @@ def cases():
     """Windows of which every term is alive, with a filter, without one and on two clocks."""
     found = []
 
-    # enough of them for every bug, whichever they are: they depend on what else is loaded
-    @settings(database=None, derandomize=True, max_examples=160, phases=[Phase.generate], deadline=None)
+    # enough of them for every bug
+    @settings(database=None, derandomize=True, max_examples=400, phases=[Phase.generate], deadline=None)
     @given(courses())
     def gathered(case):
         if len(case[1].windows) > 1:
             found.append(case)
 
-    gathered()
+    with pytest.MonkeyPatch.context() as patch:  # the same ones whatever other tests have loaded
+        patch.setattr(providers, "_get_local_constants", Constants)
+        gathered()
     return found
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import proven
 import pytest
 from systems import SMALL
 
-from tubecert import pipeline
 from tubecert.errors import TubecertError
 from tubecert.simulate.setting import setting_of
 from tubecert.simulate.tuning import Choice, loop_of
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def setting():
     spec = load_text(TEXT, "s.yaml")
-    return setting_of(spec, pipeline.certify(spec, pipeline.Options(conditions="hardware")), Fraction(1, 5))
+    return setting_of(spec, proven.result(TEXT, bare=True, conditions="hardware"), Fraction(1, 5))
 
 
 def test_the_feedback_is_raised_by_what_the_gain_may_lack(setting):

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import proven
 import pytest
 from simulated import FLAT
 
@@ -15,7 +16,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "harness"))
 
 from hardware_attack import ROWS, WIND, Row, certified, scaled, shares
 
-from tubecert import pipeline
 from tubecert.errors import TubecertError
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.setting import setting_of
@@ -27,7 +27,8 @@ BOX = Row("two_state_orbit", "{sample_time: 1/1000, delay: 1/2000, noise: {x1: 1
 
 @lru_cache
 def made(name):
-    return certified(replace(BOX if name == "box" else ROWS[name], duration="1"))
+    with proven.barely():
+        return certified(replace(BOX if name == "box" else ROWS[name], duration="1"))
 
 
 def attacked(setting, loop, count, seed):
@@ -85,7 +86,7 @@ def test_noise_is_that_of_each_state_and_h_stays_in_the_box_of_the_clip():
 @pytest.mark.slow
 def test_without_certificate_h_there_is_no_such_loop():
     spec = load_text(FLAT)
-    setting = setting_of(spec, pipeline.certify(spec, pipeline.Options(conditions="distance")))
+    setting = setting_of(spec, proven.result(FLAT, bare=True, conditions="distance"))
     with pytest.raises(TubecertError, match="does not certify the controller hardware"):
         loop_of(setting, "hardware", Choice())
 
@@ -93,9 +94,8 @@ def test_without_certificate_h_there_is_no_such_loop():
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["l1", "sampled"])
 def test_a_wind_blows_on_the_loops_of_b_and_c_and_breaks_nothing(controller):
-    spec = load_text(FLAT + "disturbance: {E: [[1, 0], [0, 1]], bound: 1/100}\n")
-    result = pipeline.certify(spec, pipeline.Options(conditions="all"))
-    setting = setting_of(spec, result)
+    text = FLAT + "disturbance: {E: [[1, 0], [0, 1]], bound: 1/100}\n"
+    setting = setting_of(load_text(text), proven.result(text, bare=True, conditions="all"))
     loop = loop_of(setting, controller, Choice())
     assert loop.promise.decay.defect > 0.009 * setting.certified["wind_push"] > 0  # the plan has none
     found = attacked(setting, loop, 15, 2)

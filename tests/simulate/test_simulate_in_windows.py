@@ -7,10 +7,10 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import proven
 import pytest
 from systems import IN_WINDOWS
 
-from tubecert import pipeline
 from tubecert.simulate.compare import compare
 from tubecert.simulate.monte_carlo import monte_carlo
 from tubecert.simulate.promise import Levels
@@ -26,7 +26,7 @@ from hardware_attack import by_window
 @pytest.mark.slow
 def test_no_run_leaves_the_level_of_its_window():
     spec = load_text(IN_WINDOWS)
-    setting = setting_of(spec, pipeline.certify(spec, pipeline.Options(conditions="hardware")), Fraction(2))
+    setting = setting_of(spec, proven.result(IN_WINDOWS, bare=True, conditions="hardware"), Fraction(2))
     loop = loop_of(setting, "hardware", Choice())
     sample = monte_carlo(setting, loop, 8, 1)
     assert sample is not None

@@ -6,12 +6,12 @@ from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
+import proven
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import CONFIGS, FLAT
 
-from tubecert import pipeline
 from tubecert.letters import name_of
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
@@ -27,7 +27,7 @@ CONTROLLERS = {"A": "l1", "B": "l1", "C": "sampled"}
 
 def made(text, kinds="all"):
     spec = load_text(text)
-    result = pipeline.certify(spec, pipeline.Options(conditions=kinds))
+    result = proven.result(text, bare=True, conditions=kinds)
     assert result.verdict is Verdict.CERTIFIED
     return setting_of(spec, result), result
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import proven
 import pytest
 from scipy.integrate import solve_ivp
 from systems import SMALL
 
-from tubecert import pipeline
 from tubecert.simulate.compare import compare
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.monte_carlo import monte_carlo
@@ -34,11 +34,8 @@ CHOICES = {
 
 @lru_cache
 def stirred(kind):
-    spec = load_text(
-        GUSTS + ("hardware: {rate: 500, noise: 0.0001}\n" if kind == "hardware" else ""), "s.yaml"
-    )
-    result = pipeline.certify(spec, pipeline.Options(conditions=kind))
-    return setting_of(spec, result)
+    text = GUSTS + ("hardware: {rate: 500, noise: 0.0001}\n" if kind == "hardware" else "")
+    return setting_of(load_text(text, "s.yaml"), proven.result(text, bare=True, conditions=kind))
 
 
 def loop(kind):

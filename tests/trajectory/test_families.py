@@ -11,16 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from proven import proven
+from proven import result as proven_result
 from rechecked import examine, failing, sealed
 from systems import FAMILY_TWO as FAMILY
 
-from tubecert import pipeline
 from tubecert.bounds.suprema import Suprema
 from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.model import build
-from tubecert.pipeline import Options
 from tubecert.spec import canonical, load_text
 from tubecert.trajectory.make import plan_of
 from tubecert.tube import Tube, containment
@@ -48,11 +47,11 @@ OWN = "trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]
 
 @pytest.fixture(scope="module")
 def document():
-    return proven(FAMILY, conditions="distance")
+    return proven(FAMILY, bare=True, conditions="distance")
 
 
 def result_of(text, **options):
-    return pipeline.certify(load_text(text, "spec.yaml"), Options(**{"conditions": "distance"} | options))
+    return proven_result(text, bare=True, **{"conditions": "distance"} | options)
 
 
 @pytest.mark.slow
@@ -73,7 +72,7 @@ def test_a_family_is_certified_for_all_time_and_says_which_plans(document):
     "text", [FAMILY, BENT, BENT.replace("1/3]", "-0.4]")], ids=["two-state", "bent", "flat box"]
 )
 def test_recheck_confirms_it(text):
-    made = proven(text, conditions="distance")
+    made = proven(text, bare=True, conditions="distance")
     assert made["result"]["verdict"] == "certified"
     assert failing(examine(made)) == []
 
@@ -215,7 +214,7 @@ def test_two_percent_less_is_not_confirmed_where_the_metric_moves(name):
         constant = result["constants"][name]
         constant.update(above=constant["above"] * 0.98, below=0.0)
 
-    assert failing(examine(changed(proven(BENT, conditions="distance"), less))) != []
+    assert failing(examine(changed(proven(BENT, bare=True, conditions="distance"), less))) != []
 
 
 WIDE = BENT.replace("tube: {epsilon: 0.2, rho_a: 0.1}", "tube: {half_widths: {x: 0.3, y: 0.35}}")
@@ -224,7 +223,7 @@ WIDE = BENT.replace("tube: {epsilon: 0.2, rho_a: 0.1}", "tube: {half_widths: {x:
 @pytest.mark.slow
 def test_a_tube_in_coordinates_of_its_own():
     """The ellipsoid of the metric, cut to half-widths, around the box: sampled, confirmed, and what is less is not."""
-    spec, made = load_text(WIDE), proven(WIDE, conditions="distance")
+    spec, made = load_text(WIDE), proven(WIDE, bare=True, conditions="distance")
     assert failing(examine(made)) == []
     tube, c, model = made["result"]["tube"], made["result"]["constants"], build(spec)
     S = np.array([[float(Fraction(value)) for value in row] for row in tube["coordinates"]])
@@ -255,7 +254,7 @@ def test_a_tube_in_coordinates_of_its_own():
 def test_every_plan_of_a_family_keeps_away_from_an_obstacle():
     """A disc beside a corner of the box: sampled over the box, and a hair more is not confirmed."""
     disc = "obstacles: [{states: [x1, x2], disc: {center: [3, 3], radius: 0.5}}]\n"
-    made = proven(FAMILY + disc, conditions="distance")
+    made = proven(FAMILY + disc, bare=True, conditions="distance")
     assert failing(examine(made)) == []
     below, above = made["result"]["clearance"][0]["clearance"]
     W = np.array([[4.25828, -0.93423], [-0.93423, 3.76692]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf, isfinite, log
 
@@ -26,28 +26,59 @@ _FLOORS = (log(1e-5), 0.0)  # of the level
 _FASTEST = 40.0  # omega Ts
 
 
+@dataclass(frozen=True, slots=True)
+class Valley:
+    """Where a least value is looked for, between `low` and `high`, at first at so many points and one more."""
+
+    low: float
+    high: float
+    points: int = _GRID
+
+    def around(self, x: float) -> Valley:
+        """Nearby."""
+        reach = (self.high - self.low) / self.points
+        return Valley(max(self.low, x - reach), min(self.high, x + reach), 2)
+
+
 def proposed(
-    setting: Setting, machine: MachineNumbers, promise: Promise, like: Digital, *, fixed: bool
+    setting: Setting,
+    machine: MachineNumbers,
+    promise: Promise,
+    like: Digital,
+    *,
+    fixed: bool,
+    beside: Digital | None = None,
 ) -> Digital | None:
     """A recipe for the loop and the level of `like` that may serve, None if none was found: a proposal.
 
-    `fixed`: the bandwidth is not to be chosen. Of each bandwidth the least Y, S, N, np, then the best floor.
+    `fixed`: the bandwidth is not to be chosen. Of each bandwidth the least Y, S, N, np, then the best floor. `beside`:
+    a recipe for nearly the same loop, around which one is looked for first.
     """
 
-    def quality(omega: Fraction | None) -> tuple[float, Digital | None]:
+    def quality(omega: Fraction | None, floors: Valley) -> tuple[float, Digital | None]:
         at = _settled(setting, machine, promise, replace(like, bandwidth=omega))
         if at is None:
             return inf, None
         settled = Evaluation(setting, machine, promise, at)
-        share, top = _least(lambda x: _top(settled.with_floor(_floor(at, x))), _FLOORS)
+        share, top = _least(lambda x: _top(settled.with_floor(_floor(at, x))), floors)
         return top, replace(at, floor=_floor(at, share))
 
+    def searched(omegas: Valley, floors: Valley) -> tuple[float, Digital | None]:
+        x, _ = _least(lambda x: quality(Fraction(exp(x)), floors)[0], omegas)
+        return quality(Fraction(exp(x)), floors)
+
+    floors = Valley(*_FLOORS)
     with ctx.workprec(_ROUGH):
-        top, best = quality(like.bandwidth if fixed else None)
-        if not fixed and not top < _ENOUGH:
-            ends = log(float(setting.rate)), log(_FASTEST / float(like.sample_time))
-            x, _ = _least(lambda x: quality(Fraction(exp(x)))[0], ends)
-            top, best = min((top, best), quality(Fraction(exp(x))), key=lambda pair: pair[0])
+        top, best = quality(like.bandwidth if fixed else None, floors)
+        if fixed or top < _ENOUGH:
+            return best if top < inf else None
+        omegas = Valley(log(float(setting.rate)), log(_FASTEST / float(like.sample_time)))
+        if beside is not None and beside.bandwidth is not None:
+            near = omegas.around(log(beside.bandwidth)), floors.around(log(beside.floor / beside.level))
+            least, found = searched(*near)
+            if least < _ENOUGH:
+                return found
+        top, best = min((top, best), searched(omegas, floors), key=lambda pair: pair[0])
     return best if top < inf else None
 
 
@@ -56,9 +87,9 @@ def _floor(at: Digital, x: float) -> Fraction:
     return at.level * Fraction(exp(x))
 
 
-def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[float, float]:
+def _least(value: Callable[[float], float], within: Valley) -> tuple[float, float]:
     """Where a function with one valley is about least, and its value there; the first point where it is enough."""
-    low, high = ends
+    low, high, count = within.low, within.high, within.points
     best: list[tuple[float, float]] = []
 
     def at(x: float) -> float:
@@ -66,14 +97,14 @@ def _least(value: Callable[[float], float], ends: tuple[float, float]) -> tuple[
         best.append((y, x))
         return y
 
-    points = [low + (high - low) * k / _GRID for k in range(_GRID + 1)]
+    points = [low + (high - low) * k / count for k in range(count + 1)]
     values: list[float] = []
     for x in points:
         values.append(at(x))
         if values[-1] < _ENOUGH:
             return x, values[-1]
     k = min(range(len(points)), key=lambda k: values[k])
-    low, high = points[max(0, k - 1)], points[min(_GRID, k + 1)]
+    low, high = points[max(0, k - 1)], points[min(count, k + 1)]
     inner = [high - (high - low) * _GOLDEN, low + (high - low) * _GOLDEN]
     found = [at(x) for x in inner]
     for _ in range(_ZOOMS):

@@ -305,14 +305,22 @@ def _curve_holds(section: HardwareSection, recipe: Digital, ground: Ground) -> O
         return stated(False, "there is no machine")
     if recipe.losses is not None and section.curve:
         return stated(False, "what rounding may cost belongs to one sample time, and there are others")
-    return all_of(_feasible(point, recipe, ground) for point in section.curve)
+    beside: Digital | None = recipe
+    for point in section.curve:
+        outcome, beside = _feasible(point, recipe, beside, ground)
+        if not outcome.holds:
+            return outcome
+    return CONFIRMED
 
 
-def _feasible(point: tuple[Fraction, Fraction], recipe: Digital, ground: Ground) -> Outcome:
+def _feasible(
+    point: tuple[Fraction, Fraction], recipe: Digital, beside: Digital | None, ground: Ground
+) -> tuple[Outcome, Digital | None]:
+    """Whether a point is feasible, and by which recipe; `beside`: that of the point before."""
     Ts, level = point
     why = f"the point at Ts = {float(Ts):.6g} is not feasible"
     if Ts <= 0 or level <= 0 or ground.machine is None:
-        return stated(False, why)
+        return stated(False, why), None
     asked = ground.asked
     like = replace(
         recipe,
@@ -322,13 +330,13 @@ def _feasible(point: tuple[Fraction, Fraction], recipe: Digital, ground: Ground)
         delay=Ts if asked.one_sample else recipe.delay,
     )
     fixed = asked.bandwidth is not None
-    found = proposed(ground.setting, ground.machine, promise(asked), like, fixed=fixed)
+    found = proposed(ground.setting, ground.machine, promise(asked), like, fixed=fixed, beside=beside)
     if found is None:
-        return Outcome(verdict="undecided", why=why)
+        return Outcome(verdict="undecided", why=why), None
     own = loop(ground.setting, ground.machine, promise(asked), found)
     whole = (
         own is not None
         and bool(own.top < exact(level))
         and bool(exact(level) + own.noise <= ground.setting.reach)
     )
-    return CONFIRMED if whole else Outcome(verdict="undecided", why=why)
+    return CONFIRMED if whole else Outcome(verdict="undecided", why=why), found
