@@ -139,6 +139,10 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     run = CliRunner().invoke(app, ["export", str(target)], prog_name="tubecert")
     assert run.exit_code == 0, run.output
     folder = tmp_path / "orbit.controller"
+    around = ["export", str(target), "-o", str(tmp_path / "node"), "--for", "ros2"]
+    run = CliRunner().invoke(app, around, prog_name="tubecert")
+    assert run.exit_code == 2
+    assert "u* moves between samples" in run.output
     own = certification_of(data).certificate
     found = code_in(str(folder), text, target.name)
     assert found.difference < 1e-13

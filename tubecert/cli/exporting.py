@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tubecert.cli.guard import guarded
 from tubecert.cli.options import Output, with_output
 
+if TYPE_CHECKING:
+    from tubecert.library.exporting import Platform
+
 _AFTER = """\b
 Examples:
   tubecert export plant.certificate.json -o controller
   tubecert export plant.certificate.json -o controller --precision single
+  tubecert export plant.certificate.json -o controller --precision single --for arduino
   tubecert export plant.certificate.json -o controller --language python
 
 \b
@@ -34,6 +38,14 @@ class Precisions(StrEnum):
 
     DOUBLE = "double"
     SINGLE = "single"
+
+
+class Platforms(StrEnum):
+    """What a skeleton is written for."""
+
+    ARDUINO = "arduino"
+    ROS2 = "ros2"
+    PX4 = "px4"
 
 
 def register(app: typer.Typer) -> None:
@@ -59,13 +71,25 @@ def export(
     precision: Annotated[
         Precisions, typer.Option(help="Of C: double, or single (float).")
     ] = Precisions.DOUBLE,
+    platform: Annotated[
+        Platforms | None,
+        typer.Option("--for", help="Also a program around it, to be completed.", show_default=False),
+    ] = None,
     how: Output,
 ) -> None:
     """Write the controller that a certificate H is about: C99 without dependencies, or Python."""
     if language is Languages.PYTHON and precision is Precisions.SINGLE:
         raise typer.BadParameter("Python computes in double", ctx=context)
     with guarded(how):
-        from tubecert.cli.export import run
+        from tubecert.cli.export import Wanted, run
 
-        code = run(certificate, output, language.value, precision.value, how)
+        machine: Platform | None = None
+        if platform is not None:
+            machine = platform.value
+        wanted = Wanted(
+            language=language.value,
+            precision=precision.value,
+            platform=machine,
+        )
+        code = run(certificate, output, wanted, how)
     raise typer.Exit(code)

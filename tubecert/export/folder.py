@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -16,6 +16,7 @@ from tubecert.export.controller import Controller, refused
 from tubecert.export.followed import UncoveredError
 from tubecert.export.python import python
 from tubecert.export.rounding import within
+from tubecert.export.skeletons import Platform, skeleton
 from tubecert.export.vectors import vectors
 from tubecert.export.words import readme
 from tubecert.findings import Finding
@@ -47,6 +48,13 @@ class Exported:
             raise TargetError([Finding(code="TC120", message=message, help=_REMEDY)]) from error
         for name, text in self.files.items():
             write_text(str(target / name), text, _REMEDY)
+
+    def around(self, platform: Platform) -> Exported:
+        """The same, with a program around it for a machine; raises TC710 where there can be none."""
+        if self.language == "python":
+            raise refused(f"a program for {platform} is about code in C", "leave --language out")
+        name, text = skeleton(self.controller, platform)
+        return replace(self, files={**self.files, name: text})
 
 
 def exported(controller: Controller, language: Language = "c", precision: Precision = "double") -> Exported:

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 Language = Literal["c", "python"]
 Precision = Literal["double", "single"]
+Platform = Literal["arduino", "ros2", "px4"]
 _LANGUAGES: Final[tuple[Language, ...]] = ("c", "python")
 _PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")
+_PLATFORMS: Final[tuple[Platform, ...]] = ("arduino", "ros2", "px4")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +47,12 @@ def export(
     *,
     language: Language = "c",
     precision: Precision = "double",
+    platform: Platform | None = None,
 ) -> Exported:
     """The controller that a certificate is about, or that of the file of one, written into a folder if one is given.
 
-    `tubecert export`. In C everything is `double`, or `float` if the precision is `single`; in Python `double`.
+    `tubecert export`. `platform`: beside it a program around it, of which what measures and acts is left open (C only;
+    `--for`). In C everything is `double`, or `float` if the precision is `single`; in Python `double`.
     Raises `TubecertError` where certificate H does not hold or cannot be exported, and `TargetError`.
     """
     from tubecert.export.assembly import controller_of
@@ -56,9 +60,12 @@ def export(
 
     one_of("language", language, _LANGUAGES)
     one_of("precision", precision, _PRECISIONS)
+    one_of("platform", platform, _PLATFORMS)
     found = result if isinstance(result, Certification) else read(result)
     name = "the certificate" if isinstance(result, Certification) else os.fspath(result)
     written = exported(controller_of(found.certificate, name), language, precision)
+    if platform is not None:
+        written = written.around(platform)
     if folder is not None:
         written.save(os.fspath(folder))
     return Exported(files=written.files, controller=written.controller)

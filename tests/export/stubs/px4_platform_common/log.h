@@ -1,0 +1,2 @@
+#pragma once
+#define PX4_WARN(...) ((void)sizeof(#__VA_ARGS__))

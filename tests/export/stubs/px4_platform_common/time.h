@@ -1,0 +1,3 @@
+#pragma once
+#include <cstdint>
+inline int px4_usleep(uint32_t) { return 0; }
