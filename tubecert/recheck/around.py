@@ -187,9 +187,10 @@ class _Form:
         self._weights, self._rows = _squares(Q)
         self._least = [math.nextafter(float(d), 0.0) for d in self._weights]
         self._floats = [[float(l) for l in row] for row in self._rows]
+        n = range(len(which))
+        self._others = [[[0.0 if i == j else row[i] for i in n] for j in n] for row in self._floats]
         if any(l and abs(float(l)) < _TINY for row in self._rows for l in row):
             raise ValueError("the tube is too narrow in one direction for floats")
-        n = range(len(which))
         columns = [[Q[i][j] for i in n] for j in n]
         self._completion = [
             [product([row[i] for i in which], column) for column in columns] for row in spread
@@ -229,7 +230,7 @@ class _Form:
             for j, weight in enumerate(row):
                 if weight == 0 or not math.isfinite(reach):
                     continue
-                rest = _sum([l if i != j else 0.0 for i, l in enumerate(row)], now)
+                rest = _sum(self._others[k][j], now)
                 size = max(abs(rest[0]), abs(rest[1])) + reach
                 ends = sorted(((-reach - rest[1]) / weight, (reach - rest[0]) / weight))
                 blur = size / abs(weight) * _SLACK

@@ -1,17 +1,19 @@
 """Expressions as a product of powers: what stands in a numerator and in a denominator is cancelled.
 
-Sums keep their terms, but what these have in common is taken out of them. For a mechanical system 1/(1/D) is D, and the
-determinant of M/det(M) is 1/det(M). Untrusted: used for what is proposed, and proven as it is then written.
+What the terms of a sum have in common is taken out of it. For a mechanical system 1/(1/D) is D, and the determinant of
+M/det(M) is 1/det(M), whatever the units. Untrusted: used for what is proposed, and proven as it is then written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 
-from tubecert.expression import ONE, ZERO, Expression, constant, rebuild, topological
+from tubecert.expression import ONE, ZERO, Expression, coefficient, constant, rebuild, topological
 from tubecert.expression.matrix import Matrix, Rows, matrix
+from tubecert.synthesis.lifting import common_divisor
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +69,31 @@ def _product(node: Expression, known: Mapping[Expression, _Product]) -> _Product
 
 
 def _sum(terms: list[_Product]) -> _Product:
-    """What the terms have in common, times the sum of what is left of each."""
+    """What the terms have in common, times the sum of what is left of each, without a factor of all its numbers.
+
+    So that M and 2 M, or what is left of either, are powers of one base.
+    """
     bases = dict.fromkeys(base for term in terms for base in term.powers)
     least = {base: min(term.powers.get(base, 0) for term in terms) for base in bases}
     common = _Product(Fraction(1), {base: k for base, k in least.items() if k})
-    rest = sum((term.times(common, -1).expression for term in terms), start=ZERO)
-    if rest.is_constant:
-        return _Product(rest.fraction, common.powers if rest is not ZERO else {})
-    return common.times(_Product(Fraction(1), {rest: 1}))
+    rest: dict[Expression, Fraction] = {}
+    for term in terms:
+        for q, e in _addends(term.times(common, -1).expression):
+            rest[e] = rest.get(e, Fraction(0)) + q
+    kept = sorted((item for item in rest.items() if item[1]), key=lambda item: item[0].serial)
+    if not kept:
+        return _Product(Fraction(0), {})
+    content = reduce(common_divisor, (abs(q) for _, q in kept)) * (1 if kept[0][1] > 0 else -1)
+    total = sum((q / content * e for e, q in kept), start=ZERO)
+    own = _Product(content, {} if total is ONE else {total: 1})
+    return common.times(own)
+
+
+def _addends(e: Expression) -> Iterator[tuple[Fraction, Expression]]:
+    """The terms of a sum, or of a number times one: numbers and what they multiply."""
+    q, rest = coefficient(e)
+    if rest.op == "add":
+        for arg in rest.args:
+            yield from ((q * p, part) for p, part in _addends(arg))
+    elif q:
+        yield q, rest

@@ -71,7 +71,7 @@ def unit_angles(expressions: Iterable[Expression]) -> dict[str, Fraction]:
 
 
 def _unit(factors: set[Fraction]) -> Fraction:
-    unit = reduce(_divisor, factors)
+    unit = reduce(common_divisor, factors)
     return unit if max(factors) <= _MOST * unit else min(factors)
 
 
@@ -144,7 +144,7 @@ def _multiples(u: Expression) -> dict[str, Fraction] | None:
     return {name: q for name, q in total.items() if q}
 
 
-def _divisor(a: Fraction, b: Fraction) -> Fraction:
+def common_divisor(a: Fraction, b: Fraction) -> Fraction:
     """The greatest number that both are integer multiples of."""
     return Fraction(
         gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator
