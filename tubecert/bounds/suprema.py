@@ -16,6 +16,7 @@ from tubecert.bounds.affine import NormOverRest
 from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
+from tubecert.bounds.linear import linear_bound
 from tubecert.bounds.lipschitz import lipschitz_constant, substituted
 from tubecert.bounds.parts import Parts
 from tubecert.coordinates import Coordinates, Fields
@@ -43,8 +44,11 @@ from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _FEW = 20_000  # boxes
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
-_WORTH = 30_000  # boxes after which such a constant stays as it is
+_WORTH = 30_000  # boxes after which such a constant stays as it is;
+_MANY = 8  # of more states than that each box takes longer, and fewer are worth it
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
+_BESIDE = 500  # boxes beside a bound by the linear part
+_NEAR = 0.05  # that bound serves where it is this close, however close was asked for
 _COARSE, _ROUGH = 0.1, 1e-2  # from that gap on the metric, too, need not be known sharply
 Spent = Callable[[str, int], None]
 
@@ -77,7 +81,9 @@ class Suprema:
         gap, own = self.gaps.get(name), self.effort
         if gap is None:
             return own
-        return replace(own, gap=gap, cheap=min(own.cheap, _CHEAP), budget=min(own.budget, _WORTH))
+        states = len(self.model.states)
+        worth = _WORTH if states <= _MANY else int(_WORTH * (_MANY / states) ** 6)
+        return replace(own, gap=gap, cheap=min(own.cheap, _CHEAP), budget=min(own.budget, worth))
 
     def with_radius(self, rho: Fraction, sides: Sequence[Fraction] | None = None) -> Suprema:
         """The same over another tube."""
@@ -142,6 +148,9 @@ class Suprema:
         if objective.is_zero:
             return Constant.exactly(0.0)
         whole = self._over_rest(matrices)
+        near = self._nearly_linear(name, objective if whole is None else whole, matrices)
+        if near is not None:
+            return near
         if whole is None:
             return self._constant(self._over_tube(name, objective))
         found = self._over_tube(name, whole)
@@ -150,6 +159,22 @@ class Suprema:
         known = set(whole.variables) <= set(found.at)  # or no point was found
         at = {**found.at, **whole.completed(found.at)} if known else {}
         return self._constant(replace(found, above=above, at=at))
+
+    def _nearly_linear(self, name: str, objective: Objective, matrices: list[Matrix]) -> Constant | None:
+        """The norm of one vector of many states by its linear part, where that is close and gaps go by effect.
+
+        A few boxes say what the supremum is at least; where the linear part is too far from that, they say the rest.
+        """
+        if name not in self.gaps or len(matrices) > 1 or len(matrices[0][0]) > 1:
+            return None
+        above = linear_bound(self, matrices[0])
+        if above is None:
+            return None
+        effort = self.effort_for(name)
+        found = self._over_tube(name, objective, replace(effort, budget=min(effort.budget, _BESIDE)))
+        if above > found.below * (1 + max(effort.gap, _NEAR)):
+            return None
+        return Constant(below=found.below, above=min(found.above, above), at=self._constant(found).at)
 
     def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
         """The norm of one vector as a function of fewer states, where those that it is affine in need no search."""
@@ -345,6 +370,10 @@ class Suprema:
         return self._root(self._over_tube(name, objective))
 
     # -- searches ----------------------------------------------------------------------------------------------
+
+    def over_tube(self, name: str, objective: Objective, effort: Effort) -> Supremum:
+        """A supremum over the tube, with an effort of its own."""
+        return self._over_tube(name, objective, effort)
 
     def _over_tube(
         self,

@@ -17,6 +17,7 @@ from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.family import Everyone
 from tubecert.recheck.identity import vanish
+from tubecert.recheck.linear import straight_below
 from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.metric import (
     adjugate,
@@ -49,6 +50,7 @@ from tubecert.recheck.wind import added_to, least_sum
 
 _ROUND_UP = 1 + Fraction(1, 10**15)  # what a ball loses as a float
 _FIRST = 500  # boxes before another way is tried
+_FEW = 4  # variables in which boxes are poor
 
 
 def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) -> Outcome:
@@ -75,6 +77,13 @@ def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
     if found.verdict != "undecided" or place.budget <= _FIRST:
         return found
     if len(matrices) == 1 and len(matrices[0][0]) == 1 and not place.curve.moves and not place.curve.ranges:
+        straight = (
+            straight_below(place, [row[0] for row in matrices[0]], limit)
+            if len(test.variables) >= _FEW
+            else None
+        )
+        if straight is not None:
+            return straight
         eased = column_below(place, [row[0] for row in matrices[0]], limit)
         if eased is not None and eased.holds:
             return eased
