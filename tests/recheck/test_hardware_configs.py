@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import proven
 import pytest
 import rechecked
@@ -18,6 +20,19 @@ def test_a_shipped_machine_is_certified_and_confirmed(name):
     document = proven.shipped(name)
     assert document["result"]["verdict"] == Verdict.CERTIFIED
     assert document["result"]["decided_by"] == ["hardware"]
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+def test_a_planar_quadrotor_is_certified_and_confirmed():
+    """Six states, two inputs with limits, wind; half the corridor at four times the rate, with rough constants."""
+    text = (CONFIGS / "hardware_pvtol.yaml").read_text("utf-8")
+    text = text.replace("{px: 0.4}", "{px: 0.2}").replace("rate: 250", "rate: 1000")
+    document = proven.proven(text, gap=Fraction(1, 5), conditions="hardware")
+    result = document["result"]
+    assert result["verdict"] == Verdict.CERTIFIED
+    assert result["hardware"]["half_widths"]["px"] < 0.2
+    assert [own["verdict"] for own in result["inputs"]] == ["certified", "certified"]
     assert failing(examine(document)) == []
 
 
