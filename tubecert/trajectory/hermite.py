@@ -59,11 +59,16 @@ class Pieces:
         first = np.clip(np.searchsorted(self.end.hi, lo, side="left"), 0, len(self) - 1)
         last = np.clip(np.searchsorted(self.start.lo, hi, side="right") - 1, 0, len(self) - 1)
         last = np.maximum(first, last)
-        found = self._within(first, lo, hi)
         more = last > first
-        if more.any():
-            wide = found[more].hull(self._within(last[more], lo[more], hi[more]))
+        if more.any():  # first and last pieces in one evaluation
+            every = self._within(
+                *(np.concatenate([x, y[more]]) for x, y in ((first, last), (lo, lo), (hi, hi)))
+            )
+            found = every[: len(lo)]
+            wide = found[more].hull(every[len(lo) :])
             found.lo[more], found.hi[more] = wide.lo, wide.hi
+        else:
+            found = self._within(first, lo, hi)
         between = last > first + 1
         if between.any():
             wide = found[between].hull(self._whole(first[between] + 1, last[between] - 1))
