@@ -49,6 +49,7 @@ NOT_RUN = {
     ".venv/bin/python -m pytest": "these tests",
     "tubecert design": "minutes; tests/sweep runs designs of smaller systems",
     "tubecert certify plant.yaml --set hardware.delay": "minutes, of the windows of a plant with a machine",
+    "tubecert synth configs/hardware_pvtol.yaml": "a metric of six states; the file has another one",
     "tubecert sweep": "30 certificates, or a cluster; tests/sweep runs smaller ones",
     "dask": "a cluster; tests/executor starts one",
     "tubecert recheck hardware_orbit": "tests/export/test_export_belongs.py, with this certificate",

@@ -101,7 +101,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path, arguments, says):
 
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=1, deadline=None)
 @given(
     rate=st.sampled_from([1, 5, 30, 200, 1000]),
     share=st.sampled_from([Fraction(0), Fraction(1, 2), Fraction(1)]),

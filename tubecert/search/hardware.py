@@ -24,6 +24,7 @@ from tubecert.search.lanes import DEADBEAT, LEAST, Choice, Lanes, Mask, Search
 from tubecert.search.scan import largest, serves
 
 DIGITS = 4
+_UNALIKE = 0.7  # of the inflation: for a Y that S is a multiple of
 _ROOM = 9  # digits of what only the proof needs
 _CURVE_POINTS = 13
 
@@ -81,11 +82,12 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
 def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
     """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried."""
     recipe: HardwareRecipe | None = None
-    for own in _near(search, setting, choice):
-        for inflation in (1e-9, 1e-6):
-            recipe = proof_at(search, setting, own, inflation)
-            if recipe is not None and serves(search.problem, recipe):
-                return recipe
+    for share in (1.0, _UNALIKE):
+        for own in _near(search, setting, choice):
+            for inflation in (1e-9, 1e-6):
+                recipe = proof_at(search, setting, own, inflation, share)
+                if recipe is not None and serves(search.problem, recipe):
+                    return recipe
     return recipe
 
 
@@ -124,13 +126,20 @@ def printed(setting: Setting, choice: Choice, room: float, *, filtered: bool = F
     )
 
 
-def proof_at(search: Search, setting: Setting, own: Printed, inflation: float) -> HardwareRecipe | None:
-    """The recipe at printed numbers: Y, S, N and np in floats, inflated, as decimals; None where they have no bound."""
+def proof_at(
+    search: Search, setting: Setting, own: Printed, inflation: float, share: float = 1.0
+) -> HardwareRecipe | None:
+    """The recipe at printed numbers: Y, S, N and np in floats, inflated, as decimals; None where they have no bound.
+
+    Y by a `share` of the inflation: where S is a multiple of Y and no more, an equal one leaves S nothing to spare.
+    """
     at = setting.lanes()
     omega = 2 * DEADBEAT / at.Ts if own.bandwidth is None else np.array([float(own.bandwidth)])
     chosen = Choice(dhat=np.array([float(own.level)]), omega=omega, f0=np.array([float(own.floor)]))
     loop = search.settled(at, chosen)
-    sizes = [max(float(x[0]) * (1 + inflation), LEAST) for x in (loop.Y, loop.S, loop.N)]
+    room = (share * inflation, inflation, inflation)
+    bare = zip((loop.Y, loop.S, loop.N), room, strict=True)
+    sizes = [max(float(x[0]) * (1 + more), LEAST) for x, more in bare]
     prediction = None if loop.np is None else max(float(loop.np[0]) * (1 + inflation), LEAST)
     if not np.all(np.isfinite([*sizes, prediction or 0.0])):
         return None
