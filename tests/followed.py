@@ -18,6 +18,7 @@ from tubecert.export.assembly import assembled
 from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
 from tubecert.recheck.balls import exact, root
+from tubecert.recheck.code.examination import moves_of
 from tubecert.recheck.code.losses import About, lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.controller import Machine
@@ -98,6 +99,7 @@ def bounds(c: Controller, formulas: Any, files: tuple[str, str]) -> dict[str, fl
             share=exact(c.share),
             sample_time=c.sample_time,
             held=formulas.held,
+            moves=moves_of(formulas, exact(1)) if c.moves else (),  # n_E of noise that is known by its length
         )
         found = lost_by(read_code(*files), about)
         return {name: float(getattr(found, name).upper()) for name in ("feedback", "input", "estimate")}

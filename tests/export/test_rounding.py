@@ -148,6 +148,38 @@ def test_the_estimate_loses_no_more_than_is_said(precision, real):
     assert 0.001 * float(bound.estimate) < worst <= float(bound.estimate)
 
 
+@pytest.mark.parametrize(("precision", "real"), [("single", np.float32), ("double", np.float64)])
+def test_the_estimate_loses_less_where_measurements_are_near_to_each_other(precision, real):
+    """The difference of two measurements alone, over Ts and th, which had been what loses most."""
+    c = controller(held=True, noise_size=Fraction(1))
+    bound, generator = rounding_of(c, precision).estimate, np.random.default_rng(8)
+    worst, direction = 0.0, generator.normal(size=(40, 2))
+    for (_, _, y), own in zip(near_the_plan(c, 40, real), direction, strict=True):
+        last = (y + own / np.linalg.norm(own) * float(c.moves[0]) * 0.999).astype(real)
+        (f,), (last_f,) = (execute(c.drift, each[None], real=real) for each in (y, last))
+        zero = np.zeros((1, 1), dtype=real)
+        new, _ = execute(c.estimator, y[None], f, last[None], last_f, zero, zero, real=real)
+        one, two = [float(v) for v in y], [float(v) for v in last]
+        nothing = [mpmath.mpf(0)]
+        slow = [exactly(c.drift, each)["f"] for each in (one, two)]
+        exact = exactly(c.estimator, one, slow[0], two, slow[1], nothing, nothing)["q"][0]
+        worst = max(worst, abs(float(mpmath.mpf(float(new[0, 0])) - exact)) / float(c.share))
+    assert 0.01 * float(bound) < worst <= float(bound)
+
+
+def test_a_measurement_moves_by_its_share_of_the_coordinates():
+    """|y_i - last_i| <= |row i of S^-1| (Y Ts + 2 nu n_E), against directions at random."""
+    c = assembled(replace(GIVEN["turning"], noise_size=Fraction(2)))
+    S = np.array([[1, 0, 0], [0, 2, 0], [0, 1 / 3, 1]])
+    own = GIVEN["turning"].recipe
+    far = float(own.speed * own.sample_time + 4 * own.noise)
+    directions = np.random.default_rng(2).normal(size=(4000, 3))
+    reached = np.abs(np.linalg.solve(S, (directions / np.linalg.norm(directions, axis=1)[:, None]).T)).max(1)
+    moves = np.array([float(q) for q in c.moves])
+    assert np.all(reached * far <= moves)
+    assert np.all(reached * far > 0.98 * moves)
+
+
 def set_to(code, **rows):
     """What a compiled controller keeps, as it is wanted."""
     for name, row in rows.items():

@@ -173,6 +173,19 @@ def test_a_plan_through_knots_is_followed_piece_by_piece(held):
     assert all(0.02 < found[each] / float(getattr(theirs, each)) < 2 for each in NAMES)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_what_is_measured_moves_little_from_one_sample_to_the_next(precision):
+    """Y Ts + 2 nu n_E bounds the difference that is divided by Ts: both bounds fall, and a wrong one is noticed."""
+    c, anywhere = covered("held_orbit", noise_size=Fraction(1)), covered("held_orbit")
+    assert [float(q) for q in c.moves] == pytest.approx([8.1 / 500 + 2e-3] * 2)
+    theirs, found = rounding_of(c, precision), bounds(c, in_recheck("held_orbit"), texts(c, precision))
+    assert theirs.estimate < rounding_of(anywhere, precision).estimate / 20
+    assert 0.3 < found["estimate"] / float(theirs.estimate) < 1
+    less = rounding_of(replace(c, moves=tuple(q / 4 for q in c.moves)), precision)
+    assert found["estimate"] > float(less.estimate)
+
+
 MEANS = {
     "a middle": ("0.5 * (begin + until)", "0.25 * (begin + until)", "another way"),
     "a share": ("(until - begin) / length", "(until - begin) * length", "another way"),

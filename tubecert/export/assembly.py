@@ -31,6 +31,7 @@ from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.verdict import Verdict
 
 _NOISE: Final = "noise_metric"  # n_M of one unit of noise
+_SIZE: Final = "noise_size"  # n_E
 _GAIN: Final = "feedback_gain"
 _BENT: Final = ("lower", "symbols", "symbols_slope")
 _LONGEST: Final = 32  # characters of a name
@@ -68,6 +69,7 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
         ranges=tuple(data.inputs.get(each, (-math.inf, math.inf)) for each in model.inputs),
         feedback_gain=_gain(certificate, name),
         geodesic=spec.hardware.geodesic,
+        noise_size=_noise_size(certificate),
     )
     if certificate.result.claim.plans is not None or spec.trajectory.bundle is not None:
         raise refused(
@@ -119,7 +121,20 @@ def assembled(machine: Machine) -> Controller:
         predictor=None if recipe.prediction is None else blocks.predictor(model, recipe.delay / INTEGRATION),
         estimator=blocks.estimator(machine),
         swept=geodesics.swept(model, machine.geodesic) if bent and machine.geodesic is not None else None,
+        moves=_moves(machine),
     )
+
+
+def _moves(machine: Machine) -> tuple[Fraction, ...]:
+    """|y_k - y_(k-1)| <= Y Ts + 2 nu n_E in coordinates of the tube, state by state, from above."""
+    recipe, n = machine.recipe, len(machine.model.states)
+    if machine.noise_size is None:
+        return ()
+    rows = machine.coordinates
+    back = None if rows is None else inverse([[Fraction(q) for q in row] for row in rows])
+    far = recipe.speed * recipe.sample_time + 2 * recipe.noise * machine.noise_size
+    sizes = [Fraction(1) if back is None else sum((q * q for q in back[i]), Fraction(0)) for i in range(n)]
+    return tuple(Fraction(float((Interval.of(far) * sqrt(Interval.of(size))).hi)) for size in sizes)
 
 
 def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]:
@@ -185,6 +200,12 @@ def _reach(certificate: Certificate, recipe: HardwareRecipe, geodesic: Picard | 
         raise incomplete("that is exported", "what noise is in the metric is missing")
     reach = looked_at(recipe, noise, upper)
     return reach if geodesic is None else reach + _off(certificate, geodesic, reach, upper)
+
+
+def _noise_size(certificate: Certificate) -> Fraction | None:
+    """n_E, from above."""
+    own = certificate.result.constants.get(_SIZE)
+    return None if own is None or own.above is None else Fraction(own.above)
 
 
 def _off(certificate: Certificate, geodesic: Picard, reach: Fraction, upper: float) -> Fraction:

@@ -33,7 +33,7 @@ class Machine:
     """What a controller is made of.
 
     `clip` by input, empty for the ball of the recipe; `coordinates` S, by rows; `horizon` of the claim, None for ever;
-    `feedback_gain` du; `geodesic`: how geodesics are computed.
+    `feedback_gain` du; `geodesic`: how geodesics are computed; `noise_size` n_E, where rounding is asked for.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Machine:
     ranges: tuple[tuple[float, float], ...]
     feedback_gain: Fraction = Fraction(0)
     geodesic: Picard | None = None
+    noise_size: Fraction | None = None
 
 
 def _states(writer: Writer, model: ControlAffineModel, name: str) -> tuple[list[Place], dict[str, Place]]:

@@ -40,7 +40,8 @@ class Controller:
     what is proven of every input; `share` is th; `estimate` bounds |q|, and `feedback_gain` is du. `lost`: what
     rounding may cost, where the certificate covers it. Of the plan, either the program `plan` or `pieces`.
     `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is covered.
-    `still`: u* is constant; `held`: u* is played from sample to sample.
+    `still`: u* is constant; `held`: u* is played from sample to sample. `moves`: how far every measured state may move
+    from one sample to the next, where rounding is covered.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Controller:
     predictor: Program | None
     estimator: Program
     swept: Swept | None = None
+    moves: tuple[Fraction, ...] = ()
 
     @property
     def programs(self) -> tuple[Program, ...]:

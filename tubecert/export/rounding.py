@@ -239,7 +239,8 @@ class _Analysis:
         mean = self._run(self.c.applied, given)["mean"]
         q = [known_by_size(self._estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
-        new = self._run(self.c.estimator, {**seen, "q": q, "mean": mean})["q"]
+        apart = ("y", "last_y") if self.c.moves else None
+        new = self._run(self.c.estimator, {**seen, "q": q, "mean": mean}, apart)["q"]
         share = Interval.of(self.c.share)
         # th and pi are decimals of 50 digits at least
         return largest_of(length_of(new) * (1 + Interval.of(Fraction(1, 10**9)))) / share
@@ -294,7 +295,8 @@ class _Analysis:
         for step in program.steps:
             found = self._step(program, step, memory, given)
             if apart is not None and step.operation == "sub":
-                found = self._met(found, [program.steps[p] for p in step.places], apart)
+                args = [program.steps[p] for p in step.places]
+                found = self._moved(found, args) if apart[1] == "last_y" else self._met(found, args, apart)
             memory.append(found)
         ports = (*program.outputs, *program.marked)
         return {port.name: [memory[place] for place in port.places] for port in ports}
@@ -309,6 +311,15 @@ class _Analysis:
         return Followed(
             value=Interval(np.maximum(found.value.lo, -w), np.minimum(found.value.hi, w)), error=found.error
         )
+
+    def _moved(self, found: Followed, args: Sequence[Step]) -> Followed:
+        """y_i and the one of a sample before are near to each other, and are what the code has."""
+        first, second = args
+        if (first.name, second.name) != ("y", "last_y") or first.index != second.index:
+            return found
+        w = float(Interval.of(self.c.moves[first.index]).hi)
+        value = Interval(np.maximum(found.value.lo, -w), np.minimum(found.value.hi, w))
+        return self._rounded(value, Interval.exact(np.zeros_like(found.error)))
 
     def _step(
         self,

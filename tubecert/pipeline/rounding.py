@@ -83,6 +83,7 @@ def _machine(bounded: Bounded, known: Known, recipe: HardwareRecipe, gain: Fract
         horizon=question.spec.trajectory.horizon,
         ranges=(),
         feedback_gain=gain,
+        noise_size=Fraction(known.constants.noise_size.above),
     )
 
 

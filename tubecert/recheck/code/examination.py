@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import arb, ctx
+from flint import arb, arb_mat, ctx
 
-from tubecert.recheck.balls import Ball, exact, larger, magnitude, root
+from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root
 from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.losses import About, lost_by
 from tubecert.recheck.code.reader import Code
@@ -175,4 +175,16 @@ def about(formulas: Formulas) -> About:
         share=arb(1) if decay is None else -(-decay).expm1(),
         sample_time=recipe.sample_time,
         held=formulas.held,
+        moves=moves_of(formulas, noise.noise_size),
     )
+
+
+def moves_of(formulas: Formulas, noise_size: Ball) -> list[Ball]:
+    """|S (y_k - y_(k-1))| <= Y Ts + 2 nu n_E, of which every state is a share: Cauchy and Schwarz."""
+    recipe, S = formulas.recipe, formulas.case.tube.coordinates
+    far = exact(recipe.speed) * exact(recipe.sample_time) + 2 * exact(recipe.noise) * noise_size
+    n = len(formulas.metric)
+    if S is None:
+        return [far] * n
+    back = arb_mat([[exact(q) for q in row] for row in S]).inv()
+    return [far * length([back[i, j] for j in range(n)]) for i in range(n)]

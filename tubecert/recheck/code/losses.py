@@ -26,7 +26,7 @@ from tubecert.recheck.code.pieces import (
 )
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Counter, Machine, Own, State, Value, Vector, numbers
-from tubecert.recheck.code.seen import KINDS, Rounded, Seen, known
+from tubecert.recheck.code.seen import KINDS, SINCE, Rounded, Seen, known
 from tubecert.recheck.code.shape import ball_of, box_of, law_of
 from tubecert.recheck.code.stations import Station, stations
 from tubecert.recheck.code.words import UnreadError
@@ -46,7 +46,7 @@ class About:
     """What a certificate says of the loop.
 
     `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
-    `share` is th; `held`: u* is held from sample to sample.
+    `share` is th; `held`: u* is held from sample to sample. `moves`: how far what is measured moves in one, by state.
     """
 
     curve: Curve
@@ -60,6 +60,7 @@ class About:
     share: Ball
     sample_time: Fraction
     held: bool
+    moves: Sequence[Ball] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +97,8 @@ class _Analysis:
         self.n = len(about.widths)
         self.box = [width * about.reach for width in about.widths]
         sides = dict(enumerate(self.box))
-        self.rounded = Rounded(self.kind, apart=("y", "xs"), widths=sides)
+        moves = dict(enumerate(about.moves))
+        self.rounded = Rounded(self.kind, apart=("y", "xs"), widths=sides, moves=moves)
         self.law = law_of(code.functions["law"], self.m)
         self.stations = stations(about.curve, about.sample_time)
         self.tables = tables_of(code, about.curve)
@@ -184,11 +186,7 @@ class _Analysis:
 
         def law(*given: Value) -> None:
             y, f, xs, *rest = given
-            own: list[Vector] = [
-                [replace(each, origin=(name, i)) for i, each in enumerate(numbers(row))]
-                for name, row in (("y", y), ("xs", xs))
-            ]
-            machine.own("law", own[0], f, own[1], *rest)
+            machine.own("law", _named("y", y), f, _named("xs", xs), *rest)
             seen[:] = numbers([machine.within("law", each) for each in (*self.law.c, self.law.excess)])
             _list(rest[-2])[:] = [known(arb(0))] * self.m
 
@@ -265,7 +263,8 @@ class _Analysis:
             _list(told)[:] = [known(between(0, self.kind.most))] * 3
 
         def estimator(*given: Value) -> None:
-            machine.own("estimator", *given)
+            y, f, last, *rest = given
+            machine.own("estimator", _named(SINCE[0], y), f, _named(SINCE[1], last), *rest)
             new, clipped = given[-2:]
             q[:] = _list(new)
             _list(clipped)[:] = [Seen(_around(self.of.radius), self._clipped())] * self.m
@@ -385,6 +384,11 @@ def _greatest(balls: Sequence[Ball]) -> Ball:
 
 def _around(size: Ball) -> Ball:
     return between(-size, size)
+
+
+def _named(name: str, row: Value) -> Vector:
+    """A vector whose entries know where they come from."""
+    return [replace(each, origin=(name, i)) for i, each in enumerate(numbers(row))]
 
 
 def _slackened(found: Vector, slack: Sequence[Ball]) -> Numbers:

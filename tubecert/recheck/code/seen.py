@@ -89,11 +89,15 @@ def known(value: Ball) -> Seen:
     return Seen(value, _NOTHING)
 
 
+SINCE = ("y", "last_y")  # what is measured, and what was a sample before
+
+
 class Rounded:
     """Arithmetic of a kind. `stands`: literals stand for numbers near to them; `rounds`: operations are rounded;
     `decides`: what is not known to be less is compared by middles, which proves nothing.
 
-    `apart`: origins of which differences are forms of degree 1, and how large each of them is at most.
+    `apart`: origins of which differences are forms of degree 1, and how large each of them is at most. `moves`: how far
+    entries of `SINCE`, which the computer has exactly, are apart at most.
     """
 
     def __init__(
@@ -106,10 +110,11 @@ class Rounded:
         decides: bool = False,
         apart: tuple[str, str] | None = None,
         widths: Mapping[int, Ball] | None = None,
+        moves: Mapping[int, Ball] | None = None,
     ) -> None:
         self.kind, self.stands, self.rounds, self.decides = kind, stands, rounds, decides
         self.eta = kind.least if underflows else _NOTHING
-        self.apart, self.widths = apart, widths or {}
+        self.apart, self.widths, self.moves = apart, widths or {}, moves or {}
 
     def literal(self, text: str) -> Seen:
         """The number of the kind nearest to a decimal; it stands for any number that it is the nearest one to."""
@@ -135,6 +140,9 @@ class Rounded:
         if a.origin is None or b.origin is None or self.apart is None:
             return replace(found, degree=degree)
         (left, i), (right, j) = a.origin, b.origin
+        if (left, right) == SINCE and i == j and i in self.moves:
+            near = _met(found.value, between(-self.moves[i], self.moves[i]))
+            return self.rounded(near, a.error + b.error)
         if (left, right) != self.apart or i != j:
             return replace(found, degree=degree)
         width = self.widths.get(i)
