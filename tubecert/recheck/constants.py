@@ -91,10 +91,21 @@ def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
 
 
 def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
-    gram = times(turned(fields.B), fields.B)
+    """d(B^+) = G^-1 dB' (I - B B^+) - B^+ dB B^+, G = B'B: enclosures of the derivative of quotients would be wide."""
+    B = fields.B
+    gram = times(turned(B), B)
     d = determinant(gram)
-    inverse = [[e / d for e in row] for row in times(adjugate(gram), turned(fields.B))]
-    return fields.slopes(inverse)
+    inverse = [[e / d for e in row] for row in adjugate(gram)]
+    plain = times(inverse, turned(B))
+    beside = plus(unit_matrix(len(B)), times(B, plain), -1)
+
+    def along(slope: Matrix) -> Matrix:
+        if all_zero(slope):
+            return scaled(0, plain)
+        tilted = times(times(inverse, turned(slope)), beside)
+        return plus(tilted, times(times(plain, slope), plain), -1)
+
+    return [along(slope) for slope in fields.slopes(B)]
 
 
 def _left_inverse(place: Place, limit: Fraction) -> Outcome:
