@@ -104,3 +104,14 @@ def test_when_the_time_is_up_the_rest_is_undecided():
         stopped = prove(slopes_below([terms([H], "xyt")], "t", Fraction(15, 1000)), tube(), 10**9)
     assert stopped.boxes <= 8
     assert stopped.why.endswith("boxes, when the time was up")
+
+
+def test_a_kink_that_does_not_change_in_time_is_not_looked_at():
+    """0.3 |cos 3t| at t = 0, whatever the sign of x is; 20 000 boxes were not enough for it."""
+    h = terms(["0.1*sin(3*t) + 0.1*abs(x)"], "xyt")
+    found = prove(slopes_below([h], "t", Fraction(301, 1000)), tube(), 200)
+    assert found.holds, found
+    assert not prove(slopes_below([h], "t", Fraction(299, 1000)), tube(), 200).holds
+    assert not prove(
+        slopes_below([terms(["0.1*sin(3*t)*abs(x)"], "xyt")], "t", Fraction(1, 10)), tube(), 200
+    ).holds

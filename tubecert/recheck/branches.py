@@ -7,7 +7,8 @@ Almost everywhere the Jacobian is that of a branch, so a bound for all branches 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from fractions import Fraction
 from itertools import product
 
@@ -16,7 +17,7 @@ from flint import arb
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.boxes import Box, Field, Found, Test, Values
 from tubecert.recheck.statements import NormsBelow
-from tubecert.recheck.terms import Matrix, Rows, Term, in_order, matrix_slopes, remade, variable
+from tubecert.recheck.terms import Matrix, Rows, Term, in_order, matrix_slopes, names, remade, variable
 
 _MOST = 6  # signs
 
@@ -42,6 +43,17 @@ class Signs:
     def __init__(self, roots: Sequence[Term]) -> None:
         found = apart(roots)
         self.entries, signs = (list(roots), {}) if found is None else found
+        self._keep(signs)
+
+    def within(self, entries: Iterable[Term]) -> Signs:
+        """The signs that occur in terms made of the entries: the others need not be known for these."""
+        used = names(entries)
+        found = copy(self)
+        found._keep({name: e for name, e in self._of.items() if name in used})
+        return found
+
+    def _keep(self, signs: dict[str, Term]) -> None:
+        self._of = signs
         self.names = tuple(signs)
         self._inner = Field(list(signs.values()))
         self._bare = {name: str(e.value) for name, e in signs.items() if e.op == "symbol"}
@@ -98,6 +110,7 @@ def slopes_below(h: Rows, name: str, limit: Fraction, beside: Sequence[Rows] = (
     signs = Signs(_entries([h]))
     slopes = matrix_slopes(_like([h], signs.entries)[0], name)
     every = [slopes, *beside]
+    signs = signs.within(_entries([slopes]))
     return BranchesBelow(every, signs, limit) if signs.names else NormsBelow(every, limit)
 
 

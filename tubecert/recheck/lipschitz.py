@@ -90,9 +90,9 @@ class LipschitzBelow:
         return bool(self._levels) and bool(total <= self._limit)
 
     def _widened(self, found: Found, box: Box) -> Found:
-        """What to split: where there are kinks, whatever is wide; else what causes the width."""
-        kinked = bool(self._levels or self._signs.names)
-        caused = [hi - lo if kinked else 0.0 for lo, hi in box]
+        """What to split: where there are kinks, whatever is wide in them; else what causes the width."""
+        kinked = range(len(box)) if self._levels else self._signed
+        caused = [hi - lo if i in kinked else 0.0 for i, (lo, hi) in enumerate(box)]
         spread = list(caused)
         for c, i in enumerate(self._columns):
             caused[i] = max(caused[i], found.caused[c])
