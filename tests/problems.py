@@ -184,22 +184,24 @@ def alive(**options) -> TubeProblem:
     return TubeProblem(constants=constants(**values), **(defaults | options))
 
 
-def _judged(letter: str, problem: TubeProblem, asked: dict[str, Fraction]) -> Any:
+def _judged(letter: str, problem: TubeProblem, asked: dict[str, Any]) -> Any:
+    """Without a curve, which takes longer than the rest, unless it is asked for."""
     kind = kind_of(letter)
-    return kind.section(problem, PROPOSERS[kind.theorem.recipe].propose(problem, Asked(**asked)))
+    wanted = Asked(**{"curve": False} | asked)
+    return kind.section(problem, PROPOSERS[kind.theorem.recipe].propose(problem, wanted))
 
 
-def judged_26(problem: TubeProblem, **asked: Fraction) -> RatesSection:
+def judged_26(problem: TubeProblem, **asked: Any) -> RatesSection:
     """What is proposed and decided for certificate A."""
     return _judged("A", problem, asked)
 
 
-def judged_distance(problem: TubeProblem, **asked: Fraction) -> DistanceSection:
+def judged_distance(problem: TubeProblem, **asked: Any) -> DistanceSection:
     """What is proposed and decided for certificate B."""
     return _judged("B", problem, asked)
 
 
-def judged_sampled(problem: TubeProblem, **asked: Fraction) -> SampledSection:
+def judged_sampled(problem: TubeProblem, **asked: Any) -> SampledSection:
     """What is proposed and decided for certificate C."""
     return _judged("C", problem, asked)
 

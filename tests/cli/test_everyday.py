@@ -55,6 +55,7 @@ def test_schema_of_the_specification_by_default():
 # init
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 @pytest.mark.parametrize("template", Template)
 def test_templates_certify_as_they_are(template, folder):

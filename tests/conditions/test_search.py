@@ -222,7 +222,7 @@ def test_where_26b_binds_a_hundredth_is_left():
 @pytest.mark.parametrize("options", CASES_26[:4])
 def test_printed_pairs_of_26_are_proven_and_cannot_be_smaller(options):
     problem = alive(**options)
-    result = judged_26(problem)
+    result = judged_26(problem, curve=True)
     for recipe in (result.pair.recipe, result.least_adaptation.recipe, *result.curve):
         assert verdict_at(problem, recipe) is Verdict.CERTIFIED
         less = replace(recipe, adaptation_rate=recipe.adaptation_rate * Fraction("0.998"))
@@ -234,7 +234,7 @@ def test_printed_pairs_of_26_are_proven_and_cannot_be_smaller(options):
 
 def test_auto_takes_the_best_predictor_gain_of_26():
     problem = alive(A_m=None)
-    result = judged_26(problem)
+    result = judged_26(problem, curve=True)
     w, G = gains(result.pair)
     n = problem.floats()
     g = np.geomspace(0.01, 1000, 4001)
@@ -296,7 +296,7 @@ def test_least_gamma_against_brute_force(problem, g):
 
 def test_auto_takes_the_best_predictor_gain_of_b():
     problem = alive(A_m=None, values={"B_pinv_x": 300.0, "h_t": 40.0})
-    low = judged_distance(problem).curve[0].bandwidth
+    low = judged_distance(problem, curve=True).curve[0].bandwidth
     pair = judged_distance(problem, bandwidth=low).asked
     n = problem.floats()
     g = np.geomspace(0.2, 5, 2000) * float(low)
@@ -311,7 +311,7 @@ def test_auto_takes_the_best_predictor_gain_of_b():
     "problem", [two_state(), three_state(), alive(), alive(A_m=None), alive(smooth=Fraction("0.1"))]
 )
 def test_printed_pairs_of_b_are_proven_and_cannot_be_smaller(problem):
-    result = judged_distance(problem)
+    result = judged_distance(problem, curve=True)
     assert result.verdict is Verdict.CERTIFIED
     assert len(result.curve) >= 20
     for recipe in (result.split.recipe, result.least_adaptation.recipe, *result.curve):
@@ -330,7 +330,7 @@ def test_printed_pairs_of_b_are_proven_and_cannot_be_smaller(problem):
 @pytest.mark.slow
 @pytest.mark.parametrize("problem", [two_state(), three_state(), alive(), alive(A_m=None)])
 def test_sample_times_are_proven_and_cannot_be_longer(problem):
-    result = judged_sampled(problem)
+    result = judged_sampled(problem, curve=True)
     assert result.verdict is Verdict.CERTIFIED
     assert len(result.curve) >= 15
     for recipe in (result.pair.recipe, *result.curve):

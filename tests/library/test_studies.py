@@ -62,6 +62,7 @@ def test_a_comparison_is_what_its_certificates_say(swept, tmp_path):
         tc.compare(points[0].file, points[1].file, names=["one"])
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_design_gives_the_certificate_of_its_best_tube(monkeypatch):
     monkeypatch.setattr(attempts, "_FARTHEST", 1)

@@ -43,6 +43,7 @@ def radii(epsilon, rho_a):
     return Options(epsilon=Fraction(epsilon), rho_a=Fraction(rho_a))
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_other_radii_prove_neither_rank_nor_metric_again():
     memory = Memory()
@@ -55,6 +56,7 @@ def test_other_radii_prove_neither_rank_nor_metric_again():
         assert result == certify(THREE, options).to_json()  # and what is recalled changes nothing
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_other_radii_plan_once(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -26,6 +26,7 @@ from tubecert.verdict import Verdict
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 COARSE = Options(gap=Fraction(1, 5))
+pytestmark = pytest.mark.usefixtures("barely")
 # a link and a motor behind a spring; W for speeds in rad/s
 JOINT = np.array(
     [

@@ -41,6 +41,7 @@ def run(*arguments):
 # -- systems written from their equations
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "car", "flexible_joint"])
 def test_a_metric_for_nothing_but_the_equations_certifies(name):
@@ -58,6 +59,7 @@ def test_a_metric_for_nothing_but_the_equations_certifies(name):
     assert found.limits.faster is not None
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_certify_finds_a_metric_by_itself_and_recheck_confirms_it(tmp_path):
     spec, target = str(ROBOTS / "pendulum.yaml"), str(tmp_path / "p.json")

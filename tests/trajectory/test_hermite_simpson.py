@@ -158,6 +158,7 @@ def test_check_compares_such_a_plan_with_the_dynamics(tmp_path):
     assert (finding.code, finding.location.line) == ("TC407", 4)
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_certificate_of_such_a_plan_is_confirmed_and_forgeries_are_not(tmp_path):
     result = pipeline.certify(load(written(tmp_path)), pipeline.Options())
