@@ -71,6 +71,7 @@ def test_an_exception_of_a_piece_is_raised(executor):
     assert nobody_is_left()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [dying, leaving])
 def test_a_worker_that_dies_is_told(function):
     with pytest.raises(WorkerError, match="killed, or out of memory"):

@@ -127,6 +127,7 @@ def test_fast_math_is_refused(flag, cc, tmp_path):
     assert "compile without" in done.stderr
 
 
+@pytest.mark.slow
 @needs_cc
 @pytest.mark.parametrize("cc", PRESENT)
 @pytest.mark.parametrize("flag", ["-funsafe-math-optimizations", "-freciprocal-math", "-fno-signed-zeros"])

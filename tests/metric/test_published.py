@@ -244,6 +244,7 @@ def test_beside_each_that_is_refuted_stands_one_that_holds_on_its_set_at_its_rat
             assert (spec["system"], spec["safe_set"]) == (published["system"], published["safe_set"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("each", REFUTED, ids=lambda each: each["name"])
 def test_the_one_beside_it_holds_where_it_fails(each):
     spec, _, same = beside()[each["name"]]

@@ -66,6 +66,7 @@ def test_another_table_is_not_confirmed(row, column):
     assert failing(examine(respecified(copy.deepcopy(made()), changed)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "why"),
     [

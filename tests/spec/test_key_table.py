@@ -112,6 +112,7 @@ def same_as_left_out(place: tuple[str, ...], values: list[Any]) -> set[str] | No
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", KEYS, ids=".".join)
 def test_a_default_is_what_its_absence_means(place):
     """And where one of the words of a key means that always, the schema says so."""

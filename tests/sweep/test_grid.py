@@ -86,6 +86,7 @@ def test_the_last_key_changes_first():
     ]
 
 
+@pytest.mark.slow
 def test_keys_that_meet_and_grids_without_end_are_refused():
     with pytest.raises(SpecError, match="a has a range already"):
         points([Axis.of("a=1,2"), Axis.of("a.b=1,2")])
