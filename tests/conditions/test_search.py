@@ -69,7 +69,7 @@ def test_three_state_corrected():
     problem = three_state(A_m=THREE, drift=Drift.SUM, kernel=Kernel.PAPER)
     assert gains(judged_26(problem).pair) == pytest.approx((41.8, 1.39e7), rel=2e-3)
     assert gains(judged_distance(three_state()).least_adaptation) == pytest.approx((10.8, 1.38e4), rel=5e-3)
-    result = judged_sampled(three_state(A_m=THREE))
+    result = judged_sampled(three_state(A_m=THREE), curve=True)
     assert float(result.pair.recipe.bandwidth) == pytest.approx(11.0, rel=5e-3)
     assert float(result.pair.recipe.sample_time) == pytest.approx(0.0906, rel=5e-3)
     assert result.sample_time_limit == pytest.approx(0.1258, rel=1e-2)
@@ -94,7 +94,7 @@ def test_two_state_with_a_plan_defect(delta, omega, Gamma):
 
 
 def test_two_state_sampled():
-    result = judged_sampled(two_state(A_m=scalar_predictor("1", 2)))
+    result = judged_sampled(two_state(A_m=scalar_predictor("1", 2)), curve=True)
     assert float(result.pair.recipe.bandwidth) == pytest.approx(27.0, rel=3e-3)
     assert float(result.pair.recipe.sample_time) == pytest.approx(0.0370, rel=3e-3)
     assert result.sample_time_limit == pytest.approx(0.0514, rel=5e-3)

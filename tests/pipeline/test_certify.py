@@ -100,7 +100,7 @@ def test_gains_of_the_reference_rows(monkeypatch):
     b = judged_distance(best).least_adaptation.recipe
     assert float(b.bandwidth) == pytest.approx(10.8, rel=0.03)
     assert float(b.adaptation_rate) == pytest.approx(1.38e4, rel=0.1)
-    c = judged_sampled(row)  # with g = 1 the mean age is Ts/2, as in the row
+    c = judged_sampled(row, curve=True)  # with g = 1 the mean age is Ts/2, as in the row
     assert float(c.pair.recipe.bandwidth) == pytest.approx(11.0, rel=0.03)
     assert float(c.pair.recipe.sample_time) == pytest.approx(0.0906, rel=0.03)
     assert c.sample_time_limit == pytest.approx(0.1258, rel=0.03)
