@@ -263,6 +263,23 @@ def test_windows_of_a_specification_are_those_of_the_section(honest):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda r: r["spec"]["effective"]["tube"].pop("windows"), "does not ask for"),
+        (lambda r: r["tube"].update(coordinates=[["2", "0"], ["0", "2"]]), "beside coordinates"),
+    ],
+    ids=["without", "turned"],
+)
+def test_windows_that_cannot_be_are_refused(honest, change, why):
+    """Each ended in an error of the program's own before: a part of a turned tube, a pad without a sample time."""
+    document = copy.deepcopy(honest[0])
+    change(document["result"])
+    with pytest.raises(TubecertError, match=why):
+        examine(sealed(document), BUDGET, memory={})
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_no_level_is_beyond_that_of_the_whole_tube(honest, share):
     """Half-widths of the whole tube rest on d < dbar of the whole, however large the metric is in a window."""

@@ -120,7 +120,19 @@ def read_result(node: Node) -> Result:
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
         sections=_sections(own, len(states), applying) if searched else None,
     )
+    _windows(node, result)
     return _complete(node, result) if verdict == "certified" else result
+
+
+def _windows(node: Node, result: Result) -> None:
+    """What is told of windows needs some that are asked for, and a tube of balls."""
+    sections = {} if result.sections is None else result.sections.by_key
+    if not any(section.windows for section in sections.values()):
+        return
+    if not result.specification.windows:
+        raise node.refused("has windows that its specification does not ask for")
+    if result.tube is not None and result.tube.coordinates is not None:
+        raise node.refused("has windows beside coordinates of the tube")
 
 
 def _complete(node: Node, result: Result) -> Result:

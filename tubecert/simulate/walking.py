@@ -56,10 +56,11 @@ def _rates(drift: Any, segment: Any, lane: int, k: int, count: int, trial: Any, 
         share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         for i in range(n):
             memory[i] = x[i] + (share * dt * trial.rates[stage - 1, i] if stage else 0.0)
+        beside = memory[n:]  # u, then t
         for j in range(m):
             change = segment.then[lane, j] - segment.now[lane, j]
-            memory[n + j] = segment.now[lane, j] + change * (k + share) / count
-        memory[n + m] = segment.begin + (k + share) * dt
+            beside[j] = segment.now[lane, j] + change * (k + share) / count
+        beside[m] = segment.begin + (k + share) * dt
         execute(drift.steps, drift.steps.shape[0], memory)
         for i in range(n):
             trial.rates[stage, i] = memory[drift.outputs[i]] + segment.p[lane, i]
