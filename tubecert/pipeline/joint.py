@@ -41,7 +41,7 @@ from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
 from tubecert.synthesis.sos import propose_sos
 from tubecert.verdict import Verdict
 
-_BACK_OFF: Final = 6e-3  # of the rate: what the proof may need
+_BACK_OFFS: Final = (6e-3, 3e-4)  # of the rate: what the proof may need
 _UP: Final = 1 + 1e-9  # so that a rate of three digits stays what it is
 _EVALUATIONS: Final = 20
 _BOXES: Final = 20_000  # what each claim may cost here
@@ -124,16 +124,19 @@ class Joint:
             model=self.model,
             safe_set=self.spec.safe_set,
             family=self.family,
-            rate=float(rate) * (1 + _BACK_OFF),
+            rate=float(rate),
             coordinates="auto",
             target=own.target,
         )
-        try:
-            proposal = propose_sos(problem)
-            outcome = shortest_proven(problem, proposal, rate, Effort(gap=0.05, budget=_BOXES))
-        except (ArithmeticError, ValueError, RuntimeError):  # a solver that breaks down has found nothing
-            return None
-        return outcome if isinstance(outcome, VerifiedMetric) else None
+        for back_off in _BACK_OFFS:
+            tried = replace(problem, rate=problem.rate * (1 + back_off))
+            try:
+                outcome = shortest_proven(tried, propose_sos(tried), rate, Effort(gap=0.05, budget=_BOXES))
+            except (ArithmeticError, ValueError, RuntimeError):  # a solver that breaks down has found nothing
+                continue
+            if isinstance(outcome, VerifiedMetric):
+                return outcome
+        return None
 
     def _section(self, text: str, metric: VerifiedMetric) -> HardwareData | None:
         if self.progress is not None:
