@@ -16,6 +16,7 @@ from tubecert.printable import visible
 from tubecert.report import console, reach
 from tubecert.report.findings import summary
 from tubecert.report.html import environment
+from tubecert.report.outline import widths
 from tubecert.report.page import Cell, Page, Table
 from tubecert.report.page_origin import equations
 from tubecert.report.page_sections import gains_table, not_certified
@@ -79,12 +80,13 @@ def certificate(certificate: Certificate) -> str:
 
 
 def _half_widths(result: Result) -> Table | None:
-    tube = result.tube
-    if result.verdict is not Verdict.CERTIFIED or tube is None or not tube.half_widths:
+    """What the certificate that decides proves of each state."""
+    found = widths(result)
+    if result.verdict is not Verdict.CERTIFIED or not found:
         return None
     return Table(
         columns=("half-widths of the tube",),
-        rows=((Cell(text=reach.half_widths(result, tube.half_widths)),),),
+        rows=((Cell(text=reach.half_widths(result, found)),),),
     )
 
 
