@@ -62,6 +62,7 @@ def test_it_is_above_the_solution_of_the_comparison_equation(d0, h, delta, T, en
     assert certified == (top < 2) or top == pytest.approx(2, rel=1e-9)
 
 
+@pytest.mark.slow
 @given(st.floats(0, 1.5), st.floats(0, 1), st.sampled_from([None, "0.2", "7"]))
 def test_the_largest_uncertainty_is_where_the_proof_ends(d0, delta, horizon):
     of = problem(horizon, initial_distance=d0, plan_defect_metric=delta)

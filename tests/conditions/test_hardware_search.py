@@ -236,6 +236,7 @@ def test_a_ripple_that_is_nothing_but_rounding_is_none_of_the_budget():
     assert searching.DIGITS == 4
 
 
+@pytest.mark.slow
 def test_a_choice_is_looked_for_again_only_if_the_one_before_does_not_serve(monkeypatch):
     problem = orbit()
     search = Search(problem, problem.machine)

@@ -202,6 +202,7 @@ MUTATIONS = {
 }
 
 
+@pytest.mark.slow
 @needs_cc
 @pytest.mark.parametrize("what", sorted(MUTATIONS))
 def test_the_self_test_meets_a_mutation(what, tmp_path):

@@ -511,6 +511,7 @@ def test_a_simulation_is_refused():
 # looks
 
 
+@pytest.mark.slow
 def test_texts_are_escaped_in_notebooks(tmp_path):
     spec, result = tc.load(DATA), certified()
     metric = tmp_path / "<script>.json"

@@ -198,6 +198,7 @@ def test_the_table_is_about_the_files():
         assert expect["verdict"] == each["verdict"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("each", REFUTED, ids=lambda each: each["name"])
 def test_every_witness_is_confirmed_at_fifty_digits(each):
     spec = yaml.load((GALLERY / Path(each["file"]).name).read_text("utf-8"), Loader=yaml.BaseLoader)

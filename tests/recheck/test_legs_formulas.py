@@ -195,6 +195,7 @@ def differs(told, module=legs):
     return False
 
 
+@pytest.mark.slow
 def test_without_a_bug_the_readings_agree(told):
     assert not differs(told)
 

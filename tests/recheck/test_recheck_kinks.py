@@ -93,6 +93,7 @@ def test_recheck_cuts_boxes_where_a_sign_changes(bound, more, holds):
     assert prove(LipschitzBelow([uncertain], fields, limit), tube(), 3_000).holds is holds
 
 
+@pytest.mark.slow
 def test_when_the_time_is_up_the_rest_is_undecided():
     document = proven(systems.SMALL, conditions="distance")
     memory = {}

@@ -45,6 +45,7 @@ def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
     )
 
 
+@pytest.mark.slow
 def test_a_certificate_that_is_not_stated_for_wind_says_so():
     windy = Certificate.from_json(proven(WINDY)).result
     [line] = beyond_its_theorem(windy)

@@ -313,6 +313,7 @@ def test_linear_systems_agree_with_cvxpy(seed, rate):
         proven(problem(model, box(*[(-1, 1)] * 3), rate), found, str(rate * 0.99))
 
 
+@pytest.mark.slow
 def test_three_state_is_proven_close_to_the_uncontrollable_mode():
     asked = problem(THREE, THREE_BOX, 0.9995, degree=2)
     found = cegis.propose(asked)

@@ -89,6 +89,7 @@ def test_the_kind_that_decides_is_what_a_metric_is_chosen_for(kind):
 # -- nothing certifies
 
 
+@pytest.mark.slow
 def test_where_nothing_certifies_nothing_is_written(tmp_path):
     text = (ROBOTS / "pendulum.yaml").read_text().replace("epsilon: 0.1", "epsilon: 1")
     path, target = tmp_path / "wide.yaml", tmp_path / "wide.json"
@@ -284,6 +285,7 @@ def test_a_deadline_leaves_the_best_that_was_proven():
     assert isinstance(none.reason.claim.failure, NothingFound)
 
 
+@pytest.mark.slow
 def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
     calls = []
     whole = synthesis.SynthesisRun._row

@@ -8,6 +8,7 @@ from fractions import Fraction as Q
 from itertools import product
 
 import numpy as np
+import pytest
 import sympy as sp
 from oracle import optimum
 
@@ -92,6 +93,7 @@ def test_where_there_is_a_metric_there_is_no_certificate():
     assert not is_certificate(certificate(slopes), slopes)
 
 
+@pytest.mark.slow
 def test_synthesis_says_the_same():
     from test_cegis import QUADROTOR, quadrotor_box
 

@@ -509,6 +509,7 @@ def test_angles_without_a_common_unit_are_left_alone():
     assert list(lifted.atoms.values()) == [sin(Fraction(137, 100) * q)]
 
 
+@pytest.mark.slow
 def test_state_dependent_input():
     """The frame must be polynomial: the one in closed form is a quotient, to which sums of squares do not apply."""
     asked = problem(MOVING, ((-1, 1),) * 2, degree=1, rate=0.301)

@@ -240,6 +240,7 @@ def test_the_file_says_what_is_true_of_what_it_holds(name, tmp_path):
         assert file["condition_number"][1] <= wanted.condition_number
 
 
+@pytest.mark.slow
 def test_the_greatest_margin_falls_back_on_the_metric_at_the_rate(monkeypatch):
     """A metric of a larger rate whose second proof fails is not the end."""
     run = synthesis.SynthesisRun(load_text(small()), WISHES["margin"], Options(), pipeline.certify, None)

@@ -114,6 +114,7 @@ def test_frames_are_independent_everywhere(system):
 # -- rounding
 
 
+@pytest.mark.slow
 @given(
     st.integers(2, 9), st.lists(st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-3), min_size=4, max_size=4)
 )
@@ -179,6 +180,7 @@ def ladder(route, system=OBLIQUE, box=BOX, **more):
     return Ladder(Request(model=system, safe_set=box, routes=(("test", route),), **more))
 
 
+@pytest.mark.slow
 def test_the_two_state_metric_is_as_good_as_the_best_published():
     found = ladder(cegis.propose).metric(Fraction("1.742857"))
     assert isinstance(found, VerifiedMetric)
@@ -200,6 +202,7 @@ def test_the_rate_is_searched_up_to_what_is_possible():
     assert higher.condition_number.above > 20
 
 
+@pytest.mark.slow
 def test_advice_names_a_rate_and_a_box_that_work():
     double = model(("x", "y"), ("u",), ("y", "0"), [["0"], ["1"]])
     box = ((Fraction(-1), Fraction(1)),) * 2
@@ -432,6 +435,7 @@ def test_the_end_to_end_objective_compares_certificates(tmp_path):
 # -- condition numbers as small as they can be
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("route", ["cegis", "sos"])
 @pytest.mark.parametrize("rate", ["1.5", "1.742857"])
 def test_condition_numbers_are_within_a_thousandth_of_the_least(route, rate):

@@ -319,6 +319,7 @@ def test_a_curve_that_is_a_solution_has_no_defect_to_speak_of():
     assert found.above < 1e-12
 
 
+@pytest.mark.slow
 def test_the_norm_in_a_metric_is_proven_from_both_sides():
     v, W = (
         ((x - y,), (x * y + constant(1),)),
