@@ -9,7 +9,11 @@ import pytest
 import systems
 
 import tubecert as tc
+from tubecert.library.designing import _merged
 from tubecert.pipeline import design as attempts
+from tubecert.spec import Setting
+from tubecert.spec.load import load_source
+from tubecert.spec.source import Source
 
 
 @pytest.fixture(scope="module")
@@ -90,3 +94,23 @@ def test_what_a_design_lacks_is_told():
         tc.machines(tc.specification(systems.SMALL), {"x": 0.1})
     with pytest.raises(tc.SpecError, match="no range"):
         tc.sweep(systems.SMALL, {"tube.epsilon": "1:2"}, folder="x")
+
+
+@pytest.mark.parametrize(
+    ("whole", "own", "widths"),
+    [
+        (
+            "tube={epsilon: 0.3, rho_a: 0.2}",
+            ("tube.epsilon=0.6", "tube.rho_a=0.4"),
+            (Fraction("0.6"), Fraction("0.4")),
+        ),
+        ("tube={half_widths: {x: 0.3}}", ("tube.half_widths.x=1/7",), (Fraction(1, 7),)),
+    ],
+)
+def test_a_tube_that_was_set_as_a_whole_is_scaled_inside(whole, own, widths):
+    fixed = [Setting.of(whole), Setting.of("hardware.rate=100")]
+    merged = _merged(fixed, [Setting.of(each) for each in own])
+    spec = load_source(Source.of("scalar.yaml", systems.SCALAR), merged)
+    assert len(merged) == 2
+    tube = spec.tube
+    assert (tuple(w for _, w in tube.half_widths) or (tube.epsilon, tube.rho_a)) == widths

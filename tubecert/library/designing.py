@@ -6,6 +6,7 @@ In: a specification with a machine, and what is asked for. Out: every attempt, e
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -154,7 +155,7 @@ def opened(
     def plain(settings: Sequence[Setting]) -> Spec:
         # what a design sets itself takes the place of what was set of the same key
         kept = [own for own in fixed if not any(each.covers(own.path) for each in settings)]
-        return load_source(source, (*kept, *settings)) if settings else spec
+        return load_source(source, _merged(kept, settings)) if settings else spec
 
     asked = Asked(
         load=plain, options=options, measure=_minimised(spec, minimise, named), progress=progress, named=named
@@ -172,6 +173,21 @@ def opened(
         load=lambda settings: with_metric(plain(settings), own)[0],
         options=replace(options, metric=Path(name)),
     )
+
+
+def _merged(fixed: Sequence[Setting], settings: Sequence[Setting]) -> list[Setting]:
+    """Both; what a design sets of a mapping that was set as a whole, as in `tube={epsilon: 1}`, goes into its text."""
+    found, left = list(fixed), []
+    for each in settings:
+        whole = next((k for k, own in enumerate(found) if own.covers(each.path)), None)
+        key = each.path.rpartition(".")[2]
+        number = re.compile(rf"\b{re.escape(key)}\s*:[^,{{}}]+")
+        if whole is not None and number.search(found[whole].text):
+            text = number.sub(f"{key}: {each.text}", found[whole].text, count=1)
+            found[whole] = replace(found[whole], text=text)
+        else:
+            left.append(each)
+    return [*found, *left]
 
 
 def narrowed(asked: Asked) -> Attempts:
