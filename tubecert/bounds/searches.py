@@ -1,0 +1,156 @@
+"""Searches over a tube and along its plan: how hard to try, who is told, where a supremum was found. Trusted: yes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from tubecert.bounds.constants import Constant, Witness
+from tubecert.bounds.parts import Parts
+from tubecert.coordinates import Coordinates, Fields
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
+from tubecert.enclosure.domain import Range
+from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.enclosure.objective import Objective, SumOfNorms, size_of
+from tubecert.enclosure.questions import Domain
+from tubecert.model import TIME, ControlAffineModel
+from tubecert.progress import Progress
+from tubecert.trajectory import Plan
+from tubecert.trajectory.family import starred
+from tubecert.tube import Ball, Ellipsoid, Section, Tube
+
+_CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
+_WORTH = 30_000  # boxes after which such a constant stays as it is;
+_MANY = 8  # of more states than that each box takes longer, and fewer are worth it
+Spent = Callable[[str, int], None]
+
+
+@dataclass(frozen=True)
+class Searches:
+    """What is searched: a model over the tube of radius `rho` around a plan, with an effort.
+
+    With `coordinates` S, the constants are those of the fields in z = S x, and the tube is the ellipsoid |S (x - x*)|
+    <= rho cut to `sides` (n,), what |x_i - x*_i| is at most; without, they are those in x and the tube is a ball.
+    `time` is the range of t for h (the horizon, or one period of h); the plan brings its own. `gaps`: the relative gaps
+    of constants, by name, that are not enclosed to the gap of the effort. `spent` is told what work each search was.
+    `parts`: what is found for several parts of a plan at once, this one among them.
+    """
+
+    model: ControlAffineModel
+    plan: Plan
+    rho: float
+    time: Range | None
+    effort: Effort
+    report: Progress | None = None
+    coordinates: Coordinates | None = None
+    sides: tuple[float, ...] | None = None
+    gaps: Mapping[str, float] = field(default_factory=dict)
+    spent: Spent | None = None
+    parts: Parts | None = None
+
+    def effort_for(self, name: str) -> Effort:
+        """How hard to try for a constant; one with a gap of its own is as close as few boxes make it."""
+        gap, own = self.gaps.get(name), self.effort
+        if gap is None:
+            return own
+        states = len(self.model.states)
+        worth = _WORTH if states <= _MANY else int(_WORTH * (_MANY / states) ** 6)
+        return replace(own, gap=gap, cheap=min(own.cheap, _CHEAP), budget=min(own.budget, worth))
+
+    def with_radius(self, rho: Fraction, sides: Sequence[Fraction] | None = None) -> Self:
+        """The same over another tube."""
+        ends = None if sides is None else tuple(fraction_bounds(side)[1] for side in sides)
+        return replace(self, rho=fraction_bounds(rho)[1], sides=ends)
+
+    @cached_property
+    def fields(self) -> Fields:
+        """The fields of the model in the coordinates of the tube."""
+        return Fields(self.model, self.coordinates)
+
+    @property
+    def section(self) -> Section:
+        """The tube at one time."""
+        if self.coordinates is None:
+            return Ball(self.rho)
+        return Ellipsoid(self.coordinates, self.rho, self.sides or (np.inf,) * len(self.model.states))
+
+    def over_tube(self, name: str, objective: Objective, effort: Effort) -> Supremum:
+        """A supremum over the tube, with an effort of its own."""
+        return self._over_tube(name, objective, effort)
+
+    def _over_tube(
+        self,
+        name: str,
+        objective: Objective,
+        effort: Effort | None = None,
+        extra: dict[str, Range] | None = None,
+    ) -> Supremum:
+        chosen, more = effort or self.effort_for(name), extra or {}
+        found = (
+            None
+            if self.parts is None
+            else self.parts.over_tube(self, objective, self._heard(name, chosen), more)
+        )
+        if found is not None:
+            return self._told(name, objective, found)
+        return self._run(name, objective, self.tube(more), chosen)
+
+    def tube(self, extra: Mapping[str, Range]) -> Tube:
+        """The tube as a domain, with further ranges."""
+        return Tube(
+            self.plan,
+            self.section,
+            states=self.model.states,
+            inputs=self.model.inputs,
+            time=self.plan.time.get(TIME, self.time),
+            extra={**self.plan.ranges, **dict(self.model.parameters), **extra},
+        )
+
+    def _search_plan(self, name: str, objective: Objective, effort: Effort | None = None) -> Supremum:
+        return self._run(name, objective, self.plan.domain, effort or self.effort_for(name))
+
+    def _on_plan(self, name: str, objective: SumOfNorms) -> Constant:
+        return (
+            Constant.exactly(0.0) if objective.is_zero else self._constant(self._search_plan(name, objective))
+        )
+
+    def _run(self, name: str, objective: Objective, domain: Domain, effort: Effort) -> Supremum:
+        return self._told(name, objective, supremum(objective, domain, self._heard(name, effort)))
+
+    def _heard(self, name: str, effort: Effort) -> Effort:
+        if self.report is None:
+            return effort
+        report = self.report
+        return replace(effort, progress=lambda step: report(replace(step, name=name)))
+
+    def _told(self, name: str, objective: Objective, found: Supremum) -> Supremum:
+        if self.spent is not None:
+            self.spent(name, found.boxes * size_of(objective))
+        return found
+
+    def _constant(self, found: Supremum) -> Constant:
+        return Constant(below=found.below, above=found.above, at=self._witness(found))
+
+    def _root(self, found: Supremum) -> Constant:
+        root = sqrt(Interval(max(0.0, found.below), max(0.0, found.above)))
+        return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
+
+    def _witness(self, found: Supremum) -> Witness:
+        """Where the value was found; states that do not matter are taken from the plan."""
+        t = self.plan.moment(found.at)
+        if t is None and not self.plan.is_constant:  # a part of the plan that stays: any time will do
+            t = 0.0
+        moment = np.array([0.0 if t is None else t])
+        centre, _ = self.plan.enclose(moment, moment)
+        states = self.model.states
+        origin = np.array([found.at.get(starred(name), centre.mid[0, i]) for i, name in enumerate(states)])
+        x = np.array([found.at.get(name, origin[i]) for i, name in enumerate(states)])
+        which = [i for i, name in enumerate(states) if name in found.at]
+        if isinstance(self.section, Ellipsoid) and which:  # the others are such that the point lies in it
+            x = origin + self.section.completed(which, (x - origin)[None, which])[0]
+        return Witness(t=t, x=tuple(map(float, x)))
