@@ -18,8 +18,9 @@ from tubecert.export.assembly import assembled
 from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
 from tubecert.recheck.balls import exact, root
+from tubecert.recheck.code.about import About
 from tubecert.recheck.code.examination import moves_of
-from tubecert.recheck.code.losses import About, lost_by
+from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.controller import Machine
 from tubecert.recheck.curve import Knots, hermite

@@ -137,10 +137,15 @@ def log1p_ratio(x: T) -> T:
 def _ratio_at(x: Array) -> Interval:
     """The same at floats; near 0 from 1 - x/2 <= r(x) <= 1 - x/2 + x^2/2, which holds for |x| <= 1/3."""
     point = Interval.exact(x)
-    quotient = iv.log1p(point) / point
+    return _near_one(x, iv.log1p(point) / point)
+
+
+def _near_one(x: Array, quotient: Interval) -> Interval:
+    """A quotient that is 1 at 0; near 0 by 1 - x/2 and 1 - x/2 + x^2/2."""
     near = np.abs(x) <= 1e-5
     if not near.any():
         return quotient
+    point = Interval.exact(x)
     line = 1 - point / 2
     return Interval(
         np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
@@ -161,14 +166,7 @@ def decay_mean(y: T) -> T:
 def _decay_mean_at(y: Array) -> Interval:
     """The same at floats; near 0 from 1 - y/2 <= value <= 1 - y/2 + y^2/2."""
     point = Interval.exact(y)
-    quotient = iv.expm1(-point) / (-point)
-    near = np.abs(y) <= 1e-5
-    if not near.any():
-        return quotient
-    line = 1 - point / 2
-    return Interval(
-        np.where(near, line.lo, quotient.lo), np.where(near, (line + point**2 / 2).hi, quotient.hi)
-    )
+    return _near_one(y, iv.expm1(-point) / (-point))
 
 
 @quiet

@@ -14,7 +14,7 @@ import numpy as np
 
 from tubecert.enclosure import interval
 from tubecert.enclosure.constant import printable_above
-from tubecert.enclosure.interval import Array, Interval, sqrt
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.spec import Arithmetic
 
 
@@ -139,3 +139,19 @@ def printed(x: Interval) -> Fraction:
     if not np.isfinite(most):
         raise UncoveredError("what a program computes has no bound in this type")
     return Fraction(repr(printable_above(most)))
+
+
+def intervals_of(values: Sequence[Fraction]) -> Interval:
+    """Rational numbers, enclosed."""
+    ends = [fraction_bounds(value) for value in values]
+    return Interval([low for low, _ in ends], [high for _, high in ends])
+
+
+def floats_of(table: Sequence[Sequence[Sequence[Fraction]]]) -> Array:
+    """A table of floats, as floats."""
+    return np.array([[[float(value) for value in row] for row in piece] for piece in table])
+
+
+def frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:
+    """A bound of the norm of a matrix of rational numbers."""
+    return sqrt(Interval.of(sum((q * q for row in rows for q in row), Fraction(0))))

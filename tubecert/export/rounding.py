@@ -22,7 +22,7 @@ import numpy as np
 from tubecert.conditions.hardware import Rounding
 from tubecert.coordinates import inverse
 from tubecert.enclosure import interval
-from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
+from tubecert.enclosure.interval import Array, Interval, sqrt
 from tubecert.enclosure.outward import up
 from tubecert.export.blocks import LEAST_SIZE
 from tubecert.export.controller import Controller, Pieces
@@ -33,6 +33,9 @@ from tubecert.export.followed import (
     UncoveredError,
     by_pieces,
     combined,
+    floats_of,
+    frobenius,
+    intervals_of,
     known_by_size,
     largest_of,
     length_of,
@@ -77,7 +80,7 @@ class _Analysis:
         self.m, self.n = len(controller.inputs), len(controller.states)
         W = inverse([list(row) for row in controller.metric])
         self.widths = [sqrt(Interval.of(W[i][i])) * Interval.of(controller.reach) for i in range(self.n)]
-        self.norm_M, self.norm_W = _frobenius(controller.metric), _frobenius(W)
+        self.norm_M, self.norm_W = frobenius(controller.metric), frobenius(W)
 
     def rounding(self) -> Rounding:
         """r_a, r_u, r_q; nothing is predicted."""
@@ -128,15 +131,15 @@ class _Analysis:
     def _through_knots(self, plan: Pieces) -> tuple[list[Followed], list[Followed]]:
         """Piece by piece; where a time near a knot is taken for one in the next piece, x* and u* go on continuously."""
         late = self._late()
-        start, length = _fractions(plan.start), _fractions(plan.length)
+        start, length = intervals_of(plan.start), intervals_of(plan.length)
         begun = late + (self.u * Interval.exact(start.magnitude) + self.eta)
         r = Interval(-2 * begun.hi, (length + 2 * begun).hi)
         since = self._rounded(r, begun)
         rows = [
             [self._polynomial(since, late, values[:, i], off[:, i]) for i in range(values.shape[1])]
             for values, off in (
-                (_numbers(plan.x), _numbers(plan.x_off)),
-                (_numbers(plan.u), _numbers(plan.u_off)),
+                (floats_of(plan.x), floats_of(plan.x_off)),
+                (floats_of(plan.u), floats_of(plan.u_off)),
             )
         ]
         return rows[0], rows[1]
@@ -388,17 +391,3 @@ def _reads_input(program: Program) -> bool:
     written = {place for port in program.outputs for place in port.places}
     given = {place for port in program.inputs for place in port.places}
     return bool(given & (read | written))
-
-
-def _fractions(values: Sequence[Fraction]) -> Interval:
-    ends = [fraction_bounds(value) for value in values]
-    return Interval([low for low, _ in ends], [high for _, high in ends])
-
-
-def _numbers(table: Sequence[Sequence[Sequence[Fraction]]]) -> Array:
-    """A table of floats, as floats."""
-    return np.array([[[float(value) for value in row] for row in piece] for piece in table])
-
-
-def _frobenius(rows: Sequence[Sequence[Fraction]]) -> Interval:
-    return sqrt(Interval.of(sum((q * q for row in rows for q in row), Fraction(0))))

@@ -14,8 +14,9 @@ from fractions import Fraction
 from flint import arb, arb_mat, ctx
 
 from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root
+from tubecert.recheck.code.about import About
 from tubecert.recheck.code.constants import otherwise
-from tubecert.recheck.code.losses import About, lost_by
+from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, known

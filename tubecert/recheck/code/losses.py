@@ -15,6 +15,7 @@ from functools import cached_property
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root
+from tubecert.recheck.code.about import About, Lost
 from tubecert.recheck.code.pieces import (
     any_of,
     jumps,
@@ -30,7 +31,7 @@ from tubecert.recheck.code.seen import KINDS, SINCE, Rounded, Seen, known
 from tubecert.recheck.code.shape import ball_of, box_of, law_of
 from tubecert.recheck.code.stations import Station, stations
 from tubecert.recheck.code.words import UnreadError
-from tubecert.recheck.curve import CLOCK, Curve
+from tubecert.recheck.curve import CLOCK
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import Term, slopes
 
@@ -39,37 +40,6 @@ _NODES = 3
 _MOST_SAMPLES = 2**32 - 1
 
 Numbers = list[Seen]
-
-
-@dataclass(frozen=True, kw_only=True)
-class About:
-    """What a certificate says of the loop.
-
-    `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
-    `share` is th; `held`: u* is held from sample to sample. `moves`: how far what is measured moves in one, by state.
-    """
-
-    curve: Curve
-    inputs: int
-    metric: list[list[Ball]]
-    widths: list[Ball]
-    reach: Ball
-    gain: Ball
-    estimate: Ball
-    radius: Ball
-    share: Ball
-    sample_time: Fraction
-    held: bool
-    moves: Sequence[Ball] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lost:
-    """Upper bounds of r_a, r_u and r_q."""
-
-    feedback: Ball
-    input: Ball
-    estimate: Ball
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ from tubecert.recheck.kinds.hardware_section import (
 from tubecert.recheck.kinds.kind import Ground, Kind, Shares
 from tubecert.recheck.kinds.machine import agrees, promise
 from tubecert.recheck.kinds.window_section import read_stretches
-from tubecert.recheck.kinds.windows import claims_of_constants, covers
+from tubecert.recheck.kinds.windows import above, claims_of_constants, covers
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.proposal import proposed
 from tubecert.recheck.recipe import Digital
@@ -290,13 +290,10 @@ def _in_range(i: int, own: Range, clip: Range, recipe: Digital, ground: Ground) 
     found, place = _loop(recipe, ground), ground.place
     if found is None:
         return stated(False, "the level is not proven")
-    feedback = Fraction(float((found.feedback + found.feedforward).upper())) * _MORE
+    feedback = above(found.feedback + found.feedforward)
     u = place.curve.u[i]
     rooms = (u - number(own[0] + feedback + clip[1]), number(own[1] - feedback + clip[0]) - u)
     return all_of(place.along(lambda room=room: NotNegative(room, place.numbers)) for room in rooms)  # type: ignore[misc]
-
-
-_MORE = 1 + Fraction(1, 2**50)
 
 
 def _curve_holds(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:

@@ -1,0 +1,41 @@
+"""What a code is examined against, and what it may lose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tubecert.recheck.balls import Ball
+from tubecert.recheck.curve import Curve
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """What a certificate says of the loop.
+
+    `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
+    `share` is th; `held`: u* is held from sample to sample. `moves`: how far what is measured moves in one, by state.
+    """
+
+    curve: Curve
+    inputs: int
+    metric: list[list[Ball]]
+    widths: list[Ball]
+    reach: Ball
+    gain: Ball
+    estimate: Ball
+    radius: Ball
+    share: Ball
+    sample_time: Fraction
+    held: bool
+    moves: Sequence[Ball] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost:
+    """Upper bounds of r_a, r_u and r_q."""
+
+    feedback: Ball
+    input: Ball
+    estimate: Ball
