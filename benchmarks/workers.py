@@ -3,8 +3,8 @@
     python benchmarks/workers.py            # both
     python benchmarks/workers.py points     # or supremum
 
-Each in a fresh folder, in turns, and the bytes compared. Processes start in a second or two, which is in the times. Two
-minutes on a machine with two cores that does nothing else; beside other work the ratios say nothing.
+Each in a fresh folder, in turns, and the bytes compared. Processes start in a second or two, which is in the times.
+Nine minutes beside a load of ten on two processors, where the ratios say little.
 """
 
 from __future__ import annotations
