@@ -12,10 +12,10 @@ import tubecert
 # what is there now, outside the edge (`counts.EDGE`) and recheck; lower a number when it falls
 MOST = {
     "mappings of Any": 0,
-    "string-key reads": 110,
-    "Any": 200,
+    "string-key reads": 112,
+    "Any": 201,
     "asserts that something is not None": 19,
-    "verdict literals": 16,
+    "verdict literals": 17,
     "comparisons with sentences": 2,
 }
 

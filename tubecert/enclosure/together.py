@@ -104,8 +104,8 @@ class _SideBySide:
         return chosen
 
     def _answer(self, asked: dict[int, Asked]) -> None:
-        questions = list(asked.values())
-        if len(questions) == 1 or (self._joint is None and not isinstance(questions[0], (Bound, Values))):
+        questions, joint = list(asked.values()), self._joint
+        if len(questions) == 1 or (joint is None and not isinstance(questions[0], (Bound, Values))):
             for place, question in asked.items():
                 answer(question, self._objective, self._searches[place].domain)
             return
@@ -114,12 +114,14 @@ class _SideBySide:
             self._bound(_all(Bound, questions))
         elif isinstance(questions[0], Values):
             self._values(_all(Values, questions))
+        elif joint is None:
+            raise ValueError("what is asked of domains needs one that answers for all")
         elif isinstance(questions[0], Contract):
-            self._contract(places, _all(Contract, questions))
+            self._contract(joint, places, _all(Contract, questions))
         elif isinstance(questions[0], Inside):
-            self._inside(places, _all(Inside, questions))
+            self._inside(joint, places, _all(Inside, questions))
         else:
-            self._priorities(places, _all(Priorities, questions))
+            self._priorities(joint, places, _all(Priorities, questions))
 
     def _bound(self, questions: Sequence[Bound]) -> None:
         heights = [len(each.lo) for each in questions]
@@ -134,32 +136,29 @@ class _SideBySide:
         for each, part in zip(questions, _parts(found, [len(q.lo) for q in questions]), strict=True):
             each.answer = part
 
-    def _contract(self, places: Sequence[int], questions: Sequence[Contract]) -> None:
-        assert self._joint is not None
+    def _contract(self, joint: Joint, places: Sequence[int], questions: Sequence[Contract]) -> None:
         heights = [len(each.lo) for each in questions]
-        found = self._joint.contract(questions[0].variables, np.repeat(places, heights), *_stacked(questions))
+        found = joint.contract(questions[0].variables, np.repeat(places, heights), *_stacked(questions))
         lo, hi, alive = found
         parts = zip(_parts(lo, heights), _parts(hi, heights), _parts(alive, heights), strict=True)
         for each, part in zip(questions, parts, strict=True):
             each.answer = part
 
-    def _inside(self, places: Sequence[int], questions: Sequence[Inside]) -> None:
-        assert self._joint is not None
+    def _inside(self, joint: Joint, places: Sequence[int], questions: Sequence[Inside]) -> None:
         which = np.repeat(places, [len(each.points) for each in questions])
         points = np.concatenate([each.points for each in questions])
-        left, (lo, hi) = self._joint.inside(questions[0].variables, which, points)
+        left, (lo, hi) = joint.inside(questions[0].variables, which, points)
         for place, each in zip(places, questions, strict=True):
             own = which[left] == place
             each.answer = lo[own], hi[own]
 
-    def _priorities(self, places: Sequence[int], questions: Sequence[Priorities]) -> None:
-        assert self._joint is not None
+    def _priorities(self, joint: Joint, places: Sequence[int], questions: Sequence[Priorities]) -> None:
         heights = [len(each.lo) for each in questions]
         whole = Estimate(
             *map(np.concatenate, zip(*(_columns(each.estimate) for each in questions), strict=True))
         )
         lo, hi = _stacked(questions)
-        found = self._joint.priorities(questions[0].variables, np.repeat(places, heights), lo, hi, whole)
+        found = joint.priorities(questions[0].variables, np.repeat(places, heights), lo, hi, whole)
         for each, part in zip(questions, _parts(found, heights), strict=True):
             each.answer = part
 
