@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tubecert.bounds.searches import Searches
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad, norm_bound, spectral_norm_midrad
@@ -25,9 +25,6 @@ from tubecert.expression.matrix import Matrix, column, constants, jacobian, mult
 from tubecert.model import TIME
 from tubecert.tube.sections import enclosed
 
-if TYPE_CHECKING:
-    from tubecert.bounds.suprema import Suprema
-
 LEAST = 4  # variables: with fewer, boxes are as good
 _STEPS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the way
 _DIGITS = 2**30
@@ -35,7 +32,7 @@ _CLOSE = 1e-3  # of the linear part: how closely a remainder is enclosed
 _BOXES = 4_000  # for each
 
 
-def linear_bound(suprema: Suprema, v: Matrix) -> float | None:
+def linear_bound(suprema: Searches, v: Matrix) -> float | None:
     """A bound of |v|, v (p, 1), over the tube of a plan that stays at a point; None where there is none."""
     model, plan = suprema.model, suprema.plan
     entries = [row[0] for row in v]
@@ -55,7 +52,7 @@ def linear_bound(suprema: Suprema, v: Matrix) -> float | None:
 
 
 def _bound(
-    suprema: Suprema, v0: list[Fraction], H: list[list[Fraction]], rest: list[Expression]
+    suprema: Searches, v0: list[Fraction], H: list[list[Fraction]], rest: list[Expression]
 ) -> float | None:
     reach = Interval.exact(suprema.rho)
     mid, rad = midrad(enclosed(tuple(map(tuple, H))) * reach)
@@ -75,12 +72,12 @@ def _bound(
     return float(np.nextafter(total, np.inf)) if isfinite(total) else None
 
 
-def _remainder(suprema: Suprema, e: Expression, effort: Effort) -> float:
+def _remainder(suprema: Searches, e: Expression, effort: Effort) -> float:
     objective = SumOfNorms([((e,),)])
     return 0.0 if objective.is_zero else suprema.over_tube("remainder", objective, effort).above
 
 
-def _in_z(suprema: Suprema, K: list[list[Fraction]]) -> list[list[Fraction]]:
+def _in_z(suprema: Searches, K: list[list[Fraction]]) -> list[list[Fraction]]:
     """K S^-1, exactly."""
     if suprema.coordinates is None:
         return K
@@ -91,7 +88,7 @@ def _in_z(suprema: Suprema, K: list[list[Fraction]]) -> list[list[Fraction]]:
 
 
 def _proposed(
-    suprema: Suprema, entries: list[Expression], centre: Array
+    suprema: Searches, entries: list[Expression], centre: Array
 ) -> tuple[list[Fraction], list[list[Fraction]]] | None:
     """v at the centre, and in column j its mean slope on the way to where x_j is largest and least; t is 0."""
     n, states = len(centre), suprema.model.states
