@@ -104,24 +104,21 @@ class _SideBySide:
         return chosen
 
     def _answer(self, asked: dict[int, Asked]) -> None:
-        questions, joint = list(asked.values()), self._joint
-        if len(questions) == 1 or (joint is None and not isinstance(questions[0], (Bound, Values))):
+        places, questions, joint = list(asked), list(asked.values()), self._joint
+        first = questions[0]
+        if len(questions) > 1 and isinstance(first, Bound):
+            self._bound(_all(Bound, questions))
+        elif len(questions) > 1 and isinstance(first, Values):
+            self._values(_all(Values, questions))
+        elif len(questions) == 1 or joint is None:
             for place, question in asked.items():
                 answer(question, self._objective, self._searches[place].domain)
-            return
-        places = list(asked)
-        if isinstance(questions[0], Bound):
-            self._bound(_all(Bound, questions))
-        elif isinstance(questions[0], Values):
-            self._values(_all(Values, questions))
-        elif joint is None:
-            raise ValueError("what is asked of domains needs one that answers for all")
-        elif isinstance(questions[0], Contract):
-            self._contract(joint, places, _all(Contract, questions))
-        elif isinstance(questions[0], Inside):
-            self._inside(joint, places, _all(Inside, questions))
+        elif isinstance(first, Contract):
+            _contract(joint, places, _all(Contract, questions))
+        elif isinstance(first, Inside):
+            _inside(joint, places, _all(Inside, questions))
         else:
-            self._priorities(joint, places, _all(Priorities, questions))
+            _priorities(joint, places, _all(Priorities, questions))
 
     def _bound(self, questions: Sequence[Bound]) -> None:
         heights = [len(each.lo) for each in questions]
@@ -136,31 +133,32 @@ class _SideBySide:
         for each, part in zip(questions, _parts(found, [len(q.lo) for q in questions]), strict=True):
             each.answer = part
 
-    def _contract(self, joint: Joint, places: Sequence[int], questions: Sequence[Contract]) -> None:
-        heights = [len(each.lo) for each in questions]
-        found = joint.contract(questions[0].variables, np.repeat(places, heights), *_stacked(questions))
-        lo, hi, alive = found
-        parts = zip(_parts(lo, heights), _parts(hi, heights), _parts(alive, heights), strict=True)
-        for each, part in zip(questions, parts, strict=True):
-            each.answer = part
 
-    def _inside(self, joint: Joint, places: Sequence[int], questions: Sequence[Inside]) -> None:
-        which = np.repeat(places, [len(each.points) for each in questions])
-        points = np.concatenate([each.points for each in questions])
-        left, (lo, hi) = joint.inside(questions[0].variables, which, points)
-        for place, each in zip(places, questions, strict=True):
-            own = which[left] == place
-            each.answer = lo[own], hi[own]
+def _contract(joint: Joint, places: Sequence[int], questions: Sequence[Contract]) -> None:
+    heights = [len(each.lo) for each in questions]
+    found = joint.contract(questions[0].variables, np.repeat(places, heights), *_stacked(questions))
+    lo, hi, alive = found
+    parts = zip(_parts(lo, heights), _parts(hi, heights), _parts(alive, heights), strict=True)
+    for each, part in zip(questions, parts, strict=True):
+        each.answer = part
 
-    def _priorities(self, joint: Joint, places: Sequence[int], questions: Sequence[Priorities]) -> None:
-        heights = [len(each.lo) for each in questions]
-        whole = Estimate(
-            *map(np.concatenate, zip(*(_columns(each.estimate) for each in questions), strict=True))
-        )
-        lo, hi = _stacked(questions)
-        found = joint.priorities(questions[0].variables, np.repeat(places, heights), lo, hi, whole)
-        for each, part in zip(questions, _parts(found, heights), strict=True):
-            each.answer = part
+
+def _inside(joint: Joint, places: Sequence[int], questions: Sequence[Inside]) -> None:
+    which = np.repeat(places, [len(each.points) for each in questions])
+    points = np.concatenate([each.points for each in questions])
+    left, (lo, hi) = joint.inside(questions[0].variables, which, points)
+    for place, each in zip(places, questions, strict=True):
+        own = which[left] == place
+        each.answer = lo[own], hi[own]
+
+
+def _priorities(joint: Joint, places: Sequence[int], questions: Sequence[Priorities]) -> None:
+    heights = [len(each.lo) for each in questions]
+    whole = Estimate(*map(np.concatenate, zip(*(_columns(each.estimate) for each in questions), strict=True)))
+    lo, hi = _stacked(questions)
+    found = joint.priorities(questions[0].variables, np.repeat(places, heights), lo, hi, whole)
+    for each, part in zip(questions, _parts(found, heights), strict=True):
+        each.answer = part
 
 
 def _kind(asked: Asked) -> tuple[Kind, bool]:

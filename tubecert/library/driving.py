@@ -86,9 +86,9 @@ def drive(
     """
     require_extra()
     numbers = Numbers()
-    texts = number_texts(runs=runs, seed=seed, duration=duration)
-    count, start = numbers.whole("runs", texts["runs"]), numbers.whole("seed", texts["seed"])
-    length = numbers.positive("duration", texts["duration"])
+    most, first, long = number_texts(runs=runs, seed=seed, duration=duration).values()
+    count, start = numbers.whole("runs", most), numbers.whole("seed", first)
+    length = numbers.positive("duration", long)
     numbers.check()
     certification = result if isinstance(result, Certification) else read(result)
     system = specification_of(certification) if spec is None else spec_of(spec)

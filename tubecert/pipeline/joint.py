@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
@@ -141,7 +142,7 @@ class Joint:
     def _section(self, text: str, metric: VerifiedMetric) -> HardwareData | None:
         if self.progress is not None:
             self.progress(
-                Step(phase=Phase.DESIGN, name=f"weights of the metric: rate {float(metric.rate):.3g}")
+                Step(phase=Phase.DESIGN, name=f"weights of the metric: rate {near(metric.rate, 3)}")
             )
         try:
             held = with_metric_text(self.spec, text, "<searched>")

@@ -107,7 +107,7 @@ def specification(effective: Effective) -> str:
 
 def findings(name: str, found: Sequence[Finding]) -> str:
     """The card of a check: every finding with its place, and how many there are."""
-    style = "undecided" if any(item.severity is not Severity.NOTE for item in found) else ""
+    style = Verdict.UNDECIDED if any(item.severity is not Severity.NOTE for item in found) else ""
     rows = tuple((Cell(text=str(item.severity)), Cell(text=item.message, note=item.help)) for item in found)
     tables = [Table(columns=("", ""), rows=rows)] if rows else []
     return render(Card(verdict="checked", name=name, style=style, summary=summary(found, 1), tables=tables))

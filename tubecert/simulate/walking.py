@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def walk(drift: Program, segment: Segment, trial: Trial, path: Array) -> None:
 
 
 @compiled
-def _rates(drift: Any, segment: Any, lane: int, k: int, count: int, trial: Any, x: Any) -> None:
+def _rates(drift: Program, segment: Segment, lane: int, k: int, count: int, trial: Trial, x: Array) -> None:
     """The four rates of a step of RK4 from x on."""
     memory, n, m = trial.memory, x.shape[0], segment.now.shape[1]
     dt = segment.length / count
