@@ -12,10 +12,10 @@ import tubecert
 # what is there now, outside the edge (`counts.EDGE`) and recheck; lower a number when it falls
 MOST = {
     "mappings of Any": 0,
-    "string-key reads": 112,
-    "Any": 201,
-    "asserts that something is not None": 19,
-    "verdict literals": 17,
+    "string-key reads": 109,
+    "Any": 197,
+    "asserts that something is not None": 18,
+    "verdict literals": 16,
     "comparisons with sentences": 2,
 }
 
