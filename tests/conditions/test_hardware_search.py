@@ -252,5 +252,5 @@ def test_a_choice_is_looked_for_again_only_if_the_one_before_does_not_serve(monk
     assert len(asked) == 1
     monkeypatch.setattr(searching, "serves", lambda problem, recipe: False)
     assert searching.served(search, setting, choice) is not None
-    assert len(asked) == 1 + 5
+    assert len(asked) == 1 + 2 * 5
     assert asked[-1] is None
