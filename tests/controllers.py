@@ -128,6 +128,8 @@ GIVEN = {
     "orbit": _orbit(),
     # u* held from sample to sample
     "held_orbit": _orbit(held=True),
+    # a feedback that has a clock of its own, at every third sample
+    "seldom_orbit": _orbit(recipe=recipe(feedback_time=Fraction(3, 500))),
     # B(x), two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube
     "turning": machine(
         TURNING,

@@ -44,7 +44,7 @@ TEXTS = {
 
 def in_recheck(name: str) -> Machine:
     """The machine of a hand-made controller, as recheck reads it."""
-    kind = name.removeprefix("held_").removeprefix("predicting_")
+    kind = name.removeprefix("held_").removeprefix("seldom_").removeprefix("predicting_")
     given = controllers.SLOW if name == "steep" else controllers.GIVEN[name]
     controller = controllers.assembled(given)
     data = {"format": certificate.FORMAT, "spec": canonical(load_text(TEXTS[kind]))}

@@ -178,7 +178,8 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        ({"recipe": controllers.recipe(feedback_time=Fraction(1, 1000))}, "a clock of its own"),
+        ({"recipe": controllers.recipe(feedback_time=Fraction(1, 1000))}, "are no samples of the estimate"),
+        ({"recipe": controllers.recipe(feedback_time=Fraction(3, 1000))}, "are no samples of the estimate"),
         ({"text": (controllers.CONFIGS / "hardware_three.yaml").read_text("utf-8")}, "is not constant"),
     ],
 )
@@ -214,3 +215,15 @@ def test_a_constant_that_is_no_float_is_refused_in_single_precision():
     given = controllers.machine(TEXTS["orbit"], recipe=controllers.recipe(clip_radius=Fraction(10) ** 40))
     with pytest.raises(TubecertError, match="too large"):
         exported(controllers.assembled(given), precision="single")
+
+
+@needs_cc
+@pytest.mark.slow
+def test_windows_along_a_plan_of_the_planner(tmp_path):
+    """Of the windows in its tube the code needs to know nothing: the loop is the same in all of them."""
+    data = proven.shipped("two_state_windows")
+    own = certification_of(data).certificate
+    controller = controller_of(own)
+    assert f"{float(controller.level):.9g}" == f"{float(data['result']['hardware']['level']):.9g}"
+    exported(controller).save(str(tmp_path))
+    assert examined(str(tmp_path), own, certificate.dump(data), "windows.json").difference < 1e-13

@@ -18,6 +18,7 @@ from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
 from tubecert.recheck.balls import exact
+from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.examination import agreement
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
@@ -261,6 +262,28 @@ def test_a_text_that_computes_something_else_is_noticed(change):
         except UnreadError:
             return
     assert share > 1
+
+
+@pytest.mark.slow
+def test_a_feedback_at_every_third_sample_loses_what_one_at_all_of_them_does():
+    (_, all_of_them), (_, third) = followed("orbit", "double"), followed("seldom_orbit", "double")
+    assert third == all_of_them
+
+
+@pytest.mark.parametrize(
+    "change", [("_EVERY 3 ", "_EVERY 4 "), ("c->since = 0;\n    }", "c->since = 1;\n    }")]
+)
+def test_a_feedback_at_other_samples_is_noticed(change):
+    files = texts(CONTROLLERS["seldom_orbit"](), "double")
+    changed = [text.replace(*change) for text in files]
+    assert changed != list(files)
+    y = measured(CONTROLLERS["seldom_orbit"](), 8, "double")
+    with ctx.workprec(200):
+        rows = [[exact(Fraction(value)) for value in row] for row in y.tolist()]
+        code, formulas = read_code(*changed), in_recheck("seldom_orbit")
+        assert agreement(code, formulas, rows)[1] > 1
+        if "EVERY" in change[0]:
+            assert next(otherwise(code, formulas)) == "EVERY"
 
 
 def test_a_text_whose_numbers_have_no_bound_is_not_said_to_differ():

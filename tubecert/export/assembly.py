@@ -35,6 +35,7 @@ _SIZE: Final = "noise_size"  # n_E
 _GAIN: Final = "feedback_gain"
 _BENT: Final = ("lower", "symbols", "symbols_slope")
 _LONGEST: Final = 32  # characters of a name
+_MOST_EVERY: Final = 1000  # samples from one feedback to the next
 
 
 def controller_of(certificate: Certificate, name: str = "the certificate") -> Controller:
@@ -122,6 +123,7 @@ def assembled(machine: Machine) -> Controller:
         estimator=blocks.estimator(machine),
         swept=geodesics.swept(model, machine.geodesic) if bent and machine.geodesic is not None else None,
         moves=_moves(machine),
+        every=int(recipe.feedback_time / recipe.sample_time),
     )
 
 
@@ -143,7 +145,9 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
     if knots is not None:  # its plan was in a file
         rest = {"kind": "equilibrium", "at": ["0"] * len(certificate.result.spec.effective.system.states)}
         apart = ("initial_state", "obstacles", "simulation", "expect", "conditions")
-        data = {key: value for key, value in data.items() if key not in apart} | {"trajectory": rest}
+        tube = {key: value for key, value in data["tube"].items() if key != "windows"}  # times of its plan
+        data = {key: value for key, value in data.items() if key not in apart}
+        data |= {"trajectory": rest, "tube": tube}
     spec = load_text(json.dumps(dict(data)), "certificate")
     trajectory, model = spec.trajectory, build(spec)
     if knots is not None:
@@ -180,10 +184,11 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard
             "which is not exported yet",
             "give them one value",
         )
-    if recipe.feedback_time != recipe.sample_time:
+    every = recipe.feedback_time / recipe.sample_time
+    if every.denominator > 1 or every > _MOST_EVERY:
         raise refused(
-            "the feedback has a clock of its own, which is not exported yet",
-            "leave hardware.feedback_rate out",
+            "the samples of the feedback are no samples of the estimate: step is called at hardware.rate",
+            f"take a hardware.rate that is 1, 2, ... or {_MOST_EVERY} times hardware.feedback_rate",
         )
     unknown = free_symbols([*model.f, *(e for row in model.B for e in row)]) - {*model.states}
     if unknown:

@@ -51,6 +51,8 @@ def _header(c: Controller, language: C) -> Iterator[str]:
         yield f"#define {big}_HORIZON {language.number(c.horizon)} /* s */"
     yield f"#define {big}_LEVEL {language.number(c.level)} /* d(x*, x) stays below it */"
     yield f"#define {big}_REACH {language.number(c.reach)} /* and d(x*, y), y being measured or predicted */"
+    if c.every > 1:
+        yield f"#define {big}_EVERY {c.every} /* samples from one feedback to the next */"
     yield f"#define {big}_ADDS_PLAN {int(c.adds_plan)} /* 1: u* is in what step gives; 0: add feedforward(t) */"
     yield ""
     yield "/* What step returns: 0, or a sum of these. */"
@@ -63,6 +65,8 @@ def _header(c: Controller, language: C) -> Iterator[str]:
     yield "/* What the controller keeps between samples; nobody else writes to it. */"
     yield "typedef struct {"
     yield "    uint32_t sample;"
+    if c.every > 1:
+        yield "    uint32_t since; /* samples since the last feedback */"
     yield f"    {name}_real y[{big}_STATES];"
     yield f"    {name}_real f[{big}_STATES];"
     for field in ("q", "feedback", "held", "before"):

@@ -148,6 +148,26 @@ def prediction_in_c(c: Controller, language: C) -> Iterator[str]:
     yield "}"
 
 
+def _fed_in_c(c: Controller) -> Iterator[str]:
+    """The feedback of a sample; with a clock of its own it is held until the next one."""
+    big, pad = c.name.upper(), "    " if c.every > 1 else ""
+    if c.every > 1:
+        yield "    if (c->since == 0) {"
+    if c.predicts:
+        yield f"    {pad}predicted(y, t, c->feedback, x);"
+        yield f"    {pad}status = feedback(x, t + {big}_DELAY, c->feedback);"
+    else:
+        yield f"    {pad}status = feedback(y, t, c->feedback);"
+    if c.every > 1:
+        yield "    } else {"
+        yield f"        status = {'0' if c.horizon is None else f't > {big}_HORIZON ? {big}_OVER : 0'};"
+        yield "    }"
+        yield "    c->since++;"
+        yield f"    if (c->since == {big}_EVERY) {{"
+        yield "        c->since = 0;"
+        yield "    }"
+
+
 def entries_in_c(c: Controller, language: C) -> Iterator[str]:
     """`NAME_feedforward`, `NAME_start` and `NAME_step`."""
     name, big, zero = c.name, c.name.upper(), language.number(Fraction(0))
@@ -163,6 +183,8 @@ def entries_in_c(c: Controller, language: C) -> Iterator[str]:
     yield f"    const int status = feedback(y, {zero}, u);"
     yield "    int i;"
     yield "    c->sample = 0;"
+    if c.every > 1:
+        yield "    c->since = 0;"
     yield "    for (i = 0; i < N; i++) {"
     yield f"        c->y[i] = {zero};"
     yield f"        c->f[i] = {zero};"
@@ -196,11 +218,7 @@ def entries_in_c(c: Controller, language: C) -> Iterator[str]:
         yield "        applied(c->held, c->before, played, mean);"
     yield "        estimator(y, f, c->y, c->f, c->q, mean, q, estimate);"
     yield "    }"
-    if c.predicts:
-        yield "    predicted(y, t, c->feedback, x);"
-        yield f"    status = feedback(x, t + {big}_DELAY, c->feedback);"
-    else:
-        yield "    status = feedback(y, t, c->feedback);"
+    yield from _fed_in_c(c)
     yield "    for (i = 0; i < M; i++) {"
     yield "        c->before[i] = c->held[i];"
     yield "        c->held[i] = c->feedback[i] - estimate[i];"

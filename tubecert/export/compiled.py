@@ -35,7 +35,9 @@ class Compiled:
         self._real = ctypes.c_float if single else ctypes.c_double
         self._type = np.float32 if single else np.float64
         self._shape = (lanes, m)
-        fields = [("sample", ctypes.c_uint32), ("y", self._real * n), ("f", self._real * n)]
+        fields: list[tuple[str, type]] = [("sample", ctypes.c_uint32)]
+        fields += [("since", ctypes.c_uint32)] if controller.every > 1 else []
+        fields += [("y", self._real * n), ("f", self._real * n)]
         fields += [(name, self._real * m) for name in ("q", "feedback", "held", "before")]
         kind = type("State", (ctypes.Structure,), {"_fields_": fields})
         self._states = [kind() for _ in range(lanes)]

@@ -41,7 +41,7 @@ class Controller:
     rounding may cost, where the certificate covers it. Of the plan, either the program `plan` or `pieces`.
     `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is covered.
     `still`: u* is constant; `held`: u* is played from sample to sample. `moves`: how far every measured state may move
-    from one sample to the next, where rounding is covered.
+    from one sample to the next, where rounding is covered. `every`: the feedback is computed at every so many samples.
     """
 
     name: str
@@ -75,6 +75,7 @@ class Controller:
     estimator: Program
     swept: Swept | None = None
     moves: tuple[Fraction, ...] = ()
+    every: int = 1
 
     @property
     def programs(self) -> tuple[Program, ...]:

@@ -69,6 +69,8 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield f"REACH = {decimal(c.reach)}  # and d(x*, y) below this, y being what was measured, or predicted from it"
     if c.pieces is not None:
         yield f"MEETS = {c.pieces.most}  # so many pieces of the plan can meet one sample"
+    if c.every > 1:
+        yield f"EVERY = {c.every}  # samples from one feedback to the next"
     yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add feedforward(t) all the time"
     if c.pieces is not None:
         yield from _tables(c.pieces)
@@ -203,7 +205,13 @@ def _class(c: Controller) -> Iterator[str]:
     mean = "" if c.adds_plan else ", mean_of_plan((self.sample - 1) * SAMPLE_TIME, t)"
     yield f"            mean = applied(self.held, self.before{mean})"
     yield "            self.q, estimate = estimator(y, f, self.y, self.f, self.q, mean)"
-    yield f"        self.feedback = self._law({'self._predicted(y, t), t + DELAY' if c.predicts else 'y, t'})"
+    fed = f"self.feedback = self._law({'self._predicted(y, t), t + DELAY' if c.predicts else 'y, t'})"
+    if c.every > 1:
+        yield "        self.status = 1 if t > HORIZON else 0"
+        yield "        if self.sample % EVERY == 0:"
+        yield f"            {fed}"
+    else:
+        yield f"        {fed}"
     yield "        self.before = self.held"
     yield "        self.held = tuple(p - q for p, q in zip(self.feedback, estimate))"
     yield "        self.y, self.f = y, f"

@@ -103,27 +103,30 @@ class Reference:
     feedback: Array = field(default_factory=lambda: np.zeros((0, 0)))
     held: Array = field(default_factory=lambda: np.zeros((0, 0)))
     before: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    square: Array = field(default_factory=lambda: np.zeros(0))
 
     def start(self, y: Array) -> Array:
         """Forgets everything; the inputs (N, m) that act from 0 on, for what is measured at 0, (N, n)."""
         self.sample = 0
-        self.feedback, _ = self._law(y, self.real(0))
+        self.feedback, self.square = self._law(y, self.real(0))
         self.q = np.zeros_like(self.feedback)
         self.held = self.before = self.feedback
         return np.asarray(self.held)
 
     def step(self, y: Array) -> tuple[Array, Array]:
-        """The inputs (N, m) that act a delay from now on, and d(x*, y)^2 (N,)."""
+        """The inputs (N, m) that act a delay from now on, and d(x*, y)^2 (N,) where the feedback looked last."""
         c, real = self.controller, self.real
         (f,) = execute(c.drift, y, real=real)
         estimate = self.q
         if self.sample:
             self.q, estimate = execute(c.estimator, y, f, self.y, self.f, self.q, self._mean(), real=real)
-        self.feedback, square = self._law(self._predicted(y), self.time(c.delay if c.predicts else 0))
+        if self.sample % c.every == 0:
+            seen, after = self._predicted(y), c.delay if c.predicts else 0
+            self.feedback, self.square = self._law(seen, self.time(after))
         self.before, self.held = self.held, self.feedback - estimate
         self.y, self.f = y, f
         self.sample += 1
-        return self.held, square
+        return self.held, self.square
 
     def time(self, after: Fraction | int = 0) -> Array:
         """A time after the newest sample, in s."""

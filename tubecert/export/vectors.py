@@ -15,6 +15,7 @@ _SAMPLES: Final = 40
 _CALM: Final = (
     24  # samples that move as a plant might; then the measurements jump, and the estimate is clipped
 )
+_FEEDBACKS: Final = 4  # more of them, at least, where it has a clock of its own
 _SLOW: Final = 1e-3  # of the tube, per sample
 _RELATIVE: Final = 1e-11
 _SINGLE: Final = 64 * 2.0**-24
@@ -32,7 +33,7 @@ class Vectors:
 
 def vectors(controller: Controller, *, single: bool = False) -> Vectors:
     """The vectors of a controller; they are the same in every process."""
-    y = measured(controller)
+    y = measured(controller, _SAMPLES + _FEEDBACKS * (controller.every - 1))
     exact = run(controller, y)
     scale = float(np.abs(exact).max())
     tolerance = _RELATIVE * scale

@@ -94,6 +94,8 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield f"| measured, in this order | {', '.join(c.states)} |"
     yield f"| inputs, in this order | {', '.join(c.inputs)} |"
     yield f"| sample time | {float(c.sample_time):.9g} s |"
+    if c.every > 1:
+        yield f"| samples from one feedback to the next | {c.every}; in between, `step` holds it |"
     yield f"| delay, from a sample to its input | {float(c.delay):.9g} s |"
     yield f"| horizon | {'none' if c.horizon is None else f'{float(c.horizon):.9g} s'} |"
     for name, (low, high) in zip(c.inputs, c.ranges, strict=True):

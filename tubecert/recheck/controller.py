@@ -30,7 +30,7 @@ from tubecert.recheck.terms import names
 BITS = 200
 _PANELS = 16  # of a sample, for the mean of u*
 _STEPS = 64  # of a delay, for the prediction
-_NO_MACHINE = "its certificate H has no machine with one clock"
+_NO_MACHINE = "its certificate H has no machine of which every feedback is computed at a sample"
 
 Column = list[Ball]
 
@@ -54,7 +54,7 @@ def machine_of(text: str, file: str) -> Machine:
     if not isinstance(section, HardwareSection) or not isinstance(recipe, Digital):
         raise ValueError(_NO_MACHINE)
     hardware = case.result.specification.hardware
-    if hardware is None or recipe.feedback_time != recipe.sample_time:
+    if hardware is None or (recipe.feedback_time / recipe.sample_time).denominator > 1:
         raise ValueError(_NO_MACHINE)
     return Machine(case, section, recipe, held=hardware.held)
 
@@ -88,7 +88,9 @@ class Machine:
                 if not self.whole:
                     mean = [a + b for a, b in zip(mean, self.played(t - Ts, t), strict=True)]
                 q = self.filtered(q, self.estimate(y, measured[k - 1], mean))
-            if self.section.predict:
+            if t % self.recipe.feedback_time:
+                pass  # it is held
+            elif self.section.predict:
                 feedback = self.feedback(self.predicted(y, t, feedback), t + tau)
             else:
                 feedback = self.feedback(y, t)

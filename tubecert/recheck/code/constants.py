@@ -33,6 +33,9 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
     for name, value in wanted.items():
         if not _is(code, code.macros.get(f"{big}_{name}"), value):
             yield name
+    every = recipe.feedback_time / recipe.sample_time
+    if code.macros.get(f"{big}_EVERY", Number("1")) != Number(str(every)):
+        yield "EVERY"
     own, m = code.functions["estimator"], len(case.system.inputs)
     box = box_of(own, m)
     ends = [(Number(low), Number(high)) for low, high in box or ()]

@@ -1,6 +1,6 @@
 """What exported code can lose to its rounding: bounds of recheck's own for the numbers of theorem H-R.
 
-Implements: theory 8.11 (H.36), for a constant metric, one clock and no prediction. In: the text of the code, read, and
+Implements: theory 8.11 (H.36), for a constant metric and no prediction. In: the text of the code, read, and
 what the certificate says of the machine. Every function of the text is run on balls that contain all that goes in, at
 stations along the plan.
 """
@@ -270,6 +270,7 @@ class _Analysis:
         acted = feedback + self._largest_input + self.of.radius * (1 + 8 * self.kind.unit)
         rows: State = {"y": y, "f": f, "q": [known(_around(self.of.estimate))] * self.m}
         rows |= {name: [known(_around(acted))] * self.m for name in ("feedback", "held", "before")}
+        rows["since"] = 0  # the feedback is computed: where it is held, less is rounded
         state = machine.state()
         for name, old in state.items():
             state[name] = rows[name] if name in rows else self._time(station) if old is None else old
