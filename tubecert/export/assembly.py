@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 from itertools import pairwise
 from typing import Final
@@ -145,9 +146,8 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
     if knots is not None:  # its plan was in a file
         rest = {"kind": "equilibrium", "at": ["0"] * len(certificate.result.spec.effective.system.states)}
         apart = ("initial_state", "obstacles", "simulation", "expect", "conditions")
-        tube = {key: value for key, value in data["tube"].items() if key != "windows"}  # times of its plan
-        data = {key: value for key, value in data.items() if key not in apart}
-        data |= {"trajectory": rest, "tube": tube}
+        kept = {key: value for key, value in data.items() if key not in apart} | {"trajectory": rest}
+        data = {key: _anytime(value) if key == "tube" else value for key, value in kept.items()}
     spec = load_text(json.dumps(dict(data)), "certificate")
     trajectory, model = spec.trajectory, build(spec)
     if knots is not None:
@@ -164,6 +164,11 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
             "a table stands in the plan, which is not exported yet", "write its numbers into a CSV plan"
         )
     return spec, Plan(x, u, trajectory.horizon), model
+
+
+def _anytime(tube: Mapping[str, object]) -> Mapping[str, object]:
+    """A tube without its windows, which are times of a plan."""
+    return {key: value for key, value in tube.items() if key != "windows"}
 
 
 def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard | None) -> None:
