@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.claims.advice import ConstantInputs
+from tubecert.claims.advice import ConstantInputs, LessenCause
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
 from tubecert.cli.app import app
@@ -366,6 +366,22 @@ def test_for_a_machine_metrics_are_ranked_by_the_tube_that_is_proven_with_them()
     assert width <= best.demand < 1.1 * width  # the search knew constants to 5 %
     failed = [row for row in found.rows if row.verdict is not Verdict.CERTIFIED]
     assert all(row.demand > 1 for row in failed)
+
+
+@pytest.mark.slow
+def test_where_no_metric_serves_a_machine_what_fills_the_loop_that_comes_nearest_is_said():
+    """Only margins were told: of -1e-6, where the loop needed ten times its room."""
+    told = []
+    spec = load_text(CART.replace("rate: 200", "rate: 2").replace("z: 0.3", "z: 0.01"))
+    found = pipeline.synthesise(
+        spec, Synthesis(rate=Fraction(2), objective="adaptation"), Options(), told=told.append
+    )
+    assert [each.reason.relax for each in told] == [()], "the verdict first"
+    assert found.reason.claim.failure.slow.condition == "hardware"
+    shares = [each.share for each in found.reason.relax if isinstance(each, LessenCause)]
+    least = min(row.demand for row in found.rows)
+    assert sum(shares) > 1
+    assert sum(shares) == pytest.approx(least, rel=0.1), "of the best of them"
 
 
 def test_a_narrow_tube_counts_even_where_the_filter_is_slow():

@@ -2,16 +2,19 @@
 
 Whether there are gains for a tube is not monotone in its size: a wide one has large constants, in a narrow one the
 start or the machine does not fit. So sizes are tried by factors of two in both directions until one fails, and the best
-is then narrowed to what it was proven to need. In: a specification at every scale. Out: every attempt, each a full
-certification.
+is then narrowed to what it was proven to need. Where none is proven, but the loop asks for more than one size and the
+next is stopped by something else (limits, the safe set, an obstacle), sizes between these two are tried. In: a
+specification at every scale. Out: every attempt, each a full certification.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
+from itertools import pairwise
+from math import sqrt
 from typing import Final
 
 from tubecert.certificate.result import Result
@@ -21,9 +24,11 @@ from tubecert.pipeline.width import Measure, machine_of, size_of
 from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
 from tubecert.stages.memory import Memory
+from tubecert.verdict import Verdict
 
 _FARTHEST: Final = 6  # factors of two in one direction
 _NARROWINGS: Final = 8
+_HALVINGS: Final = 4  # of the factor of two between a tube that is too narrow and one that is too wide
 _ROOM: Final = Fraction(1001, 1000)  # between what is needed and what is tried next
 _SETTLED: Final = Fraction(998, 1000)
 
@@ -80,13 +85,32 @@ def narrowest(
                 or (factor > 1 and _is_wider(found, attempts.values()))
             ):
                 break
-    best = Design(attempts=tuple(attempts.values())).best or first
+    best = Design(attempts=tuple(attempts.values())).best or _between(attempts, attempt) or first
     for _ in range(_NARROWINGS):
         needed = needed_of(best.result)
         if best.size is None or needed is None or needed >= _SETTLED:
             break
         best = attempt(round_up(float(best.scale * needed * _ROOM), 5))
     return Design(attempts=tuple(attempts.values()))
+
+
+def _between(attempts: Mapping[Fraction, Attempt], attempt: Callable[[Fraction], Attempt]) -> Attempt | None:
+    """A tube that is proven between one that is too narrow for the loop and the next, where something else stops it."""
+    for _ in range(_HALVINGS):
+        beside = pairwise(sorted(attempts))
+        gap = next(
+            (pair for pair in beside if [_lacks_room(attempts[each]) for each in pair] == [True, False]), None
+        )
+        found = None if gap is None else attempt(round_up(sqrt(gap[0] * gap[1]), 4))
+        if found is None or found.size is not None:
+            return found
+    return None
+
+
+def _lacks_room(found: Attempt) -> bool:
+    """Whether it is the loop that a tube has no room for."""
+    own = machine_of(found.result)
+    return own is not None and own.verdict is not Verdict.CERTIFIED
 
 
 def _told(progress: Progress, done: int, step: Step) -> None:

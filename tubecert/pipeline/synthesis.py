@@ -49,6 +49,7 @@ from tubecert.letters import HARDWARE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
+from tubecert.pipeline.certification import answer, explain
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
@@ -59,6 +60,7 @@ from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
+from tubecert.stages.judged import Judged
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
@@ -269,14 +271,17 @@ class SynthesisRun:
                 raise _TooLongError(metric, error.findings[0].code) from None
             return row
         self._say(f"rate {near(metric.rate, 4)}: certifying")
-        options = replace(
+        outputs = measure_in(self.spec, self.wanted.outputs)
+        return judged_row(row, self.ask(spec, self._judging(), self._watch, self.memory), outputs)
+
+    def _judging(self) -> Options:
+        """How closely a metric is judged that is to be compared."""
+        return replace(
             self.options,
             gap=max(self.options.gap, _GAP_OF_MACHINE if self._by_machine else _GAP),
             budget=min(self.options.budget, _BOXES),
             metric=None,
         )
-        outputs = measure_in(self.spec, self.wanted.outputs)
-        return judged_row(row, self.ask(spec, options, self._watch, self.memory), outputs)
 
     @property
     def _by_machine(self) -> bool:
@@ -355,13 +360,33 @@ class SynthesisRun:
                     LowerRate(),
                 )
         if (failure := none_certified(self._table())) is not None:
-            relax = (ReduceRadii(), EnlargeSafeSet()) if isinstance(failure.slow, TubeInSafeSet) else ()
-            return self._failed(failure, *relax)
+            room: tuple[Relax, ...] = (ReduceRadii(), EnlargeSafeSet())
+            relax = room if isinstance(failure.slow, TubeInSafeSet) else ()
+            if self.told is not None and self._nearest is not None:
+                self.told(self._failed(failure, *relax))
+            return self._failed(failure, *relax, *self._lacking())
         if self.told is not None:
             self.told(self._failed(tried(self.ladder.attempts)))
         return self._failed(
             tried(self.ladder.attempts), *remedies(self.ladder, rate, self.wanted.degree, self._say)
         )
+
+    @property
+    def _nearest(self) -> Row | None:
+        """The metric with which a machine's loop comes nearest to a proof; None where certificate H does not decide."""
+        judged = [row for row in self.rows.values() if row.by_machine]
+        return min(judged, key=lambda row: row.demand, default=None)
+
+    def _lacking(self) -> tuple[Relax, ...]:
+        """What fills the level of the loop that comes nearest, and machines that would serve with its metric."""
+        nearest = self._nearest
+        if nearest is None or self.cut is not None:
+            return ()
+        try:
+            end = answer(self.ask(self._with(nearest.metric), self._judging(), self._watch, self.memory))
+        except OutOfTime:
+            return ()
+        return explain(end).reasons[0].relax if isinstance(end, Judged) else ()
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""

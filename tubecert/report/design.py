@@ -50,7 +50,7 @@ def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType
             _used(each),
             _stops(each),
         )
-    covered = f"{len(found.attempts)} sizes were tried, by factors of two and then inward from the best"
+    covered = f"{len(found.attempts)} sizes were tried, by factors of two and then between them"
     parts += titled("Attempts", [table, Text(f"{covered}; what lies between them was not.", style="dim")])
     if target is not None:
         parts += [Text(), Text(f"certificate {target}")]

@@ -27,6 +27,7 @@ DIGITS = 4
 _UNALIKE = 0.7  # of the inflation: for a Y that S is a multiple of
 _ROOM = 9  # digits of what only the proof needs
 _CURVE_POINTS = 13
+_ASIDE = 1e-9  # of the largest level: n_M in floats is not n_M
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +77,12 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     if np.isfinite(choice.dhat[0]):
         return served(search, setting, choice)
     best, nearest = search.least(at)
-    return proof_at(search, setting, printed(setting, nearest, 0.0), 1e-6) if np.isfinite(best[0]) else None
+    if not np.isfinite(best[0]):
+        return None
+    # the largest level there may be, rounded into what (H.10) allows: what it lacks is then said of (H.12) alone
+    own = printed(setting, nearest, 0.0)
+    allowed = round_down(float(nearest.dhat[0]) * (1 - _ASIDE), DIGITS + 1)
+    return proof_at(search, setting, replace(own, level=allowed), 1e-6)
 
 
 def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:

@@ -266,6 +266,8 @@ def _margin(claim: ConditionHolds) -> str:
         return below if high == inf else f"{below}; it is {near(high, 3)} at most"
     if (shown := near(low, 3)) == near(high, 3):
         return f"its margin is {shown}"
+    if high == inf:
+        return f"its margin is at least {shown}"
     return f"its margin lies in [{shown}, {near(high, 3)}]"
 
 
