@@ -11,9 +11,10 @@ from systems import IN_WINDOWS, SCALAR
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import EaseHardware, LessenCause, TakeWindows
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Options, certify, design
 from tubecert.pipeline.design import narrowest, needed_of
 from tubecert.pipeline.width import Measure, size_of
+from tubecert.report.design import report
 from tubecert.spec import load_text
 from tubecert.spec.windows import more_windows
 from tubecert.verdict import Verdict
@@ -71,6 +72,30 @@ def test_between_a_tube_that_is_too_narrow_and_one_that_is_too_wide_sizes_are_tr
     assert found.best is not None
     assert 1 < found.best.scale < 2
     assert found.best.size == size_of(certify(scaled(text)(found.best.scale), H), RADIUS)
+
+
+@pytest.mark.slow
+def test_attempts_are_brief_and_the_one_that_is_shown_is_what_certify_gives(monkeypatch):
+    monkeypatch.setattr(design, "_FARTHEST", 0)
+    monkeypatch.setattr(design, "_NARROWINGS", 0)
+    (best,) = narrowest(scaled(), Options(), RADIUS).attempts
+    brief, whole = (certify(scaled()(Fraction(1)), Options(), brief=each) for each in (True, False))
+    assert best.result.to_json() == whole.to_json()
+    assert (brief.verdict, size_of(brief, RADIUS)) == (whole.verdict, best.size)
+    assert brief.sections["hardware"].curve == ()
+    assert whole.sections["hardware"].curve != ()
+
+
+@pytest.mark.slow
+def test_where_none_serves_the_nearest_is_told_with_what_would_help(monkeypatch):
+    monkeypatch.setattr(design, "_FARTHEST", 1)
+    found = narrowest(scaled(SCALAR.replace("rate: 200", "rate: 1")), Options(), RADIUS)
+    assert found.best is None
+    lacking = [each.lacks for each in found.attempts]
+    assert min(lacking) == found.shown.lacks < max(lacking)
+    assert any(isinstance(each, EaseHardware) for each in found.shown.result.reason.relax)
+    told = [str(line) for part in report(None, found, None) for line in [getattr(part, "plain", part)]]
+    assert "Not certified" in " ".join(told)
 
 
 @pytest.mark.slow

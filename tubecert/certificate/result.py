@@ -262,6 +262,11 @@ class Result:
         own = [reason for reason in self.reasons if reason.verdict is self.verdict]
         return next(iter([*own, *self.reasons]), None)
 
+    @property
+    def failed(self) -> list[Reason]:
+        """What is not proven."""
+        return [reason for reason in self.reasons if reason.verdict is not Verdict.CERTIFIED]
+
     def deciding(self) -> Mapping[str, Pair]:
         """The gains that the verdict is about, by section."""
         found = {

@@ -94,8 +94,7 @@ def run(given: Given, output: Output) -> ExitCode:
         lambda: told.report(first, found, written),
         data if output.json else None,
     )
-    best = found.best or found.attempts[0]
-    return best.result.verdict.exit_code
+    return found.shown.result.verdict.exit_code
 
 
 def _kept_metric(target: str, text: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,11 +35,12 @@ class Attempt:
     scale: Fraction
     size: float | None
     result: Result = field(repr=False)
+    whole: Callable[[], Result] = field(repr=False, compare=False)
 
     @property
     def certification(self) -> Certification:
-        """The certificate, whatever its verdict."""
-        return _sealed(self.result)
+        """The certificate, whatever its verdict; certified again, in full, where it was one among others."""
+        return _sealed(self.whole())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,8 @@ class Design:
     @property
     def best(self) -> Attempt | None:
         """The narrowest that is certified; None if none is."""
-        return None if self.found.best is None else _attempt(self.found.best)
+        best = self.found.best
+        return None if best is None else replace(_attempt(best), whole=partial(_known, best.result))
 
     def __str__(self) -> str:
         return told.summary(self.spec, self.found).plain
@@ -72,7 +75,7 @@ class Design:
         return notebook.of_line(str(self), self.spec.name, self._style(), _rows(self.attempts))
 
     def _style(self) -> str:
-        return str((self.found.best or self.found.attempts[0]).result.verdict)
+        return str(self.found.shown.result.verdict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +137,12 @@ class TradeOff:
         """What no other point beats in both: the tube, and the largest value of the part in it."""
         return tuple(
             (
-                Attempt(scale=each.scale, size=each.size, result=each.offer.result),
+                Attempt(
+                    scale=each.scale,
+                    size=each.size,
+                    result=each.offer.result,
+                    whole=partial(_known, each.offer.result),
+                ),
                 Machine(part=self.part, value=each.offer.value, result=each.offer.result),
             )
             for each in self.found.best
@@ -160,7 +168,12 @@ class TradeOff:
 
 
 def _attempt(each: Tried) -> Attempt:
-    return Attempt(scale=each.scale, size=each.size, result=each.result)
+    return Attempt(scale=each.scale, size=each.size, result=each.result, whole=each.whole)
+
+
+def _known(result: Result) -> Result:
+    """What is there already in full."""
+    return result
 
 
 def _sealed(result: Result) -> Certification:

@@ -65,16 +65,18 @@ def certify(
     advise: bool = False,
     told: Callable[[Result], None] | None = None,
     workers: Executor | None = None,
+    brief: bool = False,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
     With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
     a metric that is looked for is by then the best that was found. With `advise`, what would certify is looked for
     where the verdict is another; `told` hears the verdict before. `workers` search parts of long suprema: what comes
-    out does not depend on them.
+    out does not depend on them. `brief`: the verdict, and the gains of what decides; no curves, no other kinds, and
+    nothing that explains.
     """
     ledger = Ledger(progress)
-    question = replace(question_of(spec, options, ledger, memory), workers=workers)
+    question = replace(question_of(spec, options, ledger, memory), workers=workers, brief=brief)
     end = _end(question, deadline)
     found = result(end)
     return advised(found, end, ledger, question_of, told) if advise else found

@@ -17,7 +17,7 @@ from tubecert.claims.gains import ConditionHolds
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kinds import HARDWARE, RATES
-from tubecert.kinds.table import kinds_of
+from tubecert.kinds.table import kind_of, kinds_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
@@ -28,7 +28,7 @@ from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
 from tubecert.spec.windows import more_windows
 from tubecert.stages.bounded import Bounded, bound
-from tubecert.stages.judged import Judged, judge_all
+from tubecert.stages.judged import Judged, deciding, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
 from tubecert.stages.result import Explanation, Stage, result_of
@@ -109,9 +109,12 @@ def tube(planned: Planned) -> TubeFound | Stopped:
 
 def judge(bounded: Bounded) -> Judged:
     """The verdict on what every search proposes."""
-    problem, asked = bounded.problem, _asked(bounded.question)
+    problem, asked, question = bounded.problem, _asked(bounded.question), bounded.question
+    only = [kind_of(key).theorem.recipe for key in deciding(question)] if question.brief else PROPOSERS
     proposals = {}
     for recipe, each in PROPOSERS.items():
+        if recipe not in only:
+            continue
         tell_gains(bounded.question, recipe)
         proposals[recipe] = each.propose(problem, asked)
     if bounded.machine is None or bounded.machine.asked.arithmetic is None:
@@ -163,7 +166,7 @@ def _told(slopes: Mapping[str, float]) -> dict[str, float]:
 
 def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:
     """What explains the section of a kind; other machines are looked for where they are the question."""
-    if proposer.machine and key not in judged.deciding:
+    if judged.question.brief or (proposer.machine and key not in judged.deciding):
         return Explained()
     spec, section = judged.question.spec, judged.sections[key]
     adapted = spec.disturbance is not None and spec.disturbance.rate is not None
@@ -178,7 +181,9 @@ def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:
 
 def _asked(question: Question) -> Asked:
     options = question.options
-    return Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate)
+    return Asked(
+        bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=not question.brief
+    )
 
 
 def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:

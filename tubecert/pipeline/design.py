@@ -4,17 +4,18 @@ Whether there are gains for a tube is not monotone in its size: a wide one has l
 start or the machine does not fit. So sizes are tried by factors of two in both directions until one fails, and the best
 is then narrowed to what it was proven to need. Where none is proven, but the loop asks for more than one size and the
 next is stopped by something else (limits, the safe set, an obstacle), sizes between these two are tried. In: a
-specification at every scale. Out: every attempt, each a full certification.
+specification at every scale. Out: every attempt, each certified as far as it takes to compare them, and the one that is
+shown in full.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import pairwise
-from math import sqrt
+from math import inf, sqrt
 from typing import Final
 
 from tubecert.certificate.result import Result
@@ -35,11 +36,21 @@ _SETTLED: Final = Fraction(998, 1000)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """The tube at a scale: what came of it, and how wide it was proven to be; None if it was not proven."""
+    """The tube at a scale: what came of it, and how wide it was proven to be; None if it was not proven.
+
+    `result` is brief where nobody asked for more; `whole` is the certification that `certify` gives.
+    """
 
     scale: Fraction
     result: Result
     size: float | None
+    whole: Callable[[], Result] = field(repr=False, compare=False)
+
+    @property
+    def lacks(self) -> float:
+        """What certificate H needs of what there is, above 1 where it is not certified; inf where nobody knows."""
+        own = machine_of(self.result)
+        return inf if own is None or own.margin is None or own.margin.below is None else 1 - own.margin.below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +64,11 @@ class Design:
         """The narrowest that is proven."""
         found = [each for each in self.attempts if each.size is not None]
         return min(found, key=lambda each: each.size or 0.0, default=None)
+
+    @property
+    def shown(self) -> Attempt:
+        """The best; where none is proven, what comes nearest to it."""
+        return self.best or min(self.attempts, key=lambda each: each.lacks)
 
 
 def narrowest(
@@ -68,8 +84,14 @@ def narrowest(
     def attempt(scale: Fraction) -> Attempt:
         if scale not in attempts:
             told = None if progress is None else partial(_told, progress, len(attempts))
-            result = certify(at(scale), options, told, memory)
-            attempts[scale] = Attempt(scale=scale, result=result, size=size_of(result, measure))
+            spec = at(scale)
+            result = certify(spec, options, told, memory, brief=True)
+            attempts[scale] = Attempt(
+                scale=scale,
+                result=result,
+                size=size_of(result, measure),
+                whole=partial(certify, spec, options, told, memory),
+            )
         return attempts[scale]
 
     first = attempt(Fraction(1))
@@ -91,6 +113,8 @@ def narrowest(
         if best.size is None or needed is None or needed >= _SETTLED:
             break
         best = attempt(round_up(float(best.scale * needed * _ROOM), 5))
+    shown = Design(attempts=tuple(attempts.values())).shown
+    attempts[shown.scale] = replace(shown, result=shown.whole())
     return Design(attempts=tuple(attempts.values()))
 
 

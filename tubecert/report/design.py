@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tubecert.claims.family import Reason
+from tubecert.claims.gains import ConditionHolds
 from tubecert.digits import exact, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
@@ -27,22 +30,23 @@ if TYPE_CHECKING:
 def summary(spec: Spec, found: Design) -> Text:
     """The best tube, or that there is none."""
     del spec
-    if found.best is not None:
-        return verdict_line(found.best.result)
-    return verdict_line(found.attempts[0].result)
+    return verdict_line(found.shown.result)
 
 
 def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType]:
-    """The best, then every attempt."""
+    """The best, or what stops the one that comes nearest; then every attempt."""
     parts: list[RenderableType] = [summary(spec, found)]
     best = found.best
     if best is not None:
         parts += titled("Machine", [Text(line) for line in lines(best.result)])
         scale = f"{exact(best.scale)} times as wide as the specification's"
         parts += titled("Tube", [Text(f"{scale}: {reach.extent(best.result)}")])
+    else:
+        nearest = f"{exact(found.shown.scale)} times as wide as the specification's comes nearest"
+        parts += titled("Not certified", [Text(f"{nearest}:"), *sections.failures(found.shown.result)])
     table = plain_table(">scale", "verdict", ">proven size", ">used", "what stops it", wrapped=4)
     for each in sorted(found.attempts, key=lambda each: each.scale):
-        mark = " *" if each is best else ""
+        mark = " *" if each is found.shown else ""
         table.add_row(
             f"{exact(each.scale)}{mark}",
             Text(str(each.result.verdict), style=sections.VERDICTS[each.result.verdict]),
@@ -64,8 +68,15 @@ def _used(each: Attempt) -> str:
 
 
 def _stops(each: Attempt) -> str:
-    reason = each.result.reason
-    return "" if each.size is not None or reason is None else sentence(reason)
+    """Of several conditions that are not proven, the one that is missed by most."""
+    failed = [] if each.size is not None else each.result.failed
+    return sentence(min(failed, key=_margin)) if failed else ""
+
+
+def _margin(reason: Reason) -> float:
+    """What is left of a condition, as far as it is known; other claims come first."""
+    own = reason.claim.margin if isinstance(reason.claim, ConditionHolds) else None
+    return -inf if own is None or own.below is None else own.below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -41,10 +41,10 @@ VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDE
 
 def of(result: Result, *, verbose: bool) -> Iterator[Section]:
     """The sections that a result has something to say in."""
-    failed = [item for item in result.reasons if item.verdict is not Verdict.CERTIFIED]
+    failed = failures(result)
     holding = [item for item in result.reasons if item.verdict is Verdict.CERTIFIED]
     if failed:
-        yield "Not certified", [_reason(result, item) for item in failed]
+        yield "Not certified", failed
     if result.sections:
         yield "Gains", _gains(result)
     if section_of(result) is not None:
@@ -63,6 +63,11 @@ def of(result: Result, *, verbose: bool) -> Iterator[Section]:
 
 
 # -- why not
+
+
+def failures(result: Result) -> list[RenderableType]:
+    """What is not proven, each with what would help."""
+    return [_reason(result, item) for item in result.failed]
 
 
 def _reason(result: Result, reason: Reason) -> Group:

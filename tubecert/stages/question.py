@@ -43,7 +43,8 @@ class Question:
     """What is to be certified: a specification with its radii, the options, the range of time that matters for h.
 
     `synthesis` is what the certificate says of a metric that was synthesised for this question. `memory` may be shared
-    between questions, and `workers` search parts of long suprema; nothing that comes out depends on either.
+    between questions, and `workers` search parts of long suprema; nothing that comes out depends on either. `brief`:
+    what decides is all that is asked for, without curves, other kinds and what explains.
     """
 
     spec: Spec
@@ -53,6 +54,7 @@ class Question:
     progress: Progress | None = field(default=None, repr=False, compare=False)
     memory: Memory = field(default_factory=Memory, repr=False, compare=False)
     workers: Executor | None = field(default=None, repr=False, compare=False)
+    brief: bool = False
 
     @property
     def question(self) -> Question:
