@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from machines import alive_machine, windy
+from test_hardware import LOST, rounded
 
 from tubecert.conditions import hardware
-from tubecert.conditions.hardware import HardwareRecipe, WindowProof, margins_hardware
+from tubecert.conditions.hardware import HardwareRecipe, Rounding, WindowProof, margins_hardware
 from tubecert.conditions.hardware.course import ages_of_feedback, base_of
 from tubecert.conditions.hardware.windows import course_of
 from tubecert.conditions.machine import Window
@@ -96,8 +97,41 @@ FORMS = {
     "prediction": (alive_machine(predict=True), {"prediction": F("0.004")}),
     "a fast feedback out of step": (alive_machine(feedback_time=F(1, 2300)), {"feedback_time": F(1, 2300)}),
     "a slow feedback": (alive_machine(feedback_time=F(3, 1000)), {"feedback_time": F(3, 1000)}),
+    "rounding": (rounded(alive_machine()), {"rounding": (LOST,), "bias": F("0.1"), "speed": F(5)}),
     "wind": (windy(alive_machine(), F("0.03")), {"wind": F("0.03"), "bias": F("0.12"), "speed": F(5)}),
 }
+
+
+def test_a_gain_of_the_feedback_in_a_window_does_not_count_where_it_is_cut_by_that_of_the_whole():
+    """The code is the same in all windows, and so is what it cuts its feedback by; other constants count."""
+    own = recipe({}, {}, **FORMS["rounding"][1])
+    problem = rounded(alive_machine())
+
+    def stays(*factors):
+        return float(margins_hardware(cut(problem, *factors), own)[1].lo)
+
+    assert stays({}, {}) == stays({}, {"feedback_gain": 0.5})
+    assert stays({}, {}) < stays({"feedback_slope": 0.5}, {"feedback_slope": 0.5})
+    exact = replace(own, rounding=())
+    alive = alive_machine()
+    both = {"feedback_gain": 0.5}
+    halves = [float(margins_hardware(cut(alive, each, each), exact)[1].lo) for each in ({}, both)]
+    assert halves[0] < halves[1]
+
+
+def test_what_rounding_costs_counts_in_every_window():
+    problem, changes = FORMS["rounding"]
+    nothing = Rounding(feedback=F(0), input=F(0), estimate=F(0), prediction=F(0))
+
+    def last(lost):
+        own = recipe({}, {}, **changes | {"rounding": (lost,), "floor": F("0.01")})
+        return course_of(cut(problem, {}, {}), own)[1]
+
+    of_nothing = last(nothing)
+    for name in ("feedback", "input"):
+        assert last(replace(nothing, **{name: F(1, 20)})).supremum.lo > of_nothing.supremum.hi + 1e-4
+    bias = last(LOST).at.estimate.bias.lo - of_nothing.at.estimate.bias.hi
+    assert float(bias) >= float(LOST.estimate) * 0.999
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -236,6 +236,31 @@ def contradicted(document) -> bool:
 
 
 @pytest.mark.slow
+def test_rounding_in_windows_is_confirmed_by_du_of_the_whole_tube_alone():
+    document = certified(
+        IN_WINDOWS.replace("hardware: {", "hardware: {arithmetic: double, "), conditions="hardware"
+    )
+    own = document["result"]["hardware"]
+    assert document["result"]["verdict"] == "certified"
+    assert not any("feedback_gain" in window["constants"] for window in own["windows"])
+
+    def holds(other):
+        (claim,) = (item for item in of_certified(case_of(sealed(other))) if item.name == INSIDE)
+        return claim.outcome(None).holds
+
+    assert holds(document)
+    gain = document["result"]["constants"]["feedback_gain"]["above"]
+    for change in (
+        put(gain, *W, 2, "constants", "feedback_gain"),
+        scaled(1e9, *PROOF, "rounding", 0, "estimate"),
+        scaled(1e9, *PROOF, "rounding", 0, "feedback"),
+    ):
+        forged = copy.deepcopy(document)
+        change(forged["result"])
+        assert not holds(forged)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [*STRUCTURAL, *NUMERIC])
 def test_no_change_is_confirmed(honest, change):
     document, memory = copy.deepcopy(honest[0]), honest[1]

@@ -77,9 +77,11 @@ def courses(draw):
                 prediction=None if recipe.prediction is None else recipe.prediction * draw(st.integers(1, 2)),
             )
         )
-    # an uncertain gain, and rounding, beside windows are refused before any theorem is asked
-    problem = replace(problem, gain=None, horizon=ends[-1], machine=replace(machine, windows=tuple(windows)))
-    return problem, replace(recipe, windows=tuple(proofs), rounding=())
+    # an uncertain gain beside windows is refused before any theorem is asked
+    asked = replace(machine.asked, arithmetic="double" if recipe.rounding else None)
+    machine = replace(machine, asked=asked, windows=tuple(windows))
+    problem = replace(problem, gain=None, horizon=ends[-1], machine=machine)
+    return problem, replace(recipe, windows=tuple(proofs))
 
 
 def read(problem, recipe, module=own) -> tuple[list[own.Window], object]:

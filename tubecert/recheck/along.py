@@ -46,8 +46,6 @@ def pad(at: Digital) -> Fraction:
 def along(windows: Sequence[Window], promise: Promise) -> tuple[Passed, ...] | None:
     """What theorem HW gives; None where a condition beside those of the levels, (H.25), is not proven."""
     for window in windows:
-        if window.at.losses is not None:  # theorem H-R is stated for one window
-            return None
         if window.setting.gain is not None:  # (H.21) and (H.22) are stated for a B that is known
             return None
         if not window.at.sensible or promise.predicts != (window.at.prediction is not None):

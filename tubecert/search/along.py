@@ -15,7 +15,7 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import Array, maximum, quiet
 from tubecert.conditions.decimals import round_down, round_up
-from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, WindowProof
+from tubecert.conditions.hardware import HardwareRecipe, Loop, Plant, Rounding, WindowProof
 from tubecert.conditions.hardware.course import ages_of_feedback, base_of, resumed
 from tubecert.conditions.hardware.estimation import Past, estimate
 from tubecert.conditions.hardware.evaluation import Evaluated
@@ -36,6 +36,7 @@ _SETTLED = 1e-4
 _SPEEDS = 60
 _FLOORS = (1.0, 0.6, 0.35, 0.2, 0.1, 0.05, 0.02)  # of where both parts of delta are the same
 _WIDER = 1 + 1e-4  # of a radius, so that levels can be rounded up
+_ROUNDED = 1.1  # the same where what `single` loses is not known yet
 _LEAST = 1e-15
 
 
@@ -51,12 +52,13 @@ class Levels:
 class WindowSearch:
     """Theorem HW in floats, over one problem."""
 
-    def __init__(self, problem: TubeProblem, machine: Machine) -> None:
+    def __init__(self, problem: TubeProblem, machine: Machine, lost: Rounding | None = None) -> None:
         self.problem, self.machine = problem, machine
         self.R = machine.clip_radius(problem.constants.h)
         self.searches = [
-            Search(each, each.machine) for w in machine.windows if (each := over(problem, w)).machine
+            Search(each, each.machine, lost) for w in machine.windows if (each := over(problem, w)).machine
         ]
+        self.rounding = self.searches[0].rounding
         # what is told of the whole tube rests on d < dbar there, however large a is in a window
         self.cap = float(reach(problem.proven()).lo)
         self.setting = setting_at(problem, machine, Fraction(1))
@@ -79,7 +81,7 @@ class WindowSearch:
         found: list[InWindow[Array]] = []
         above = np.maximum(dhat, np.vstack([dhat[:1], dhat[:-1]]))
         for j, (p, span) in enumerate(zip(self.plants, self.spans, strict=True)):
-            loop = in_lanes(at, above[j], predicts=self.machine.asked.predict)
+            loop = in_lanes(at, above[j], predicts=self.machine.asked.predict, rounding=self.rounding)
             found.append(self._window(p, loop, span, found[-1] if found else None))
         return tuple(found)
 
@@ -156,10 +158,10 @@ class WindowSearch:
 
     def radii(self, levels: Levels, lane: int) -> list[Fraction]:
         """How wide the tube has to be in each window, at the levels of a lane."""
-        found = []
+        found, wider = [], _ROUNDED if self.machine.asked.arithmetic == "single" else _WIDER
         for x, w in zip(levels.found, self.machine.windows, strict=True):
             needed = (x.at.loop.dhat + x.at.estimate.n_fb)[lane] / np.sqrt(float(x.at.plant.n.a))
-            found.append(min(w.radius, round_up(float(needed) * _WIDER, _DIGITS)))
+            found.append(min(w.radius, round_up(float(needed) * wider, _DIGITS)))
         return found
 
     # -- the filter
@@ -241,6 +243,7 @@ class WindowSearch:
             ripple=max(w.ripple for w in proofs),
             prediction=max(predictions) if predictions else None,
             windows=tuple(proofs),
+            rounding=self.rounding,
         )
 
 
@@ -278,9 +281,11 @@ def _proof(level: Fraction, x: InWindow[Array], room: float) -> WindowProof | No
     )
 
 
-def propose_in_windows(problem: TubeProblem, machine: Machine) -> Proposal[HardwareRecipe]:
-    """The least levels that are found, in the windows that the constants are known in."""
-    search = WindowSearch(problem, machine)
+def propose_in_windows(
+    problem: TubeProblem, machine: Machine, lost: Rounding | None = None
+) -> Proposal[HardwareRecipe]:
+    """The least levels that are found, in the windows that the constants are known in; `lost` to rounding."""
+    search = WindowSearch(problem, machine, lost)
     found = search.chosen()
     recipe = None if found is None else search.recipe(*found)
     return Proposal() if recipe is None else Proposal(decisive=recipe, role="machine")

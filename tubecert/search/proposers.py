@@ -94,7 +94,7 @@ def _propose_on_machine(problem: TubeProblem, asked: Asked) -> Proposal[Hardware
     if machine is None or not machine.windows:
         return propose_hardware(problem, asked)
     blocked = obstacles(problem, theorem_h.THEOREM)
-    return Proposal() if blocked else propose_in_windows(problem, machine)
+    return Proposal() if blocked else propose_in_windows(problem, machine, asked.lost)
 
 
 def _propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRecipe]:

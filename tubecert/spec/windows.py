@@ -80,12 +80,6 @@ def check_windows(
             f"{at.path} beside a number that is to be largest",
             "give the number, or leave the windows out: each candidate would need windows of its own",
         )
-    elif machine is not None and machine.arithmetic is not None:
-        at.fail(
-            codes.RANGE,
-            f"{at.path} beside hardware.arithmetic: rounding is covered in one window only",
-            "leave one of the two out",
-        )
     elif machine is not None and machine.geodesic is not None:
         at.fail(
             codes.RANGE,
@@ -144,7 +138,7 @@ def more_windows(spec: Spec) -> int | None:
     machine, plan, tube, wind = spec.hardware, spec.trajectory, spec.tube, spec.disturbance
     if machine is None or plan.horizon is None or plan.kind in ("equilibrium", "any") or tube.auto:
         return None
-    if machine.largest is not None or machine.arithmetic is not None or machine.geodesic is not None:
+    if machine.largest is not None or machine.geodesic is not None:
         return None
     if wind is not None and wind.bound is None:
         return None

@@ -36,12 +36,12 @@ def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Inte
         return nothing, nothing
     if not problem.machine.clips_within(problem.constants.h, recipe.clip_radius):
         return nothing, nothing
-    inexact = recipe.rounding or problem.machine.asked.geodesic is not None
-    # theorems H-R and H-G are for one window, a known B
-    if inexact and (problem.gain is not None or problem.machine.windows or recipe.windows):
+    several, computed = problem.machine.windows or recipe.windows, problem.machine.asked.geodesic is not None
+    # theorems HW, H-R and H-G are stated for a known B, and H-G for one window
+    if problem.gain is not None and (several or computed or recipe.rounding):
         return nothing, nothing
-    if problem.machine.windows or recipe.windows:
-        if problem.gain is not None:  # theorem HW is stated for a known B
+    if several:
+        if computed:
             return nothing, nothing
         return _margins_in_windows(problem, recipe)
     x = evaluated(plant(problem, recipe.clip_radius), loop_of(recipe))

@@ -154,10 +154,12 @@ def over(problem: TubeProblem, window: Window) -> TubeProblem:
     machine, wind = problem.machine, problem.wind
     if machine is None:
         raise ValueError("windows are those of a machine")
-    half = window.radius / 2
+    half, constants = window.radius / 2, window.constants
+    if machine.asked.arithmetic is not None:  # what exported code cuts its feedback by is du of the whole tube
+        constants = replace(constants, feedback_gain=problem.constants.feedback_gain)
     return replace(
         problem,
-        constants=window.constants,
+        constants=constants,
         machine=replace(
             machine,
             constants=window.machine,

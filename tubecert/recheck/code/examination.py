@@ -141,8 +141,6 @@ def _losses(code: Code, formulas: Formulas) -> Iterator[Allowed]:
     allowed = formulas.recipe.losses
     if allowed is None:
         return
-    if formulas.recipe.windows:
-        raise UnreadError("windows have no bound of rounding here")
     found = lost_by(code, about(formulas))
     for name in ("feedback", "input", "estimate"):
         most: Ball = getattr(found, name)
