@@ -155,7 +155,7 @@ def over(problem: TubeProblem, window: Window) -> TubeProblem:
     if machine is None:
         raise ValueError("windows are those of a machine")
     half, constants = window.radius / 2, window.constants
-    if machine.asked.arithmetic is not None:  # what exported code cuts its feedback by is du of the whole tube
+    if machine.asked.arithmetic is not None:  # exported code cuts its feedback by du of the whole tube
         constants = replace(constants, feedback_gain=problem.constants.feedback_gain)
     return replace(
         problem,
