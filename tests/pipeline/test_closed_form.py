@@ -15,10 +15,15 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from tubecert.library.trading import better_machines
 from tubecert.pipeline import Options, certification, certify, design
+from tubecert.pipeline.sensitivities import sensitivities
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.search import hardware
 from tubecert.spec import load_text
+from tubecert.spec.load import load_source
+from tubecert.spec.source import Source
+from tubecert.stages.memory import Memory
 from tubecert.stages.result import Explanation
 
 UNSHRUNK = (Phase.explicit, Phase.reuse, Phase.generate)  # an example costs half a second to two
@@ -144,6 +149,38 @@ def test_no_grid_of_tubes_and_filters_finds_a_narrower_tube_than_the_design(mach
     else:
         assert found.best.size <= min(fit, default=np.inf) * (1 + TOLERANCE)
         assert found.best.size >= unavoidable(machine)
+
+
+@pytest.mark.slow
+def test_what_a_better_machine_buys_is_what_the_closed_form_says():
+    own = {"h": Fraction(1, 4), "h_t": 1, "Ts": Fraction(1, 20), "tau": Fraction(1, 40)}
+    own |= {"noise": Fraction(1, 100), "wind": Fraction(1, 10)}
+    spec, memory = at(own, Fraction(1)), Memory()
+    changed = {
+        ("noise", True): {"noise": Fraction(0)},
+        ("wind", True): {"wind": Fraction(0)},
+    }
+    machines = [each for each in better_machines(spec, str) if (each.part, each.gone) in changed]
+    assert len(machines) == len(changed)
+    with quick():
+        found = design.narrowest(lambda scale: at(own, scale), ALONE, RADIUS, memory=memory)
+        buys = sensitivities(
+            found,
+            lambda scale, better: load_source(
+                Source.of("linear.yaml", LINEAR.format(radius=scale / 2, **own)), better.settings
+            ),
+            machines,
+            options=ALONE,
+            measure=RADIUS,
+            memory=memory,
+        )
+    for each in buys:
+        other = own | changed[each.better.part, each.better.gone]
+        levels = [(radius, least(other, radius)) for radius in np.geomspace(0.01, 2, 60)]
+        fit = min(level for radius, level in levels if level + float(other["noise"]) < radius)
+        assert fit < 0.7 * found.best.size, "there is something to buy"
+        assert each.size == pytest.approx(fit, rel=0.01)
+        assert each.size >= unavoidable(other)
 
 
 def test_the_closed_form_would_notice():

@@ -89,6 +89,7 @@ def test_on_a_front_every_dot_is_a_certificate_and_a_wider_tube_allows_more(tmp_
         (("--corridor", "y=0.2"), "y"),
         (("--corridor", "x="), "no list STATE=WIDTH"),
         (("--corridor", "-1"), "not positive"),
+        (("--corridor", "1", "--sensitivities"), "those of the narrowest tube"),
         (("--corridor", "x=0.2", "--set", "hardware.sample_time=largest"), "a rate and a sample time"),
     ],
 )

@@ -45,6 +45,7 @@ class Given:
     minimise: str | None
     corridor: str | None
     pareto: str | None
+    sensitivities: bool
     settings: Sequence[str]
     metric: str | None
     gap: str
@@ -64,7 +65,7 @@ def run(given: Given, output: Output) -> ExitCode:
     spare(target, {"specification": given.spec, "metric file": file})
     fixed = settings_of(given.settings, metric=given.metric)
     first = load_source(read_source(given.spec), fixed)
-    from tubecert.library.designing import narrowed, opened
+    from tubecert.library.designing import improved, narrowed, opened
 
     default = pipeline.Options()
     options = pipeline.Options(gap=gap or default.gap, budget=budget or default.budget)
@@ -82,16 +83,20 @@ def run(given: Given, output: Output) -> ExitCode:
         )
         if given.corridor is not None or given.pareto is not None:
             return _traded(given, asked, target, output)
-        found = narrowed(asked)
+        memory = pipeline.Memory()
+        found = narrowed(asked, memory)
+        better = improved(found, asked, memory) if given.sensitivities else ()
     text = _sealed(found)
     if text is not None:
         certificate.write_text(target, text)
     written = None if text is None else visible(target)
-    data = printable_json(json.dumps(to_json(told.as_data(found)), indent=1, ensure_ascii=False)) + "\n"
+    data = (
+        printable_json(json.dumps(to_json(told.as_data(found, better)), indent=1, ensure_ascii=False)) + "\n"
+    )
     present(
         output,
         told.summary(first, found),
-        lambda: told.report(first, found, written),
+        lambda: told.report(first, found, written, better),
         data if output.json else None,
     )
     return found.shown.result.verdict.exit_code
@@ -110,6 +115,10 @@ def _traded(given: Given, asked: Asked, target: str, output: Output) -> ExitCode
     kept = Kept(target=target, seal=_certificate)
     if given.corridor is not None and given.pareto is not None:
         raise refused("--corridor", "it is beside --pareto", "give one of the two")
+    if given.sensitivities:
+        raise refused(
+            "--sensitivities", "they are those of the narrowest tube", "leave --corridor and --pareto out"
+        )
     if given.corridor is not None:
         return corridor(given.corridor, asked, kept, output)
     return pareto(given.pareto or "", asked, kept, output)

@@ -61,6 +61,13 @@ def design(
             show_default=False,
         ),
     ] = None,
+    sensitivities: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivities",
+            help="What the tube becomes with each number of the machine halved, and taken away.",
+        ),
+    ] = False,
     set_: Settings = None,
     metric: Annotated[
         str | None,
@@ -87,6 +94,7 @@ def design(
             minimise=minimise,
             corridor=corridor,
             pareto=pareto,
+            sensitivities=sensitivities,
             settings=set_ or (),
             metric=metric,
             gap=gap,

@@ -27,6 +27,7 @@ from tubecert.library.trading import (
     PARETO,
     TUBE,
     Asked,
+    better_machines,
     corridor_settings,
     largest,
     parts_of,
@@ -37,6 +38,8 @@ from tubecert.pipeline import Options
 from tubecert.pipeline.design import Design as Attempts
 from tubecert.pipeline.design import narrowest
 from tubecert.pipeline.metric_search import search
+from tubecert.pipeline.sensitivities import Sensitivity
+from tubecert.pipeline.sensitivities import sensitivities as sensitivities_of
 from tubecert.pipeline.trade import Front, Offer, cheapest, front
 from tubecert.pipeline.width import Measure, measure_in, measure_of
 from tubecert.printable import visible
@@ -45,6 +48,7 @@ from tubecert.report.progress import timed
 from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source
+from tubecert.stages.memory import Memory
 
 SEARCH: Final = "search"
 
@@ -54,6 +58,7 @@ def design(
     *,
     minimise: Sequence[str] | None = None,
     metric: MetricLike | None = None,
+    sensitivities: bool = False,
     gap: Number | None = None,
     budget: int | None = None,
     progress: Progress | None = None,
@@ -61,7 +66,8 @@ def design(
     """The narrowest certified tube for the machine of a specification: `tubecert design`.
 
     `minimise`: the states and outputs whose half-widths count, without it those of `tube.half_widths`, or the radius.
-    `metric` stands in for the specification's own; `"search"` looks for one for this machine. Raises `SpecError`.
+    `metric` stands in for the specification's own; `"search"` looks for one for this machine. `sensitivities`: what the
+    tube becomes with each number of the machine halved, and taken away. Raises `SpecError`.
     """
     found: list[Mapping[str, object]] = []
 
@@ -72,7 +78,12 @@ def design(
     asked = opened(
         spec_of(spec), _options(gap, budget), minimise, metric, named=str, keep=keep, progress=timed(progress)
     )
-    return Design(spec=asked.load(()), found=narrowed(asked), metric=found[0] if found else None)
+    memory = Memory()
+    attempts = narrowed(asked, memory)
+    better = improved(attempts, asked, memory) if sensitivities else ()
+    return Design(
+        spec=asked.load(()), found=attempts, sensitivities=better, metric=found[0] if found else None
+    )
 
 
 def machines(
@@ -190,11 +201,25 @@ def _merged(fixed: Sequence[Setting], settings: Sequence[Setting]) -> list[Setti
     return [*found, *left]
 
 
-def narrowed(asked: Asked) -> Attempts:
+def narrowed(asked: Asked, memory: Memory | None = None) -> Attempts:
     """Every attempt at the narrowest tube."""
     first = asked.load(())
     return narrowest(
-        lambda scale: asked.load(_scaled(first, scale)), asked.options, asked.measure, asked.progress
+        lambda scale: asked.load(_scaled(first, scale)), asked.options, asked.measure, asked.progress, memory
+    )
+
+
+def improved(found: Attempts, asked: Asked, memory: Memory) -> tuple[Sensitivity, ...]:
+    """What a better machine would make of the narrowest tube; `memory` is that of the design."""
+    first = asked.load(())
+    return sensitivities_of(
+        found,
+        lambda scale, better: asked.load([*_scaled(first, scale), *better.settings]),
+        better_machines(first, asked.named),
+        options=asked.options,
+        measure=asked.measure,
+        memory=memory,
+        progress=asked.progress,
     )
 
 
@@ -203,7 +228,7 @@ def offered(words: str, asked: Asked) -> tuple[Spec, tuple[Offer, ...]]:
     tube = corridor_settings(words, asked)
     spec = asked.load(tube)
     found = cheapest(
-        lambda part: asked.load([*tube, largest(spec, part)]),
+        lambda part: asked.load([*tube, *largest(spec, part)]),
         parts_of(spec, asked.named),
         asked.options,
         asked.progress,
@@ -219,7 +244,7 @@ def fronted(words: str, asked: Asked) -> tuple[Spec, Front]:
         message = f"{key} is no single number of this machine"
         raise refused(asked.named(PARETO), message, "see docs/design.md")
     found = front(
-        lambda scale: asked.load([*_scaled(spec, scale), largest(spec, part)]),
+        lambda scale: asked.load([*_scaled(spec, scale), *largest(spec, part)]),
         part,
         asked.measure,
         asked.options,

@@ -17,6 +17,7 @@ from tubecert.libraries import versions
 from tubecert.library.certification import Certification, certification_of
 from tubecert.pipeline.design import Attempt as Tried
 from tubecert.pipeline.design import Design as Attempts
+from tubecert.pipeline.sensitivities import Sensitivity
 from tubecert.pipeline.trade import Front, Offer
 from tubecert.printable import visible
 from tubecert.report import design as told
@@ -48,12 +49,13 @@ class Design:
     """The narrowest tube for a machine: every attempt in the order in which they were made.
 
     `metric` is the metric that was found for it, as a mapping that `tc.certify` takes; None where none was looked for,
-    or the specification's own is better.
+    or the specification's own is better. `sensitivities`: the tubes of better machines, where they were asked for.
     """
 
     spec: Spec = field(repr=False)
     found: Attempts = field(repr=False)
     metric: Mapping[str, object] | None = field(default=None, repr=False)
+    sensitivities: tuple[Sensitivity, ...] = ()
 
     @property
     def attempts(self) -> tuple[Attempt, ...]:

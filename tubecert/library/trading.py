@@ -18,6 +18,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding
 from tubecert.library.asked import Named
 from tubecert.library.numbers import Numbers
+from tubecert.pipeline.sensitivities import Better, Part
 from tubecert.printable import visible
 from tubecert.records import Json
 from tubecert.spec.canonical import hardware_data
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 CORRIDOR: Final = "corridor"
 PARETO: Final = "pareto"
+SENSITIVITIES: Final = "sensitivities"
 QUANTITIES: Final[Mapping[str, HardwarePart]] = {
     "hardware.rate": "sample_time",
     "hardware.delay": "delay",
@@ -85,12 +87,65 @@ def parts_of(spec: Spec, named: Named) -> list[HardwarePart]:
     return parts
 
 
-def largest(spec: Spec, part: HardwarePart) -> Setting:
-    """The setting that asks for the largest value of a part, the rest of the machine being as it is."""
+def largest(spec: Spec, part: HardwarePart) -> list[Setting]:
+    """The settings that ask for the largest value of a part, the rest of the machine being as it is."""
     if part == "wind":
-        return Setting(path="disturbance.bound", text=LARGEST)
+        return [Setting(path="disturbance.bound", text=LARGEST)]
+    return _machine(spec, {part: LARGEST})
+
+
+def _machine(spec: Spec, changed: Mapping[str, Json], limits: Fraction = Fraction(1)) -> list[Setting]:
+    """The whole machine, with what is changed; limits, which may stand in its section, in their own, so many times."""
     machine = {} if spec.hardware is None else hardware_data(spec, spec.hardware)
-    return Setting(path="hardware", text=_flow({**machine, part: LARGEST}))
+    found = [Setting(path="hardware", text=_flow({**machine, **changed}))]
+    return [*found, _limits(spec, limits)] if spec.limits else found
+
+
+def _limits(spec: Spec, factor: Fraction) -> Setting:
+    """The limits of the inputs, so many times as wide about their middles."""
+    ends = {}
+    for name, (low, high) in spec.limits:
+        middle, half = (low + high) / 2, (high - low) / 2 * factor
+        ends[name] = f"[{number_text(middle - half)}, {number_text(middle + half)}]"
+    return Setting(path="limits", text=_flow(ends))
+
+
+def better_machines(spec: Spec, named: Named) -> list[Better]:
+    """The machine with each of its numbers halved, and taken away; raises `SpecError` without a machine.
+
+    Of the sample time a hundredth is left, or the delay, which it cannot be below. Limits are doubled, and a thousand
+    times as wide.
+    """
+    own, wind, found = spec.hardware, spec.disturbance, []
+    if own is None or own.largest is not None or (wind is not None and wind.bound is None):
+        help = "give every number of the machine"
+        raise refused(named(SENSITIVITIES), "the machine is not given by numbers", help)
+
+    def add(part: Part, settings: Callable[[Fraction], list[Setting]], least: Fraction = Fraction(0)) -> None:
+        for gone, factor in ((False, Fraction(1, 2)), (True, least)):
+            found.append(Better(part=part, gone=gone, settings=tuple(settings(factor))))
+
+    Ts, delay, noise = own.sample_time, own.delay, own.noise
+    if Ts is not None:
+        least = max(Ts / 100, delay or Fraction(0)) / Ts
+        add("sample_time", lambda k: _machine(spec, {"sample_time": number_text(Ts * k)}), least)
+        if own.one_sample or delay:
+            now = Ts if delay is None else delay
+            add("delay", lambda k: _machine(spec, {"delay": number_text(now * k)}))
+    if isinstance(noise, tuple):
+        sizes = dict(zip(spec.states, noise, strict=True))
+        add(
+            "noise",
+            lambda k: _machine(spec, {"noise": {x: number_text(size * k) for x, size in sizes.items()}}),
+        )
+    elif noise:
+        add("noise", lambda k: _machine(spec, {"noise": number_text(noise * k)}))
+    if wind is not None and wind.bound:
+        bound = wind.bound
+        add("wind", lambda k: [Setting(path="disturbance.bound", text=number_text(bound * k))])
+    if spec.limits:
+        add("limits", lambda k: _machine(spec, {}, 1 / k), Fraction(1, 1000))
+    return found
 
 
 def corridor_settings(words: str, asked: Asked) -> list[Setting]:

@@ -12,6 +12,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
 | `design`, `trade`, `width` | the narrowest tube, what a tube asks of a machine |
+| `sensitivities` | what a better machine would make of the narrowest tube |
 | `metric_search`, `joint` | a metric for a machine: constant, and one that moves |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """

@@ -76,9 +76,10 @@ def narrowest(
     options: Options,
     measure: Measure,
     progress: Progress | None = None,
+    memory: Memory | None = None,
 ) -> Design:
     """The narrowest tube by a measure, among those of every size."""
-    memory = Memory()
+    memory = Memory() if memory is None else memory
     attempts: dict[Fraction, Attempt] = {}
 
     def attempt(scale: Fraction) -> Attempt:

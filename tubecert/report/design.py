@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from rich.text import Text
 
 from tubecert.claims.family import Reason
 from tubecert.claims.gains import ConditionHolds
-from tubecert.digits import exact, percent, up
+from tubecert.digits import exact, near, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
 from tubecert.report import reach, sections
@@ -19,11 +20,13 @@ from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
+from tubecert.words.machine import PARTS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.pipeline.design import Attempt, Design
+    from tubecert.pipeline.sensitivities import Sensitivity
     from tubecert.spec import Spec
 
 
@@ -33,7 +36,9 @@ def summary(spec: Spec, found: Design) -> Text:
     return verdict_line(found.shown.result)
 
 
-def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType]:
+def report(
+    spec: Spec, found: Design, target: str | None, better: Sequence[Sensitivity] = ()
+) -> list[RenderableType]:
     """The best, or what stops the one that comes nearest; then every attempt."""
     parts: list[RenderableType] = [summary(spec, found)]
     best = found.best
@@ -44,6 +49,8 @@ def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType
     else:
         nearest = f"{exact(found.shown.scale)} times as wide as the specification's comes nearest"
         parts += titled("Not certified", [Text(f"{nearest}:"), *sections.failures(found.shown.result)])
+    if better:
+        parts += titled("What a better machine would buy", _bought(found, better))
     table = plain_table(">scale", "verdict", ">proven size", ">used", "what stops it", wrapped=4)
     for each in sorted(found.attempts, key=lambda each: each.scale):
         mark = " *" if each is found.shown else ""
@@ -59,6 +66,31 @@ def report(spec: Spec, found: Design, target: str | None) -> list[RenderableType
     if target is not None:
         parts += [Text(), Text(f"certificate {target}")]
     return parts
+
+
+def _bought(found: Design, better: Sequence[Sensitivity]) -> list[RenderableType]:
+    """The tube with half of every number, and with none of it."""
+    table = plain_table("what", ">half", ">share", ">none", ">share")
+    for part in dict.fromkeys(each.better.part for each in better):
+        by_kind = {each.better.gone: each for each in better if each.better.part == part}
+        cells = [cell for gone in (False, True) for cell in _size(found, by_kind.get(gone))]
+        table.add_row(PARTS[part], *cells)
+    words = (
+        "The proven size of the tube, and its share of the one above, with one number changed alone. Each was "
+        "certified on the way, in a few sizes; none is written: design with the settings that --json has does "
+        "it. None of the sample time: a hundredth, or the delay; limits are twice, and a thousand times, as wide."
+    )
+    return [table, Text(words, style="dim")]
+
+
+def _size(found: Design, each: Sensitivity | None) -> tuple[str, str]:
+    """A size, and its share of the best one."""
+    if each is None:
+        return "", ""
+    if each.size is None:
+        return "none proven", ""
+    own = None if found.best is None else found.best.size
+    return up(each.size), "" if not own else near(each.size / own, 3)
 
 
 def _used(each: Attempt) -> str:
@@ -95,13 +127,36 @@ class DesignData:
 
     best: str | None
     attempts: tuple[AttemptData, ...]
+    sensitivities: tuple[SensitivityData, ...] = ()
 
 
-def as_data(found: Design) -> DesignData:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensitivityData:
+    """The tube with one part of the machine better: halved, or `gone`; the settings that say so."""
+
+    part: str
+    gone: bool
+    size: float | None
+    scale: str | None
+    settings: tuple[str, ...]
+
+
+def as_data(found: Design, better: Sequence[Sensitivity] = ()) -> DesignData:
     """Every attempt, for programs."""
     return DesignData(
         best=None if found.best is None else str(found.best.scale),
         attempts=tuple(map(_attempt, found.attempts)),
+        sensitivities=tuple(map(_sensitivity, better)),
+    )
+
+
+def _sensitivity(each: Sensitivity) -> SensitivityData:
+    return SensitivityData(
+        part=each.better.part,
+        gone=each.better.gone,
+        size=each.size,
+        scale=None if each.scale is None else str(each.scale),
+        settings=tuple(map(str, each.better.settings)),
     )
 
 

@@ -20,9 +20,10 @@ CAUSES: Mapping[HardwareCause | str, str] = {
     "geodesic": "geodesics that are computed at a few nodes",
 }
 
-PARTS: Mapping[HardwarePart, str] = {
+PARTS: Mapping[HardwarePart | str, str] = {
     "sample_time": "the sample time",
     "delay": "the delay",
     "noise": "the noise",
     "wind": "the wind",
+    "limits": "the limits of the inputs",
 }
