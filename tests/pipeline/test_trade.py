@@ -16,9 +16,11 @@ from typer.testing import CliRunner
 
 from tubecert import certificate
 from tubecert.cli.app import app
-from tubecert.pipeline import Options, certify, design, trade
+from tubecert.pipeline import Options, certify, design, sensitivities, trade
 from tubecert.pipeline.width import Measure
-from tubecert.spec import load_text
+from tubecert.spec import Setting, load_text
+from tubecert.spec.load import load_source
+from tubecert.spec.source import read_source
 from tubecert.verdict import Verdict
 
 
@@ -77,6 +79,26 @@ def test_on_a_front_every_dot_is_a_certificate_and_a_wider_tube_allows_more(tmp_
     assert failing(examine(last)) == []
     assert (tmp_path / "f.csv").read_text(encoding="utf-8").count("\n") == len(front) + 1
     assert "<svg" in (tmp_path / "f.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("barely")
+@pytest.mark.slow
+def test_sensitivities_are_told_and_their_settings_give_the_tube_again(tmp_path, monkeypatch):
+    for name in ("_FARTHEST", "_NARROWINGS"):
+        monkeypatch.setattr(design, name, 0)
+    monkeypatch.setattr(sensitivities, "_NARROWINGS", 1)
+    spec = written(tmp_path / "s.yaml", SCALAR.replace("0.001", "0.05"))
+    done = run(spec, "--sensitivities", "--json", "-o", tmp_path / "d.json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    buys = {(each["part"], each["gone"]): each for each in told["sensitivities"]}
+    assert list(buys) == [(part, gone) for part in ("sample_time", "noise") for gone in (False, True)]
+    quiet = buys["noise", True]
+    assert quiet["size"] < buys["noise", False]["size"] < told["attempts"][0]["size"]
+    scale = float(Fraction(quiet["scale"])) / 2
+    settings = [*quiet["settings"], f"tube.epsilon={scale}", f"tube.rho_a={scale}"]
+    again = load_source(read_source(str(spec)), [Setting.of(each) for each in settings])
+    assert design.size_of(certify(again, Options()), Measure(units={})) == quiet["size"]
 
 
 @pytest.mark.parametrize(
