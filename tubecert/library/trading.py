@@ -7,7 +7,7 @@ is the largest; what may be traded.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
@@ -24,6 +24,7 @@ from tubecert.records import Json
 from tubecert.spec.canonical import hardware_data
 from tubecert.spec.hardware import LARGEST
 from tubecert.spec.override import Setting
+from tubecert.spec.types import Hardware
 
 if TYPE_CHECKING:
     from tubecert.pipeline import Options
@@ -89,15 +90,19 @@ def parts_of(spec: Spec, named: Named) -> list[HardwarePart]:
 
 def largest(spec: Spec, part: HardwarePart) -> list[Setting]:
     """The settings that ask for the largest value of a part, the rest of the machine being as it is."""
-    if part == "wind":
+    own = spec.hardware
+    if part == "wind" or own is None:
         return [Setting(path="disturbance.bound", text=LARGEST)]
-    return _machine(spec, {part: LARGEST})
+    if part == "sample_time":
+        return _machine(spec, replace(own, sample_time=None, largest=part))
+    if part == "delay":
+        return _machine(spec, replace(own, delay=None, one_sample=False, largest=part))
+    return _machine(spec, replace(own, noise=None, largest=part))
 
 
-def _machine(spec: Spec, changed: Mapping[str, Json], limits: Fraction = Fraction(1)) -> list[Setting]:
-    """The whole machine, with what is changed; limits, which may stand in its section, in their own, so many times."""
-    machine = {} if spec.hardware is None else hardware_data(spec, spec.hardware)
-    found = [Setting(path="hardware", text=_flow({**machine, **changed}))]
+def _machine(spec: Spec, own: Hardware, limits: Fraction = Fraction(1)) -> list[Setting]:
+    """A whole machine; limits of inputs, which may stand in its section, in their own, so many times as wide."""
+    found = [Setting(path="hardware", text=_flow(hardware_data(spec, own)))]
     return [*found, _limits(spec, limits)] if spec.limits else found
 
 
@@ -128,23 +133,19 @@ def better_machines(spec: Spec, named: Named) -> list[Better]:
     Ts, delay, noise = own.sample_time, own.delay, own.noise
     if Ts is not None:
         least = max(Ts / 100, delay or Fraction(0)) / Ts
-        add("sample_time", lambda k: _machine(spec, {"sample_time": number_text(Ts * k)}), least)
-        if own.one_sample or delay:
-            now = Ts if delay is None else delay
-            add("delay", lambda k: _machine(spec, {"delay": number_text(now * k)}))
+        add("sample_time", lambda k: _machine(spec, replace(own, sample_time=Ts * k)), least)
+        now = Ts if delay is None else delay
+        if now:
+            add("delay", lambda k: _machine(spec, replace(own, delay=now * k, one_sample=False)))
     if isinstance(noise, tuple):
-        sizes = dict(zip(spec.states, noise, strict=True))
-        add(
-            "noise",
-            lambda k: _machine(spec, {"noise": {x: number_text(size * k) for x, size in sizes.items()}}),
-        )
+        add("noise", lambda k: _machine(spec, replace(own, noise=tuple(size * k for size in noise))))
     elif noise:
-        add("noise", lambda k: _machine(spec, {"noise": number_text(noise * k)}))
+        add("noise", lambda k: _machine(spec, replace(own, noise=noise * k)))
     if wind is not None and wind.bound:
         bound = wind.bound
         add("wind", lambda k: [Setting(path="disturbance.bound", text=number_text(bound * k))])
     if spec.limits:
-        add("limits", lambda k: _machine(spec, {}, 1 / k), Fraction(1, 1000))
+        add("limits", lambda k: _machine(spec, own, 1 / k), Fraction(1, 1000))
     return found
 
 
