@@ -19,6 +19,9 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # as the tool has it: some test imports numba before the tool does, and a third more of compilation would be for nothing
 os.environ.setdefault("NUMBA_OPT", "1")
+gc.set_threshold(
+    50_000, 20, 50
+)  # little of what tests make is in cycles, and looking for it costs a twentieth
 gc.disable()  # thousands of tests are collected, and none of them is garbage
 
 

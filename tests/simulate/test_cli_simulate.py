@@ -152,6 +152,7 @@ def test_runs_do_not_depend_on_their_batches(monkeypatch):
     np.testing.assert_array_equal(whole.runs.worst.distance.value, parts.runs.worst.distance.value)
 
 
+@pytest.mark.slow
 def test_interruption_keeps_what_is_finished(files, monkeypatch):
     monkeypatch.setattr(sampling, "BATCH", 2)
     real, calls = sampling.integrate, []
@@ -171,6 +172,7 @@ def test_interruption_keeps_what_is_finished(files, monkeypatch):
     assert "4 of 9" in result.stdout
 
 
+@pytest.mark.slow
 def test_interrupted_writing_leaves_no_summary_of_earlier_files(files, monkeypatch):
     assert command("--runs", "0").exit_code == 0
 
@@ -254,6 +256,7 @@ def test_radii_belong_to_the_certificate():
     assert "a certificate has its own epsilon and rho_a" in result.output
 
 
+@pytest.mark.slow
 def test_an_uncertainty_outside_its_class_ends_the_command(files):
     (files / "flat.yaml").write_text(FLAT + 'simulation: {h: ["0.3*sin(t)"]}\n')
     result = command("--runs", "0", "--controllers", "l1")

@@ -336,6 +336,7 @@ def test_steps_have_order_four(controller, B, rate, least):
     assert order > least, (order, errors)
 
 
+@pytest.mark.slow
 def test_steps_far_longer_than_the_oscillation_are_accurate():
     """Gamma 1e10 turns 6000 rad in the longest step; the error is that of the slow part."""
     gains = LoopGains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=1e10)
@@ -424,6 +425,7 @@ def test_held_controllers_converge_to_the_continuous_ones(controller):
     assert errors[1] < 0.02
 
 
+@pytest.mark.slow
 def test_the_projection_holds_under_a_control_rate():
     gains = LoopGains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
     case = problem("l1", gains=gains, control_rate=200.0, K=41)
@@ -431,6 +433,7 @@ def test_the_projection_holds_under_a_control_rate():
     assert 0.99 < np.abs(found.sigma_hat).max() <= 1 + 1e-12
 
 
+@pytest.mark.slow
 def test_lanes_do_not_know_each_other():
     """Many lanes give what each gives alone, whatever the others do; a diverging one is stopped and named."""
     rng = np.random.default_rng(1)
@@ -475,6 +478,7 @@ UNSTABLE = ControlAffineModel(
 )
 
 
+@pytest.mark.slow
 def test_disturbances_are_what_they_say():
     """h at the output times, recomputed from its parts."""
     d = Disturbance(
@@ -504,6 +508,7 @@ def test_disturbances_are_what_they_say():
     assert 0 < clipped < 9
 
 
+@pytest.mark.slow
 def test_errors_are_measured_in_the_coordinates_of_the_tube():
     """A narrow tube in one state asked for its own accuracy of all states, in whatever unit these are."""
     S = np.array([[30.0, 0.0], [2.0, 0.5]])

@@ -78,6 +78,7 @@ def test_distances_of_the_hyperbolic_plane_converge_with_the_degree():
     assert errors[3] < 1e-11
 
 
+@pytest.mark.slow
 def test_short_geodesics_are_found_with_the_order_of_their_degree():
     """Halving the distance gains 2^order: with degree 5 at least 2^6 relative to the energy."""
     direction = np.array([0.6, 0.5])
@@ -89,6 +90,7 @@ def test_short_geodesics_are_found_with_the_order_of_their_degree():
     assert np.log2(errors[0] / errors[1]) > 4, errors
 
 
+@pytest.mark.slow
 def test_the_first_variation_is_the_covector():
     """dE/dq = 2 M gamma_s(1), dE/dp = -2 M gamma_s(0)."""
     p, q = np.array([0.02, -0.05, 0.03]), np.array([-0.06, 0.08, 0.05])
@@ -101,6 +103,7 @@ def test_the_first_variation_is_the_covector():
         assert by_p == pytest.approx(-2 * found.covectors[0][i], rel=1e-6, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_three_state_geodesics_satisfy_their_differential_equation():
     """Shooting along Hamilton's equations x' = W m, m' = -1/2 d(m'W m)/dx from the covector found hits the end."""
     spec = [np.array(part, dtype=float) for part in _coefficients()]
@@ -131,6 +134,7 @@ def _coefficients():
     return constant_part, linear, square
 
 
+@pytest.mark.slow
 def test_warm_starts_are_guarded():
     """Nonsense left in the memory changes nothing: nan, infinite, or a much longer curve."""
     space, memory = metric(HALF_PLANE)
@@ -143,6 +147,7 @@ def test_warm_starts_are_guarded():
         assert again.energy == pytest.approx(clean.energy, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_geodesics_that_cannot_be_found_are_refused():
     broken = model([[1 - X, 0], [0, 1]])  # not positive definite beyond x = 1
     refused = solved(broken, [0, 0], [1.5, 0])
@@ -156,6 +161,7 @@ def test_geodesics_that_cannot_be_found_are_refused():
     assert REASONS[UNRESOLVED]
 
 
+@pytest.mark.slow
 def test_no_geodesic_is_longer_than_the_segment():
     rng = np.random.default_rng(5)
     space, memory = metric(THREE)

@@ -237,6 +237,7 @@ ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
 NOISE = {"choice": 1.0, "table": [[1e-3]]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [1, 7, 400])
 def test_noise_telescopes_and_the_bound_is_attained(period):
     """(H.7): a change of sign costs all of 2 th DBp nbar/Ts, not more where there are many; D_pf nbar is far below."""
@@ -247,6 +248,7 @@ def test_noise_telescopes_and_the_bound_is_attained(period):
     assert 0.99 < share <= 1 + 1e-3
 
 
+@pytest.mark.slow
 def test_noise_within_its_rate():
     """A change of sign takes 40 ms then: to the filter of 20 rad/s it is a disturbance of that rate."""
     machine = MachineRun(sample_time=1e-3, delay=0.0, bandwidth=20.0, radius=10.0)
@@ -254,6 +256,7 @@ def test_noise_within_its_rate():
     assert found.worst.estimate.value[0] == pytest.approx(0.05 * (1 - np.exp(-0.8)), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_estimate_is_clipped_before_it_acts():
     """q goes on to follow h, what acts is within the box."""
     machine = MachineRun(sample_time=1e-2, delay=0.0, bandwidth=50.0, box=np.array([[-0.1], [0.4]]))
@@ -263,6 +266,7 @@ def test_the_estimate_is_clipped_before_it_acts():
     assert found.u_a.min() == -found.sigma_hat.max()
 
 
+@pytest.mark.slow
 def test_a_signal_moves_at_its_rate_and_is_known_a_sample_late():
     """h = s1 t: without a filter q_k is its mean over the last sample, so |h - q^| = s1 (Ts + tau + Ts/2) at last."""
     machine = MachineRun(sample_time=1e-2, delay=1e-2, bandwidth=np.inf, radius=10.0)
@@ -272,6 +276,7 @@ def test_a_signal_moves_at_its_rate_and_is_known_a_sample_late():
     assert found.worst.estimate.value[0] == pytest.approx(0.5 * 0.5e-2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_noise_that_costs_most_is_found():
     """x' = u - x/100 from x = .5: kappa(y) = -(1 - 1/100) y, and c'kappa is largest where y is least."""
     machine = MachineRun(sample_time=1e-2, delay=0.0, bandwidth=1e-6, radius=10.0)

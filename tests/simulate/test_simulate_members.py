@@ -89,6 +89,7 @@ def test_plans_differ_and_can_be_repeated():
     assert member(drawing, 0, 0).data == first.data
 
 
+@pytest.mark.slow
 def test_a_family_whose_plans_cannot_be_kept_to_is_told(monkeypatch):
     monkeypatch.setattr(members, "_STARTS", 2)
     monkeypatch.setattr(members, "_AGAIN", 3)

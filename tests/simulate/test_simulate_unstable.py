@@ -74,6 +74,7 @@ def test_the_least_rate_is_where_growth_begins():
     assert least_rate(np.eye(2), B, 1.0, 1.0) == np.inf
 
 
+@pytest.mark.slow
 def test_an_adaptation_that_bounces_is_given_up_early():
     """Every level of steps gives another run: the integrator went on to 2^14 times as many steps."""
     found = run(loop())
@@ -86,6 +87,7 @@ def test_an_adaptation_that_bounces_is_given_up_early():
     assert np.isnan(stable.unresolved[0])
 
 
+@pytest.mark.slow
 def test_a_state_beyond_the_limit_is_not_followed():
     """At 0.1 Hz nothing stabilises x1'' = 9 x1: |x - x*| grows like e^(3 t)."""
     free = (Y, 9 * X)
@@ -101,6 +103,7 @@ def test_a_state_beyond_the_limit_is_not_followed():
     assert np.log(200 / 2) / 3 == pytest.approx(ends[1] - ends[0], rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_state_that_is_no_number_is_not_followed():
     found = run(loop("ccm"), start=(np.nan, 0.0))
     (failure,) = found.failures
@@ -125,6 +128,7 @@ def words_of(campaign):
     )
 
 
+@pytest.mark.slow
 def test_an_adaptation_that_is_unstable_at_its_rate_is_told_and_not_attacked():
     where = setting("flat")
     thin = thinner(where, 9)
@@ -144,6 +148,7 @@ def test_an_adaptation_that_is_unstable_at_its_rate_is_told_and_not_attacked():
     assert loop_of(where, "ccm", Choice(), Fraction(1)).caution == ""
 
 
+@pytest.mark.slow
 def test_when_the_tube_is_left_is_told():
     where = setting("flat")
     steep = thinner(where, 50)
@@ -159,6 +164,7 @@ def test_when_the_tube_is_left_is_told():
     assert "first at t = " in words
 
 
+@pytest.mark.slow
 def test_a_run_in_the_tube_has_no_exit():
     where = setting("flat")
     found = simulate(where, [loop_of(where, "l1", Choice())], count=0, seed=0)

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from tubecert.errors import TubecertError
@@ -52,10 +53,18 @@ def wrong(code: str, message: str, help: str = "", location: Location | None = N
 class Node:
     """A value of the document with its path; reading what is not there, or is of another kind, is an error."""
 
-    __slots__ = ("path", "value")
+    __slots__ = ("_at", "value")
 
-    def __init__(self, value: Any, path: str) -> None:
-        self.value, self.path = value, path
+    def __init__(self, value: Any, at: str | tuple[Node, str | int]) -> None:
+        self.value, self._at = value, at
+
+    @property
+    def path(self) -> str:
+        """Where the value is: written when it is asked for, as most of a million numbers never are."""
+        if isinstance(self._at, str):
+            return self._at
+        owner, key = self._at
+        return f"{owner.path}.{key[:60]}" if isinstance(key, str) else f"{owner.path}[{key}]"
 
     def _expected(self, kind: str) -> CertificateError:
         shown = (
@@ -87,13 +96,13 @@ class Node:
             yield key, self._member(key)
 
     def _member(self, key: str) -> Node:
-        return Node(self.value[key], f"{self.path}.{key[:60]}")
+        return Node(self.value[key], (self, key))
 
     def entries(self) -> list[Node]:
         """An array."""
         if not isinstance(self.value, list):
             raise self._expected("a list")
-        return [Node(value, f"{self.path}[{i}]") for i, value in enumerate(self.value)]
+        return [Node(value, (self, i)) for i, value in enumerate(self.value)]
 
     def text(self) -> str:
         """A string."""
@@ -125,7 +134,7 @@ class Node:
             raise self._expected("a number")
         if not abs(self.value) <= _MOST_FLOAT:
             raise self._expected("a number of at most 1e300")
-        return Fraction(Decimal(repr(self.value)))
+        return _of_decimal(repr(self.value))
 
     def decimal(self) -> Fraction:
         """A number of JSON, or a text where it is not the shortest decimal of a float: a decimal or `p/q`."""
@@ -137,7 +146,7 @@ class Node:
         """A text that stands for a rational number, in the one spelling that it has (unless it is very long)."""
         text = self.text()
         if _SHORT.fullmatch(text):
-            return Fraction(Decimal(text))
+            return _of_decimal(text)
         try:
             q = self._sized(Fraction(text) if _PLAIN.fullmatch(text) else read_number(text))
         except GrammarError as error:
@@ -211,6 +220,12 @@ class Members:
     def known(self, key: str, reads: Callable[[Node], T]) -> T | None:
         """A member that must be there, and may be null: then it says that there is nothing."""
         return None if self[key].value is None else reads(self[key])
+
+
+@lru_cache(maxsize=65_536)
+def _of_decimal(text: str) -> Fraction:
+    """The number of a decimal; those of knots and samples repeat."""
+    return Fraction(Decimal(text))
 
 
 def _given_instead(file: str) -> str:
