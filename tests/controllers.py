@@ -28,7 +28,8 @@ name: turning
 system:
   states: [p, v, w]
   inputs: [u, s]
-  f: ["-p + v/5", "p/2 - v/10 + tanh(w)/7", "-w + sin(p)*exp(-v)"]
+  tables: {bend: {interpolation: cubic, points: [[-1, -0.3], [-0.05, 0], [-0.01, 0.02], [0, 0], [0.03, 0.1], [1, 0.2]]}}
+  f: ["-p + v/5", "p/2 - v/10 + tanh(w)/7 + bend(p)/3", "-w + sin(p)*exp(-v)"]
   B: [["-v/4", 0], ["1 + p/4", 0], [0, 1]]
 safe_set: {p: [-1, 1], v: [-1, 1], w: [-1, 1]}
 uncertainty: {h: ["0.1*sin(t)", 0]}
@@ -130,7 +131,7 @@ GIVEN = {
     "held_orbit": _orbit(held=True),
     # a feedback that has a clock of its own, at every third sample
     "seldom_orbit": _orbit(recipe=recipe(feedback_time=Fraction(3, 500))),
-    # B(x), two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube
+    # B(x), a table, two inputs, a ball as the clip, a predicted state, a delay of one sample, coordinates of the tube
     "turning": machine(
         TURNING,
         recipe=recipe(delay=Fraction(1, 500), prediction=Fraction("0.01"), clip_radius=Fraction("0.2")),

@@ -18,7 +18,7 @@ from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
 from tubecert.recheck.balls import exact
-from tubecert.recheck.code.constants import otherwise
+from tubecert.recheck.code.constants import of_tables, otherwise
 from tubecert.recheck.code.examination import agreement
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
@@ -332,3 +332,13 @@ def test_a_prediction_and_a_plan_without_end_are_not_followed():
     formulas.case.curve = replace(formulas.case.curve, horizon=None)
     with pytest.raises(UnreadError, match="without end"):
         bounds(orbit, formulas, texts(orbit, "double"))
+
+
+@pytest.mark.parametrize("change", [None, ("(-0.01), ", "(-0.0100000001), "), ("{0.02, ", "{0.020000001, ")])
+def test_every_number_of_a_table_is_that_of_the_certificate(change):
+    header, source = texts(CONTROLLERS["turning"](), "double")
+    if change is not None:
+        assert source.count(change[0]) >= 1
+        source = source.replace(*change, 1)
+    found = list(of_tables(read_code(header, source), in_recheck("turning")))
+    assert found == ([] if change is None else ["at_bend" if change[0].startswith("(") else "cubic_bend"])

@@ -88,6 +88,11 @@ def assembled(machine: Machine) -> Controller:
     pieces = _pieces(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
     still, m = pieces is None and not free_symbols(plan.u), len(model.inputs)
     played, covered = not still and not machine.held, bool(recipe.rounding)
+    if played and pieces is None and any(node.op == "table" for node in topological(plan.u)):
+        raise refused(
+            "a table stands in u*, of which Gauss's rule does not know the mean over a sample",
+            "certify with hardware: {feedforward: held}, or write the plan into a CSV file",
+        )
     return Controller(
         name=_identifier(machine.name),
         system=machine.name,
@@ -159,10 +164,6 @@ def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]
         horizon = certificate.result.spec.effective.trajectory.horizon
         return spec, piecewise_plan(model, knots, horizon), model
     x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
-    if any(node.op == "table" for node in topological([*x, *u])):
-        raise refused(
-            "a table stands in the plan, which is not exported yet", "write its numbers into a CSV plan"
-        )
     return spec, Plan(x, u, trajectory.horizon), model
 
 
@@ -177,11 +178,6 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard
         raise refused(
             "the metric is not constant: its geodesics have to be computed, and the certificate assumes exact ones",
             "certify with hardware: {geodesic: {nodes: 16, sweeps: 3}}, which allows for what that loses",
-        )
-    entries = [*model.f, *(e for rows in (model.B, model.W) for row in rows for e in row)]
-    if any(node.op == "table" for node in topological(entries)):
-        raise refused(
-            "a table stands in f, B or W, which is not exported yet", "fit a polynomial, or a sum of tanh"
         )
     if model.gained:
         raise refused(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
+from tubecert.export import tables
 from tubecert.export.c_language import C, comment
 from tubecert.export.c_loop import entries_in_c, feedback_in_c, mean_in_c, plan_in_c, prediction_in_c
 from tubecert.export.controller import Controller, Pieces
@@ -137,6 +138,8 @@ def _source(c: Controller, language: C) -> Iterator[str]:
     yield f'const char {c.name}_certificate[] = "{c.hash}";'
     if c.pieces is not None:
         yield from _tables(c.pieces, language)
+    for table in c.tables:
+        yield from tables.in_c(table, language)
     for program in c.programs:
         yield from _function(program, language)
     yield from plan_in_c(c, language)

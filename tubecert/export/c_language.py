@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.export.listing import decimal
-from tubecert.export.program import GREATEST, LEAST, RATIO
+from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,8 @@ class C:
 
     def call(self, name: str, argument: str) -> str:
         """A function."""
+        if name.startswith(TABLE):
+            return f"{name}({argument})"
         return f"{name}{'f' if self.single else ''}({argument})"
 
     def choice(self, name: str, a: str, b: str) -> str:

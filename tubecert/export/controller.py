@@ -9,6 +9,7 @@ from tubecert.conditions.hardware import Rounding
 from tubecert.errors import TubecertError
 from tubecert.export.geodesics import Swept
 from tubecert.export.program import Program
+from tubecert.expression.lookup import Lookup
 from tubecert.findings import Finding
 
 
@@ -83,6 +84,12 @@ class Controller:
         swept = () if self.swept is None else self.swept.programs
         found = (self.plan, self.drift, self.flow, *swept, self.law, self.applied, self.gauss, self.predictor)
         return tuple(each for each in (*found, self.estimator) if each is not None)
+
+    @property
+    def tables(self) -> tuple[Lookup, ...]:
+        """Every table that a program reads, once."""
+        found = {table.name: table for program in self.programs for table in program.tables}
+        return tuple(found[name] for name in sorted(found))
 
     @property
     def adds_plan(self) -> bool:

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Final, Literal, TypeAlias
 
 from tubecert.expression import Expression, topological
+from tubecert.expression.lookup import Lookup
 from tubecert.expression.matrix import Matrix
 
 Operation = Literal["input", "constant", "add", "sub", "mul", "div", "neg", "call", "choose"]
@@ -21,6 +22,7 @@ ADD: Final = "add"
 FUNCTIONS: Final = (
     "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log",
 )  # fmt: skip
+TABLE: Final = "table_"  # begins the name of a function of a table
 RATIO: Final = "ratio"  # a/b where a > 0 and b > 0, else 0
 SHRINK: Final = "shrink"  # b/a where a > b, else 1
 LEAST: Final = "least"
@@ -49,7 +51,10 @@ class Port:
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """Steps in their order, what goes in and what comes out; `marked`: what in between has a name in a proof."""
+    """Steps in their order, what goes in and what comes out; `marked`: what in between has a name in a proof.
+
+    `tables`: those whose functions are called, by the names `table_NAME`.
+    """
 
     name: str
     words: str
@@ -57,6 +62,7 @@ class Program:
     outputs: tuple[Port, ...]
     steps: tuple[Step, ...]
     marked: tuple[Port, ...] = ()
+    tables: tuple[Lookup, ...] = ()
 
     @cached_property
     def numbers(self) -> tuple[float, ...]:
@@ -87,6 +93,7 @@ class Writer:
         self._inputs: list[Port] = []
         self._outputs: list[Port] = []
         self._marked: list[Port] = []
+        self._tables: dict[str, Lookup] = {}
 
     def input(self, name: str, size: int) -> list[Place]:
         """A vector that goes in."""
@@ -120,6 +127,9 @@ class Writer:
             inputs=_moved(self._inputs, moved),
             outputs=_moved(self._outputs, moved),
             marked=_moved(self._marked, moved),
+            tables=tuple(
+                self._tables[name] for name in sorted({steps[old].name for old in kept} & self._tables.keys())
+            ),
             steps=tuple(
                 Step(
                     operation=steps[old].operation,
@@ -249,6 +259,10 @@ class Writer:
             return self.call("sqrt", self.dot(args, args))
         if node.op in FUNCTIONS:
             return self.call(node.op, args[0])
+        if node.op == "table" and node.lookup.order == 0:
+            name = f"{TABLE}{node.lookup.name}"
+            self._tables[name] = node.lookup
+            return self.call(name, args[0])
         raise ValueError(f"{node.op} is not exported")
 
     def _power(self, base: Place, exponent: int) -> Place:

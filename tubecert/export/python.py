@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
+from tubecert.export import tables
 from tubecert.export.blocks import INTEGRATION, NODES
 from tubecert.export.controller import Controller, Pieces
 from tubecert.export.listing import decimal, lines
-from tubecert.export.program import GREATEST, LEAST, RATIO, Program
+from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE, Program
 from tubecert.export.sweeps import in_python
 from tubecert.export.vectors import Vectors
 from tubecert.export.words import TIMING, heading, promise
@@ -30,6 +31,8 @@ class _Python:
 
     def call(self, name: str, argument: str) -> str:
         """A function."""
+        if name.startswith(TABLE):
+            return f"{name}({argument})"
         return f"math.{name}({argument})"
 
     def choice(self, name: str, a: str, b: str) -> str:
@@ -74,6 +77,8 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add feedforward(t) all the time"
     if c.pieces is not None:
         yield from _tables(c.pieces)
+    for table in c.tables:
+        yield from tables.in_python(table)
     for program in c.programs:
         yield from _function(program)
     if c.swept is not None:

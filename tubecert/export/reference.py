@@ -16,7 +16,8 @@ from tubecert.enclosure.interval import Array
 from tubecert.export.blocks import INTEGRATION, NODES
 from tubecert.export.controller import Controller, Pieces
 from tubecert.export.geodesics import Swept
-from tubecert.export.program import GREATEST, LEAST, RATIO, Program, Step
+from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE, Program, Step
+from tubecert.export.tables import looked_up
 
 _NUMPY: Final = {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan}
 
@@ -27,7 +28,11 @@ def execute(program: Program, *given: Array, real: type = np.float64) -> tuple[A
     inputs = {port.name: values for port, values in zip(program.inputs, given, strict=True)}
     with np.errstate(all="ignore"):
         for step, number in zip(program.steps, program.numbers, strict=True):
-            memory.append(_value(step, real(number), memory, inputs, real))
+            called = next((own for own in program.tables if step.name == f"{TABLE}{own.name}"), None)
+            if called is None:
+                memory.append(_value(step, real(number), memory, inputs, real))
+            else:
+                memory.append(looked_up(called, memory[step.places[0]], real))
     lanes = max(len(value) for value in given)
     return tuple(
         np.stack([np.broadcast_to(memory[p], (lanes,)) for p in port.places], axis=1)

@@ -73,6 +73,8 @@ class _Analysis:
             raise UncoveredError("geodesics that are computed")
         if controller.predicts:
             raise UncoveredError("the integration of a prediction")
+        if controller.tables:
+            raise UncoveredError("the function of a table")
         if controller.pieces is not None and not controller.pieces.continuous:
             raise UncoveredError("a plan through knots whose input jumps")
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)

@@ -7,6 +7,7 @@ from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
 from tubecert.export.controller import Controller
+from tubecert.export.program import TABLE
 from tubecert.export.sweeps import counted
 
 _EXACT: Final = (
@@ -111,7 +112,8 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield "| operation | times |"
     yield "|---|---|"
     for name, count in sorted(operations(c).items()):
-        yield f"| {_OPERATIONS.get(name, name)} | {count} |"
+        what = "a search, a cubic" if name.startswith(TABLE) else ""
+        yield f"| {_OPERATIONS.get(name, name)}{what and f' ({what})'} | {count} |"
     if precision is not None:
         yield ""
         yield "There is no allocation, no recursion, and no loop without a bound."

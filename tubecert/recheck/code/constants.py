@@ -22,6 +22,7 @@ from tubecert.recheck.code.tree import (
     parts,
 )
 from tubecert.recheck.controller import Machine
+from tubecert.recheck.terms import in_order, table_of
 
 
 def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
@@ -36,6 +37,7 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
     every = recipe.feedback_time / recipe.sample_time
     if code.macros.get(f"{big}_EVERY", Number("1")) != Number(str(every)):
         yield "EVERY"
+    yield from of_tables(code, formulas)
     own, m = code.functions["estimator"], len(case.system.inputs)
     box = box_of(own, m)
     ends = [(Number(low), Number(high)) for low, high in box or ()]
@@ -51,6 +53,23 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
         code, Number(law_of(code.functions["law"], m).gain), case.bound("feedback_gain")
     ):
         yield "the gain"
+
+
+def of_tables(code: Code, formulas: Machine) -> Iterator[str]:
+    """Names of functions given by tables of which a number in the code is another one, or is missing."""
+    system, curve = formulas.case.system, formulas.case.curve
+    roots = [*(row[0] for row in system.f), *(e for row in system.B for e in row), *curve.x, *curve.u]
+    tables = {table_of(term) for term in in_order(roots) if term.op == "table"}
+    for table in sorted(tables, key=lambda own: own.name):
+        count = len(table.points) - 1
+        begins = [x for x, _, _ in table.points[:count]]
+        cubics = [q for i in range(count) for q in table.polynomial(i)]
+        for kind, wanted in (("at", begins), ("cubic", cubics)):
+            found = list(entries(code.tables.get(f"{kind}_{table.name}", ())))
+            if len(found) != len(wanted) or not all(
+                _is(code, Number(text), value) for text, value in zip(found, wanted, strict=True)
+            ):
+                yield f"{kind}_{table.name}"
 
 
 def _is(code: Code, tree: Expr | None, value: Fraction) -> bool:

@@ -230,7 +230,7 @@ class _Reader:
 
     def _function(self, *, kept: bool) -> None:
         w = self._w
-        w.take("void", "int")
+        w.take("void", "int", "real")
         name = w.name()
         w.take("(")
         given = [self._parameter()]
