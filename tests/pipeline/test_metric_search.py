@@ -11,6 +11,8 @@ from rechecked import certified, examine, failing
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app
+from tubecert.library.designing import _in_coordinates, _loader
+from tubecert.library.trading import Asked
 from tubecert.model import build
 from tubecert.pipeline import Options, design, metric_search
 from tubecert.pipeline.metric_search import sampled_system, search
@@ -82,7 +84,9 @@ def test_units_of_a_state_do_not_change_what_the_surrogate_says():
 
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
-def test_a_design_finds_a_metric_for_its_machine_and_rechecks(tmp_path, monkeypatch):
+def test_a_design_finds_metric_and_coordinates_for_its_machine_and_rechecks(tmp_path, monkeypatch):
+    """From a ball with another metric, in which nothing is certified."""
+    ball = CART.replace("half_widths: {z: 0.05}", "epsilon: 0.03, rho_a: 0.02")
     for module, name, value in (
         (design, "_FARTHEST", 0),
         (design, "_NARROWINGS", 0),
@@ -91,18 +95,39 @@ def test_a_design_finds_a_metric_for_its_machine_and_rechecks(tmp_path, monkeypa
     ):
         monkeypatch.setattr(module, name, value)
     spec, target = tmp_path / "cart.yaml", tmp_path / "d.json"
-    spec.write_text(CART, encoding="utf-8")
-    words = ["design", str(spec), "--metric", "search", "-o", str(target), "--no-progress"]
+    spec.write_text(ball + METRIC, encoding="utf-8")
+    words = ["design", str(spec), "--metric", "search", "--minimise", "z", "-o", str(target), "--no-progress"]
     done = CliRunner().invoke(app, words, catch_exceptions=False)
     assert done.exit_code == 0, done.output
     found = json.loads(target.read_text(encoding="utf-8"))
     assert failing(examine(found)) == []
+    assert found["result"]["overrides"]["settings"] == {"tube": "{half_widths: {z: 0.05}}"}
+    assert certified(ball + METRIC, conditions="H")["result"]["verdict"] == "undecided"
     width = found["result"]["hardware"]["half_widths"]["z"]
     other = certified(CART + METRIC, conditions="H")["result"]["hardware"]["half_widths"]["z"]
     assert width < other
     assert (
         json.loads((tmp_path / "d.metric.json").read_text(encoding="utf-8"))["format"] == "tubecert-metric/1"
     )
+
+
+@pytest.mark.parametrize(
+    ("tube", "told"),
+    [
+        ("epsilon: 0.03, rho_a: 0.02", "{half_widths: {z: 0.05, v: 0.05}}"),
+        ("epsilon: 0.03, rho_a: 0.02, gap: auto", "{half_widths: {z: 0.05, v: 0.05}, gap: auto}"),
+        ("epsilon: 0.03, rho_a: 0.02, coordinates: identity", None),
+        ("epsilon: 0.03, rho_a: 0.02, coordinates: auto", None),
+        ("half_widths: {z: 0.05}", None),
+    ],
+)
+def test_a_ball_is_given_coordinates_unless_it_was_asked_for(tube, told):
+    spec = load_text(CART.replace("half_widths: {z: 0.05}", tube) + METRIC)
+    asked = Asked(load=_loader(spec), options=Options(), measure=measure_of(spec), progress=None, named=str)
+    shaped = _in_coordinates(spec, asked)
+    assert (None if shaped is None else dict(shaped.load(()).settings)["tube"]) == told
+    if shaped is not None:
+        assert dict(shaped.measure.units) == {"z": 1, "v": 1}
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,7 @@ def run(given: Given, output: Output) -> ExitCode:
             named=flag,
             keep=partial(_kept_metric, target),
             progress=report,
+            as_it_is=given.corridor is not None,
         )
         if given.corridor is not None or given.pareto is not None:
             return _traded(given, asked, target, output)

@@ -10,12 +10,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from math import inf
 from pathlib import Path
 from typing import Final
 
 from tubecert.errors import SpecError
 from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
+from tubecert.letters import HARDWARE
 from tubecert.library.asked import Named, effort_numbers
 from tubecert.library.designs import Design, Machines, TradeOff
 from tubecert.library.metrics import MetricLike, with_metric
@@ -34,14 +36,14 @@ from tubecert.library.trading import (
     quantities,
     refused,
 )
-from tubecert.pipeline import Options
+from tubecert.pipeline import Options, certify
 from tubecert.pipeline.design import Design as Attempts
 from tubecert.pipeline.design import narrowest
-from tubecert.pipeline.metric_search import search
+from tubecert.pipeline.metric_search import Found, search
 from tubecert.pipeline.sensitivities import Sensitivity
 from tubecert.pipeline.sensitivities import sensitivities as sensitivities_of
 from tubecert.pipeline.trade import Front, Offer, cheapest, front
-from tubecert.pipeline.width import Measure, measure_in, measure_of
+from tubecert.pipeline.width import Measure, measure_in, measure_of, size_of
 from tubecert.printable import visible
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
@@ -108,6 +110,7 @@ def machines(
         named=str,
         keep=json.loads,
         progress=timed(progress),
+        as_it_is=True,
     )
     own, found = offered(words, asked)
     return Machines(spec=own, found=found)
@@ -154,36 +157,88 @@ def opened(
     named: Named,
     keep: Callable[[str], MetricLike],
     progress: Progress | None,
+    as_it_is: bool = False,
 ) -> Asked:
     """A design of a specification; `keep` is given the text of a metric that is found, and says how it is given on.
 
-    Raises `SpecError` where something is missing.
+    With a metric that is looked for, a tube without coordinates of its own may be given some, unless it stays
+    `as_it_is`. Raises `SpecError` where something is missing.
     """
     wanted = metric == SEARCH if isinstance(metric, str) else False
-    source = Source.of(spec.path, spec.source)
-    fixed = [Setting(path=path, text=text) for path, text in spec.settings]
-
-    def plain(settings: Sequence[Setting]) -> Spec:
-        # what a design sets itself takes the place of what was set of the same key
-        kept = [own for own in fixed if not any(each.covers(own.path) for each in settings)]
-        return load_source(source, _merged(kept, settings)) if settings else spec
-
     asked = Asked(
-        load=plain, options=options, measure=_minimised(spec, minimise, named), progress=progress, named=named
+        load=_loader(spec),
+        options=options,
+        measure=_minimised(spec, minimise, named),
+        progress=progress,
+        named=named,
     )
     held = None if wanted else metric
     _check(spec if held is None else with_metric(spec, held)[0], searched=wanted)
     if wanted:
-        text = _searched(spec, asked)
+        asked, text = _chosen(spec, asked, None if as_it_is else _in_coordinates(spec, asked))
         held = None if text is None else keep(text)
     if held is None:
         return asked
-    own, name = held, with_metric(spec, held)[1]
+    own, name, load = held, with_metric(spec, held)[1], asked.load
     return replace(
         asked,
-        load=lambda settings: with_metric(plain(settings), own)[0],
+        load=lambda settings: with_metric(load(settings), own)[0],
         options=replace(options, metric=Path(name)),
     )
+
+
+def _loader(spec: Spec) -> Callable[[Sequence[Setting]], Spec]:
+    """What reads a specification with settings beside its own."""
+    source = Source.of(spec.path, spec.source)
+    fixed = [Setting(path=path, text=text) for path, text in spec.settings]
+
+    def load(settings: Sequence[Setting]) -> Spec:
+        # what a design sets itself takes the place of what was set of the same key
+        kept = [own for own in fixed if not any(each.covers(own.path) for each in settings)]
+        return load_source(source, _merged(kept, settings)) if settings else spec
+
+    return load
+
+
+def _in_coordinates(spec: Spec, asked: Asked) -> Asked | None:
+    """The same with a tube in coordinates of its own, as wide in every state that counts as the ball is.
+
+    None where the tube has them already, was asked for without, is cut into windows, or is not what H decides.
+    """
+    own = spec.tube
+    if own.coordinates is not None or own.auto or own.windows is not None or not _of_machine(spec):
+        return None
+    width = number_text((own.epsilon or Fraction(0)) + (own.rho_a or Fraction(0)))
+    widths = ", ".join(f"{name}: {width}" for name in asked.measure.units or spec.states)
+    gap = "" if own.gap is None else f", gap: {own.gap}"
+    shaped = asked.load([Setting(path=TUBE, text=f"{{half_widths: {{{widths}}}{gap}}}")])
+    # a radius is one of x in a ball, and one of z in coordinates: half-widths are the same in both
+    units = asked.measure.units or dict.fromkeys(spec.states, 1.0)
+    return replace(asked, load=_loader(shaped), measure=Measure(units=units))
+
+
+def _of_machine(spec: Spec) -> bool:
+    """Whether certificate H decides."""
+    return bool(spec.gained) or spec.decides in (HARDWARE.letter, HARDWARE.option, HARDWARE.key)
+
+
+def _chosen(spec: Spec, asked: Asked, shaped: Asked | None) -> tuple[Asked, str | None]:
+    """The tube, as it is or in coordinates of its own, and the text of a metric; None: the specification's own."""
+    if shaped is None:
+        return asked, _metric_of(spec, _found(spec, asked))
+    asked = replace(asked, measure=shaped.measure)
+    found = _found(spec, shaped)
+    sizes = [
+        size for size in (found.own, None if found.best is None else found.best.size) if size is not None
+    ]
+    ball = (
+        size_of(certify(spec, asked.options, asked.progress, brief=True), asked.measure)
+        if spec.metric
+        else None
+    )
+    if ball is not None and ball <= min(sizes, default=inf):
+        return asked, None
+    return shaped, _metric_of(spec, found)
 
 
 def _merged(fixed: Sequence[Setting], settings: Sequence[Setting]) -> list[Setting]:
@@ -290,18 +345,23 @@ def _scaled(spec: Spec, scale: Fraction) -> list[Setting]:
     return [Setting.of(f"{key}={number_text(value * scale)}") for key, value in sizes.items()]
 
 
-def _searched(spec: Spec, asked: Asked) -> str | None:
-    """The text of the metric that was found; None if the specification's own serves better."""
+def _found(spec: Spec, asked: Asked) -> Found:
+    """Metrics for the machine, in the tube that is asked for."""
+    own = asked.load(())
 
-    def held(own: Spec, scale: Fraction) -> Spec:
-        return replace(asked.load(_scaled(spec, scale)), metric=own.metric, synthesis=None)
+    def held(other: Spec, scale: Fraction) -> Spec:
+        return replace(asked.load(_scaled(own, scale)), metric=other.metric, synthesis=None)
 
     try:
-        found = search(spec, held, asked.measure, asked.options, asked.progress)
+        return search(own, held, asked.measure, asked.options, asked.progress)
     except ValueError as error:
         raise _error(
             spec, "system.B", f"--metric search: {error}", "tubecert synth, then --metric FILE"
         ) from error
+
+
+def _metric_of(spec: Spec, found: Found) -> str | None:
+    """The text of the metric that was found; None if the specification's own serves better."""
     best = found.best
     if best is None and spec.metric is None:
         best = min(found.candidates, key=lambda each: each.told, default=None)

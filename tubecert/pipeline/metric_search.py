@@ -149,7 +149,9 @@ class Trial:
 
 
 def _radius(spec: Spec) -> float:
-    """The radius of the tube, without what the start takes."""
+    """The radius of the tube, without what the start takes, or the widest of its half-widths."""
+    if spec.tube.half_widths:
+        return float(max(width for _, width in spec.tube.half_widths))
     return float((spec.tube.epsilon or 0) + (spec.tube.rho_a or 0)) or inf
 
 
