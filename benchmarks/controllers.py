@@ -3,8 +3,8 @@
     python benchmarks/controllers.py [orbit windows pvtol bent single]
 
 For each: certify, export in C and in Python, and let the compiled code drive 8 plants against the adversaries of
-`simulate` for 1250 samples (10 000 in all). At every sample the module in Python gets the same measurement. Then the code
-is compiled once more for what it costs: nanoseconds of a step in a loop of its own, bytes of stack, and what it calls.
+`simulate` for 1250 samples (10 000 in all). At every sample the module in Python gets the same measurement. Then the
+code is compiled once more for what it costs: the time of a step in a loop of its own, bytes of stack, what it calls.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
 
@@ -146,7 +145,8 @@ def _row(words: str, config: str, changes: tuple[tuple[str, str], ...], precisio
 def _module(controller: Controller, folder: str) -> ModuleType:
     exported(controller, "python").save(folder)
     spec = importlib.util.spec_from_file_location(controller.name, Path(folder) / f"{controller.name}.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
