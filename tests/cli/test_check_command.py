@@ -529,12 +529,17 @@ def test_a_cache_from_elsewhere_decides_nothing(certified, monkeypatch, tmp_path
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_without_the_cache_no_plan_is_taken_from_it_either(monkeypatch):
-    text = SPEC.replace(
-        "trajectory: {kind: equilibrium, at: [0, 0, 0], input: [0]}",
-        "trajectory: {kind: ilqr, start: [0, 0, 0], target: [0.1, 0, 0], horizon: 1, knots: 5, goal: false}",
-    )
-    assert text != SPEC
-    Path("spec.yaml").write_text(text.replace("duration: 10 ", "duration: 1 "), encoding="utf-8")
+    text = """tubecert: 1
+name: line
+system: {states: [p], inputs: [u], f: ["-p"], B: [[1]]}
+safe_set: {p: [-2, 2]}
+uncertainty: {h: ["0.05*sin(t)"]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.5, rho_a: 0.1}
+trajectory: {kind: ilqr, start: [0], target: [0.1], horizon: 1, knots: 5, goal: false}
+initial_state: {at: [0]}
+"""
+    Path("spec.yaml").write_text(text, encoding="utf-8")
     planned = []
     true = ilqr.plan
     monkeypatch.setattr(ilqr, "plan", lambda *arguments: planned.append(1) or true(*arguments))

@@ -13,7 +13,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from rechecked import certified, examine, failing, respecified, sealed, shipped
+from rechecked import certified, examine, failing, respecified, sealed
 from systems import SMALL
 
 from tubecert import certificate, pipeline, spec
@@ -29,6 +29,7 @@ MOVING = (
     'trajectory: {kind: expressions, x: ["0.1*sin(t)", "0.1*sin(t) + 0.1*cos(t)"], '
     'u: ["0.2*cos(t) - 0.3*sin(0.1*sin(t))"], horizon: 3}'
 )
+PLANNED = "trajectory: {kind: ilqr, start: [0.05, 0], target: [0, 0], horizon: 2, knots: 5, goal: false}"
 REALS = st.floats(allow_nan=False, allow_infinity=False)
 ROWS = "t,x,y,u\n0,0,0,0\n1,0,0,0\n2,0,0,0\n"
 
@@ -45,7 +46,7 @@ def plans(tmp_path_factory):
     return {
         "expressions": certified(moving, conditions="distance"),
         "csv": json.loads(certificate.dump(certificate.seal(result, {}))),
-        "ilqr": shipped("two_state"),
+        "ilqr": certified(SMALL.replace(PLAN, PLANNED), bare=False),
     }
 
 
