@@ -28,7 +28,7 @@ B = [["sin(x2)"], ["1 + tan(x1)*cos(x2)"]]
 W = [["1", "0"], ["0", "1/cos(x1)**2"]]
 CURVE, PLAYED = ["0.1*sin(t)", "0.3 + 0.1*cos(t)"], ["0.2*sin(2*t)"]
 STATES = ("x1", "x2")
-RHO, HORIZON = Fraction(1, 5), Fraction(3)
+RHO, HORIZON = Fraction(1, 5), Fraction(1)
 
 
 def place(budget: int = 4_000) -> Place:
@@ -103,7 +103,7 @@ MOVING = (
         "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}",
         """trajectory:
   kind: expressions
-  horizon: 3
+  horizon: 1
   x: ["0.05*sin(t)", "0.05*(sin(t) + cos(t))"]
   u: ["(0.05*(cos(t) - sin(t)) - 0.025*sin(t) + 0.05*(sin(t) + cos(t)))/2"]
 """,
