@@ -70,10 +70,10 @@ def test_forged_ones_are_refused(honest, name):
 
 def test_a_wider_range_is_refused(honest):
     def change(effective):
-        effective["system"]["parameters"]["m"] = ["0.96", "1.04"]
+        effective["system"]["parameters"]["m"] = ["0.94", "1.06"]
 
     document = respecified(honest[0], change)
-    document["result"]["claim"]["parameters"] = {"m": ["0.96", "1.04"]}
+    document["result"]["claim"]["parameters"] = {"m": ["0.94", "1.06"]}
     assert refused(document, {})
 
 
