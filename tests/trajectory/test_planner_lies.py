@@ -21,7 +21,9 @@ from tubecert.spec import load_text
 from tubecert.trajectory.make import MISS, Room, misses, plan_of, refusal
 
 TEXT = (Path(__file__).parents[2] / "configs" / "two_state.yaml").read_text(encoding="utf-8")
-SHORT = TEXT.replace("  knots: 101", "  knots: 16\n  start: [0.5, -0.3]").replace("  horizon: 5 ", "  horizon: 2 ")
+SHORT = TEXT.replace("  knots: 101", "  knots: 16\n  start: [0.5, -0.3]").replace(
+    "  horizon: 5 ", "  horizon: 2 "
+)
 SPEC = load_text(SHORT.replace("  at: [3.4, -2.4]", "  at: [0.5, -0.3]"), "spec.yaml")
 TASK = SPEC.trajectory.task
 MODEL = build(SPEC)

@@ -304,7 +304,7 @@ def _split(values: Array, shapes: Sequence[tuple[int, int]]) -> list[Array]:
     result, start = [], 0
     for p, q in shapes:
         block = values[start : start + p * q]
-        result.append(np.ascontiguousarray(np.moveaxis(block, 0, -1)).reshape(-1, p, q))
+        result.append(np.ascontiguousarray(block.T).reshape(-1, p, q))
         start += p * q
     return result
 
@@ -320,6 +320,5 @@ def _fold(values: Array, choices: int, count: int) -> Array:
     """(F, A N, p, q) -> (N, F A, p, q)."""
     flips = values.shape[0]
     p, q = values.shape[-2:]
-    return np.ascontiguousarray(np.moveaxis(values.reshape(flips, choices, count, p, q), 2, 0)).reshape(
-        count, flips * choices, p, q
-    )
+    turned = values.reshape(flips, choices, count, p, q).transpose(2, 0, 1, 3, 4)
+    return np.ascontiguousarray(turned).reshape(count, flips * choices, p, q)

@@ -258,10 +258,13 @@ def _unfold(tensor: Array, rows: tuple[int, ...]) -> Array:
 
 
 def contracted(tensor: Array, vectors: Sequence[Array], keep: int | None = None) -> Array:
-    """The tensor applied to one vector per axis, except the axis `keep`."""
+    """The tensor applied to one vector per axis, except the axis `keep`: a `tensordot`, without what that looks up."""
     for axis in reversed(range(tensor.ndim)):
         if axis != keep:
-            tensor = np.tensordot(tensor, vectors[axis], axes=(axis, 0))
+            others = (*range(axis), *range(axis + 1, tensor.ndim))
+            shape = tuple(tensor.shape[other] for other in others)
+            rows = tensor.transpose(*others, axis).reshape(-1, tensor.shape[axis])
+            tensor = np.dot(rows, vectors[axis].reshape(-1, 1)).reshape(shape)
     return tensor
 
 

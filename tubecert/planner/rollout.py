@@ -58,7 +58,7 @@ class Dynamics:
             for (c, a), weight in zip(_STAGES, _WEIGHTS, strict=True):
                 share = (i + c) / count
                 at, u = x + a * h * k, (1 - share) * left + share * right
-                both = np.moveaxis(self._slopes.run_floats([*at, *u], (N,)), -1, 0).reshape(N, n, n + m)
+                both = self._slopes.run_floats([*at, *u], (N,)).T.reshape(N, n, n + m)
                 k = self.rate(at, u)
                 k_d = both[:, :, :n] @ (D + a * h * k_d)
                 k_d[:, :, n : n + m] += (1 - share) * both[:, :, n:]
