@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from math import log, sqrt
 
 from tubecert.digits import short
+from tubecert.letters import RATES
 from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
 from tubecert.report.figures_gains import STYLES
 from tubecert.report.page import Figure
@@ -22,6 +23,7 @@ from tubecert.verdict import Verdict
 
 _COLORS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
 _PARTS = ("epsilon", "rho_a", "rho_r")  # of rho, which is drawn
+_PRINTED = "m3"  # formulas that prove nothing
 _STRIP = 40  # height of the scale of colours below a heat map
 _LEGEND = {
     **{str(verdict): str(verdict) for verdict in Verdict},
@@ -31,11 +33,12 @@ _LEGEND = {
 
 
 def sweep_figures(table: SweepTable) -> list[Figure]:
-    """Every figure that there is: none for words or values without order, nor for more than two keys."""
+    """Every figure that there is: over one or two keys with numbers in order, beside one of words at most for one."""
     axes = [axis for axis in table.axes if _ordered(axis.numbers or ())]
-    if len(axes) < len(table.axes) or not 1 <= len(axes) <= 2:
-        return []
-    return list(_curves(table, axes[0]) if len(axes) == 1 else _maps(table, axes[0], axes[1]))
+    words = [axis for axis in table.axes if axis not in axes]
+    if len(axes) == 1 and len(words) <= 1:
+        return list(_curves(table, axes[0], words))
+    return list(_maps(table, axes[0], axes[1])) if len(axes) == 2 and not words else []
 
 
 def _ordered(values: Sequence[float]) -> bool:
@@ -63,20 +66,32 @@ def _value(row: Row, quantity: Quantity) -> float | None:
         return None
     if not quantity.section:
         return None if row.value("rho_r") is None else found.number
+    if quantity.section == RATES.key and grid.printed_in(row.point.settings):
+        return found.number  # which is told: they prove nothing
     return found.number if row.value(f"{quantity.section}.verdict") == Verdict.CERTIFIED else None
 
 
 # -- one key
 
 
-def _curves(table: SweepTable, axis: grid.Axis) -> Iterator[Figure]:
-    """A chart for each quantity, with a curve for each kind."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Curve:
+    """The values of a quantity at the places of a key, None where nothing is drawn; `words`: what it is called."""
+
+    quantity: Quantity
+    values: tuple[float | None, ...]
+    words: str
+    printed: bool
+
+
+def _curves(table: SweepTable, axis: grid.Axis, words: Sequence[grid.Axis]) -> Iterator[Figure]:
+    """A chart for each quantity, with a curve for each kind, and for each word where they differ."""
     shown = sorted(_shown(table), key=lambda each: _group(each) != "rho")
     groups: dict[str, list[Quantity]] = {}
     for each in shown:
         groups.setdefault(_group(each), []).append(each)
     for name, members in groups.items():
-        yield _curve(table, axis, name, members)
+        yield _curve(table, axis, name, members, words)
 
 
 def _group(quantity: Quantity) -> str:
@@ -84,27 +99,71 @@ def _group(quantity: Quantity) -> str:
     return quantity.name.partition(".")[0] if not quantity.section else quantity.name
 
 
-def _curve(table: SweepTable, axis: grid.Axis, name: str, members: Sequence[Quantity]) -> Figure:
-    places = axis.numbers or ()
-    values = [v for row in table.rows for each in members if (v := _value(row, each)) is not None]
-    spread = min(values) > 0 and max(values) > 20 * min(values)
+def _parts(table: SweepTable, words: Sequence[grid.Axis]) -> list[tuple[str, list[Row]]]:
+    """The rows of every word, in the order of the other key."""
+    if not words:
+        return [("", list(table.rows))]
+    (axis,) = words
+    return [(text, [row for row in table.rows if _text_of(row, axis) == text]) for text in axis.texts]
+
+
+def _text_of(row: Row, axis: grid.Axis) -> str:
+    return next(each.text for each in row.point.settings if each.path == axis.path)
+
+
+def _drawn(parts: Sequence[tuple[str, list[Row]]], members: Sequence[Quantity], label: str) -> list[_Curve]:
+    """The curves of a chart: of a word whose values are those of another one, none."""
+    found: list[_Curve] = []
+    for each in members:
+        own: dict[tuple[float | None, ...], _Curve] = {}
+        for word, rows in parts:
+            values = tuple(_value(row, each) for row in rows)
+            printed = bool(rows) and grid.printed_in(rows[0].point.settings) and each.section == RATES.key
+            if values not in own and any(value is not None for value in values):
+                name = _told_apart(each, label)
+                own[values] = _Curve(quantity=each, values=values, words=f"{name}, {word}", printed=printed)
+        if len(own) == 1:
+            own = {key: replace(one, words=_told_apart(each, label)) for key, one in own.items()}
+        found += own.values()
+    return found
+
+
+def _curve(
+    table: SweepTable,
+    axis: grid.Axis,
+    name: str,
+    members: Sequence[Quantity],
+    words: Sequence[grid.Axis],
+) -> Figure:
+    places, parts = axis.numbers or (), _parts(table, words)
     label = members[0].words.rpartition(", ")[2] if members[0].section else name.replace("_", " ")
+    curves = _drawn(parts, members, label)
+    values = [v for each in curves for v in each.values if v is not None]
+    spread = min(values) > 0 and max(values) > 20 * min(values)
     x = Axis.around(places, axis.path, log=axis.log, pad=0.03)
     title = f"{label} against {axis.path}"
     chart = Chart(f"sweep-{name}", title, x, Axis.around(values, label, log=spread))
-    legend = [(f"cell {verdict}", words) for verdict, words in _uncertified(table)]
-    for (low, high), row in zip(pairwise(_edges(places, log_=axis.log)), table.rows, strict=True):
-        if row.verdict != Verdict.CERTIFIED:
+    legend = [] if words else [(f"cell {verdict}", text) for verdict, text in _uncertified(table)]
+    for (low, high), row in zip(pairwise(_edges(places, log_=axis.log)), parts[0][1], strict=True):
+        if row.verdict != Verdict.CERTIFIED and not words:
             ends = max(min(low, high), x.low), min(max(low, high), x.high)
             chart.box((ends[0], chart.y.low), (ends[1], chart.y.high), f"cell {row.verdict}")
-    for index, each in enumerate(members):
-        style = STYLES.get(each.section, "") if each.section else f"m{index % 3 + 1}"
-        points = [(place, _value(row, each)) for place, row in zip(places, table.rows, strict=True)]
-        for known, part in groupby(points, key=lambda point: point[1] is not None):
+    for index, each in enumerate(curves):
+        style = STYLES.get(each.quantity.section, "") if each.quantity.section else f"m{index % 3 + 1}"
+        style = _PRINTED if each.printed else style
+        for known, part in groupby(
+            zip(places, each.values, strict=True), key=lambda point: point[1] is not None
+        ):
             if known:
                 _line(chart, [(x, y) for x, y in part if y is not None], style)
-        legend.append((style, _told_apart(each, label)))
-    caption = "Every dot is a certificate; shaded: the verdict is not certified."
+        legend.append((style, each.words))
+    caption = "Every dot is a certificate" + (
+        ", but for those as printed, which prove nothing."
+        if any(each.printed for each in curves)
+        else "."
+        if words
+        else "; shaded: the verdict is not certified."
+    )
     return Figure(key=f"sweep-{name}", title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
 
 
