@@ -75,6 +75,8 @@ ROWS = {
     "pvtol as shipped": Row("hardware_pvtol", "", duration="2"),
     "pvtol, uncertain mass": Row("hardware_pvtol_mass", "", duration="2"),
     "pvtol, moving": Row("hardware_pvtol_moving", "", duration="2", budget=4000),
+    # geodesics that the loop computes (theorem H-G)
+    "input by state as shipped": Row("hardware_state_dependent_input", "", duration="2"),
     # B and W depend on the state
     "turning": Row("state_dependent_input", "{sample_time: 1/500, noise: 1/10000}"),
     "curved": Row("three_state", "{sample_time: 1/200, delay: 0, noise: 1/10000}", duration="6"),
