@@ -119,6 +119,13 @@ def test_a_gain_of_the_feedback_in_a_window_does_not_count_where_it_is_cut_by_th
     assert halves[0] < halves[1]
 
 
+def test_rounding_in_windows_is_not_proven_of_a_problem_that_knows_nothing_of_it():
+    """Its windows would be taken with a du of their own, below what the code cuts its feedback by."""
+    own = recipe({}, {}, **FORMS["rounding"][1])
+    assert np.isfinite(float(margins_hardware(cut(rounded(alive_machine()), {}, {}), own)[1].lo))
+    assert float(margins_hardware(cut(alive_machine(), {}, {}), own)[1].lo) == -np.inf
+
+
 def test_what_rounding_costs_counts_in_every_window():
     problem, changes = FORMS["rounding"]
     nothing = Rounding(feedback=F(0), input=F(0), estimate=F(0), prediction=F(0))

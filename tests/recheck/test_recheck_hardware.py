@@ -8,10 +8,11 @@ from fractions import Fraction
 import pytest
 import tampers
 from rechecked import CONFIGS, case_of, certified, examine, failing, sealed, unconfirmed
-from systems import SMALL
+from systems import SCALAR, SMALL
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.claims import of_certified
+from tubecert.recheck.constants import feedback_gain
 
 MACHINE = "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
 WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
@@ -324,6 +325,20 @@ def test_the_units_of_a_drift_are_the_least_noise():
         arithmetic=None,
     )
     assert promise(asked).drift == 30
+
+
+@pytest.mark.slow
+def test_a_feedback_of_nothing_is_confirmed():
+    """W contracts at its rate by itself: F is 0, so du = 0 is a bound; of any other F it is none."""
+    own = SCALAR.replace("-x + 0.1*sin(x)", "-0.5*x").replace("0.2*sin(t)", "0.05*sin(t)")
+    document = certified(own, conditions="hardware")
+    assert document["result"]["constants"]["feedback_gain"]["above"] == 0
+    assert failing(examine(document, 400)) == []
+    # of a plant that contracts more slowly than that, F is .2
+    steeper = certified(SCALAR.replace("-x + 0.1*sin(x)", "-0.4*x"), conditions="hardware")
+    place = case_of(steeper).place
+    assert not feedback_gain(place, Fraction(0), Fraction(1)).holds
+    assert feedback_gain(place, Fraction(1), Fraction(1)).holds
 
 
 @pytest.mark.slow

@@ -125,7 +125,9 @@ def _metric_slope(place: Place, limit: Fraction) -> Outcome:
 
 
 def feedback_gain(place: Place, limit: Fraction, largest: Fraction) -> Outcome:
-    """F <= t (B B'/mu + mu W) for all mu in (0, largest]."""
+    """F <= t (B B'/mu + mu W) for all mu in (0, largest]; where F is 0, t = 0 serves."""
+    if vanish([e for row in place.system.F for e in row]):
+        return stated(True, "")
     extra = {MU: (Fraction(0), largest)}
     return prove(GainBelow(place.system, limit), place.tube(extra), place.budget)
 

@@ -17,7 +17,15 @@ from tubecert.conditions.arithmetic import (
 from tubecert.conditions.hardware import windows
 from tubecert.conditions.hardware.evaluation import Evaluated, evaluated
 from tubecert.conditions.hardware.gains import uncovered
-from tubecert.conditions.hardware.loop import HardwareRecipe, Loop, Plant, Rounding, loop_of, plant
+from tubecert.conditions.hardware.loop import (
+    HardwareRecipe,
+    Loop,
+    Plant,
+    Rounding,
+    loop_of,
+    machine_in,
+    plant,
+)
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Margins, Theorem
@@ -53,6 +61,9 @@ def margins_hardware(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Inte
 def _margins_in_windows(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Interval, Interval]:
     """The least margins over the windows of theorem HW."""
     nothing = Interval(-np.inf, np.inf)
+    # theorem H-R is for the du of the whole tube, which `over` takes where the problem is about rounding
+    if recipe.rounding and machine_in(problem).asked.arithmetic is None:
+        return nothing, nothing
     if not (windows.cover(problem, recipe) and windows.is_the_widest(recipe)):
         return nothing, nothing
     if not all(_describes_a_loop(own) for own in windows.within(recipe)):
