@@ -104,7 +104,7 @@ def test_two_words_about_one_key_are_refused():
     assert (done.exit_code, "--set goes without it" in " ".join(done.output.split())) == (2, True)
 
 
-@pytest.mark.parametrize("command", ["certify", "synth", "simulate"])
+@pytest.mark.parametrize("command", ["certify", "synth", "simulate", "check", "design"])
 def test_every_command_names_the_option_as_the_place(command):
     done = run(command, SPEC, "--set", "tube.epsilom=1", "--set", "foo")
     assert done.exit_code == 2
@@ -112,6 +112,22 @@ def test_every_command_names_the_option_as_the_place(command):
     done = run(command, SPEC, "--set", "tube.epsilom=1")
     assert (done.exit_code, "--set tube.epsilom: error TC103" in done.output) == (2, True)
     assert "did you mean epsilon?" in done.output
+
+
+def test_files_are_checked_and_metrics_verified_as_they_are_set(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "s.yaml").write_text(SMALL, encoding="utf-8")
+    spec = str(tmp_path / "s.yaml")
+    for _ in range(2):  # what is found of the file as it is set is not remembered for the file
+        assert run("check", spec).exit_code == 0
+        done = run("check", spec, "--set", "initial_state.at[0]=100")
+        assert (done.exit_code, "TC" in done.output) == (1, True), done.output
+    done = run("check", spec, "--family", spec, "--set", "name=a")
+    assert (done.exit_code, "--set" in done.output) == (2, True)
+    assert run("verify", spec).exit_code == 0
+    assert run("verify", spec, "--set", "metric.rate=1000").exit_code == 1
+    done = run("verify", spec, "--set", "metric.rat=1")
+    assert (done.exit_code, "did you mean rate?" in done.output) == (2, True)
 
 
 @pytest.mark.parametrize(("key", "where"), [("k", "system.parameters"), ("a", "system.definitions")])

@@ -13,7 +13,7 @@ from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding, Severity
 from tubecert.kept import nothing_kept
-from tubecert.spec import Spec, load
+from tubecert.spec import Setting, Spec, load
 
 if TYPE_CHECKING:
     from tubecert.progress import Progress
@@ -21,11 +21,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions:
-    """How to check: with a certification, warnings as errors, and whether to remember (plans as well)."""
+    """How to check: with a certification, warnings as errors, and whether to remember (plans as well).
+
+    `settings` stand in every file in place of its own keys; what is found then is about no file, and not remembered.
+    """
 
     certify: bool = False
     strict: bool = False
     cached: bool = True
+    settings: tuple[Setting, ...] = ()
     gap: Fraction = Fraction(1, 100)
     budget: int = 2_000_000
 
@@ -43,7 +47,7 @@ class Checked:
 
 def check(path: str, options: CheckOptions, progress: Progress | None = None) -> Checked:
     """The findings of a file, and the exit code that they deserve."""
-    with nothing_kept(not options.cached):
+    with nothing_kept(not options.cached or bool(options.settings)):
         return _checked(path, options, progress)
 
 
@@ -51,7 +55,7 @@ def _checked(path: str, options: CheckOptions, progress: Progress | None) -> Che
     started = time.perf_counter()
     claims: tuple[Claim, ...] = ()
     try:
-        spec = load(path)
+        spec = load(path, options.settings)
         findings = _remembered("lint", spec, lambda: _inspected(spec))
         if options.certify and not _errors(findings):
             found = _certified(spec, options, progress)

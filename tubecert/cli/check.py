@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
+from tubecert.cli.settings import settings_of
+from tubecert.cli.targets import refused
 from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Severity
 from tubecert.library.numbers import Numbers
@@ -40,6 +42,7 @@ class Given:
     family: str | None
     strict: bool
     skip_others: bool
+    settings: Sequence[str]
     jobs: str
     scheduler: str | None
     no_cache: bool
@@ -59,6 +62,8 @@ def run(given: Given, output: Output) -> ExitCode:
         files = files if given.scheduler is None else [str(Path(file).resolve()) for file in files]
         results = _checked(files, options, executor, output) if files else []
         results = [*results, *_skipped(others)] or _nothing(paths)
+    elif given.settings:
+        raise refused("--set is not for plans of a family", "leave --family or --set out")
     else:
         results = _of_family(paths, given.family)
     write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
@@ -96,7 +101,12 @@ def _options(given: Given) -> tuple[int, CheckOptions]:
     gap = numbers.positive("--gap", given.gap, below=1)
     budget = numbers.count("--budget", given.budget)
     numbers.check()
-    options = CheckOptions(certify=given.certify, strict=given.strict, cached=not given.no_cache)
+    options = CheckOptions(
+        certify=given.certify,
+        strict=given.strict,
+        cached=not given.no_cache,
+        settings=settings_of(given.settings),
+    )
     options = replace(options, gap=gap or options.gap, budget=budget or options.budget)
     return jobs or 1, options
 

@@ -9,7 +9,7 @@ import typer
 
 from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Debug, Output, with_output
+from tubecert.cli.options import Debug, Output, Settings, with_output
 
 _CHECK_AFTER = """\b
 Examples:
@@ -107,6 +107,7 @@ def check(
     skip_others: Annotated[
         bool, typer.Option("--skip-others", help="Leave YAML files that are no specifications alone.")
     ] = False,
+    set_: Settings = None,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Files checked at a time.")] = "1",
     scheduler: Scheduler = None,
     no_cache: Annotated[
@@ -135,6 +136,7 @@ def check(
             family=family,
             strict=strict,
             skip_others=skip_others,
+            settings=set_ or (),
             jobs=jobs,
             scheduler=scheduler,
             no_cache=no_cache,

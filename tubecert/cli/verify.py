@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from tubecert import certificate
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output, flag
+from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
@@ -20,7 +21,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.pipeline.verification import Verified
-    from tubecert.spec import Spec
+    from tubecert.spec import Setting, Spec
 
 _METRICS = (".json", ".csv", ".npz", ".mat")
 
@@ -38,6 +39,7 @@ class Given:
     """The command line."""
 
     files: Sequence[str]
+    settings: Sequence[str]
     rate: str | None
     gap: str
     budget: str | None
@@ -49,7 +51,7 @@ def run(given: Given, output: Output) -> ExitCode:
     """Verify every metric."""
     texts = {"rate": given.rate, "gap": given.gap, "budget": given.budget}
     numbers = verification_numbers(texts, flag)
-    cases = list(_cases(given.files, numbers.rate))
+    cases = list(_cases(given.files, numbers.rate, settings_of(given.settings)))
     target = given.target
     if target is not None:
         if len(cases) != 1:
@@ -102,7 +104,7 @@ def _as_locked(specs: Sequence[Spec], found: Sequence[Verified], terminal: Termi
     return ExitCode.NOT_CERTIFIED if wrong else ExitCode.CERTIFIED
 
 
-def _cases(files: Sequence[str], rate: Fraction | None) -> Iterator[Case]:
+def _cases(files: Sequence[str], rate: Fraction | None, settings: Sequence[Setting]) -> Iterator[Case]:
     """What is to be decided, read before any work is done; raises `TubecertError`."""
     from tubecert.spec.load import load_system
     from tubecert.spec.metric_file import with_metric
@@ -118,7 +120,7 @@ def _cases(files: Sequence[str], rate: Fraction | None) -> Iterator[Case]:
         else:
             if pending is not None:
                 yield _case(*pending, rate)
-            system = load_system(file)
+            system = load_system(file, settings)
             pending = file, system
     if pending is not None:
         yield _case(*pending, rate)

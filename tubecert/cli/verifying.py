@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Output, number_option, with_output
+from tubecert.cli.options import Budget, Output, Settings, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -41,6 +41,7 @@ def verify(
         ),
     ],
     *,
+    set_: Settings = None,
     rate: Annotated[
         str | None, number_option("--rate", "Decide at this rate, in 1/s, in place of the metric's own.")
     ] = None,
@@ -66,5 +67,14 @@ def verify(
     with guarded(how):
         from tubecert.cli.verify import Given, run
 
-        code = run(Given(files=files, rate=rate, gap=gap, budget=budget, target=output, expect=expect), how)
+        given = Given(
+            files=files,
+            settings=set_ or (),
+            rate=rate,
+            gap=gap,
+            budget=budget,
+            target=output,
+            expect=expect,
+        )
+        code = run(given, how)
     raise typer.Exit(code)

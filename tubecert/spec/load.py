@@ -89,12 +89,12 @@ def load(path: str, settings: Sequence[Setting] = ()) -> Spec:
     return load_source(read_source(path), settings)
 
 
-def load_system(path: str) -> Spec:
+def load_system(path: str, settings: Sequence[Setting] = ()) -> Spec:
     """The same of a file of which only system, safe set and metric matter: it may lack all else, which is not read.
 
     The specification is that of rest in the middle of the safe set without uncertainty. Raises as `load` does.
     """
-    return load_source(read_source(path), alone=True)
+    return load_source(read_source(path), settings, alone=True)
 
 
 def load_text(text: str, file: str = "<text>") -> Spec:
