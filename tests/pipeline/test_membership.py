@@ -141,7 +141,7 @@ def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(a=st.integers(1, 140), w=st.integers(5, 20))
 def test_the_answer_is_that_of_dense_samples(a, w):
     """p = a sin(w t) and its derivatives, which satisfy the dynamics."""

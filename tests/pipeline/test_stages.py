@@ -23,7 +23,7 @@ from tubecert.stages.tube import TubeFound
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 THREE = load(str(CONFIGS / "three_state.yaml"))
-PLANNED = (CONFIGS / "two_state.yaml").read_text(encoding="utf-8").replace("  knots: 101", "  knots: 51")
+PLANNED = (CONFIGS / "two_state.yaml").read_text(encoding="utf-8").replace("  knots: 101", "  knots: 26")
 
 
 ONE = """tubecert: 1
@@ -40,7 +40,7 @@ adaptation: {A_m: -1}
 
 
 def radii(epsilon, rho_a):
-    return Options(epsilon=Fraction(epsilon), rho_a=Fraction(rho_a))
+    return Options(epsilon=Fraction(epsilon), rho_a=Fraction(rho_a), gap=Fraction(1, 4))
 
 
 @pytest.mark.usefixtures("barely")
@@ -62,7 +62,7 @@ def test_other_radii_plan_once(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     memory, spec = Memory(), load_text(PLANNED, "spec.yaml")
     for epsilon in (".6", ".5"):
-        end = answer(question_of(spec, replace(radii(epsilon, ".1"), gap=Fraction(1, 4)), memory=memory))
+        end = answer(question_of(spec, radii(epsilon, ".1"), memory=memory))
         assert isinstance(end, Judged)
     assert [memory.computed[name] for name in ("rank", "metric", "plan", "knots", "constants")] == [
         1,

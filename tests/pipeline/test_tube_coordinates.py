@@ -226,10 +226,8 @@ def test_without_coordinates_certificates_are_as_they_were():
 @pytest.mark.parametrize("tube", ["half_widths: {x1: 0.04}", "epsilon: 0.02, rho_a: 0.02, coordinates: auto"])
 def test_simulations_stay_within_what_is_certified(tube):
     """A metric that is not constant: the loop written in z, random uncertainties of the class in z."""
-    text = re.sub(
-        r"^tube: .*$", f"tube: {{{tube}}}", (CONFIGS / "three_state.yaml").read_text("utf-8"), flags=re.M
-    )
-    spec = load_text(text)
+    text = (CONFIGS / "three_state.yaml").read_text("utf-8").replace("duration: 10 ", "duration: 3 ")
+    spec = load_text(re.sub(r"^tube: .*$", f"tube: {{{tube}}}", text, flags=re.M))
     result = certify(spec, COARSE)
     assert result.verdict is Verdict.CERTIFIED
     setting = setting_of(spec, result)
