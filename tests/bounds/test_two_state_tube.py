@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-from pathlib import Path
-
 import numpy as np
 import pytest
+import simulated
 
-from tubecert.pipeline import Options, certify
-from tubecert.spec import load
-
-CONFIG = Path(__file__).parents[2] / "configs" / "two_state.yaml"
 W = np.array([[4.25828, -0.93423], [-0.93423, 3.76692]])
 B = np.array([0.5, -2.0])
 RATE, RHO = 1.74, 0.5
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        return certify(load(str(CONFIG)), Options(epsilon=Fraction(2, 5))).to_json()
+def result():
+    return simulated.certified("two_state", "0.4")[1].to_json()
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ conditions: {decides: H}
 """
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_noise_that_is_given_by_state_is_told_by_state_with_units():
     page = tc.report(tc.certify(tc.specification(PLANT.replace("NOISE", "{v: 0.0004, z: 0.0003}"))))
@@ -32,6 +33,7 @@ def test_noise_that_is_given_by_state_is_told_by_state_with_units():
     assert "noise 0.0001" in page.html
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_states_keep_their_order_in_a_certificate_that_is_read(tmp_path):
     result = tc.certify(tc.specification(PLANT.replace("NOISE", "0")))
@@ -39,6 +41,7 @@ def test_states_keep_their_order_in_a_certificate_that_is_read(tmp_path):
     assert list(tc.read(tmp_path / "cart.json").half_widths) == list(result.half_widths) == ["z", "v"]
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_a_band_over_time_is_as_wide_as_its_window():
     result = tc.certify(tc.specification(PLANT.replace("NOISE", "0"))).result
