@@ -179,8 +179,8 @@ def told(line: str, real: list[str]) -> bool:
 
 
 def commands(block: Block) -> list[str]:
-    """The commands of a block: a line each, or joined by `&&`; without comments."""
-    lines = (re.sub(r"\s+#.*$", "", line).strip() for line in block.text.splitlines())
+    """The commands of a block: a line each, or several that are continued, or joined by `&&`; without comments."""
+    lines = (re.sub(r"\s+#.*$", "", line).strip() for line in block.text.replace("\\\n", " ").splitlines())
     parts = (part.strip() for line in lines for part in line.split("&&"))
     return [part.removeprefix(".venv/bin/") if "bin/tubecert" in part else part for part in parts if part]
 
