@@ -46,9 +46,9 @@ def with_metric(text, metric, following="tube:"):
     return text[:start] + metric + "\n" + text[end:]
 
 
-def run(text, **options):
-    """The result, which other tests may have asked for as well."""
-    return proven.result(text, **options).to_json()
+def run(text, *, bare=True, **options):
+    """The result, which other tests may have asked for as well; curves and advice only where these are looked at."""
+    return proven.result(text, bare=bare, **options).to_json()
 
 
 def captured_problem(text, **options):
@@ -62,7 +62,7 @@ def declared(text):
 
 @pytest.fixture(scope="module")
 def three():
-    return run(THREE)
+    return run(THREE, bare=False)
 
 
 def test_three_state_is_certified_in_every_number(three):

@@ -130,7 +130,7 @@ trajectory:
   kind: expressions
   x: ["sin(t)/2", "0"]
   u: ["(cos(t) + sin(t))/2 + sin(t)/80", "-sin(t)/16"]
-  horizon: 4
+  horizon: 2
 initial_state: {{at: [0.05, 0.02]}}
 metric: {{rate: 0.5, dual_metric: [[1, 0], [0, 1]]}}
 tube: {{epsilon: 0.3, rho_a: 0.2}}
