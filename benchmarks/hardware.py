@@ -224,7 +224,13 @@ def numbers() -> None:
 
 
 def cost(
-    names: Sequence[str] = ("hardware_orbit", "hardware_three", "two_state_windows", "hardware_pvtol"),
+    names: Sequence[str] = (
+        "hardware_orbit",
+        "hardware_three",
+        "hardware_state_dependent_input",
+        "two_state_windows",
+        "hardware_pvtol",
+    ),
 ) -> None:
     """CPU time of a certification with B alone and with H alone, the second of two runs each."""
     print("| configuration | B, s | H, s | H over B |\n|---|---|---|---|")

@@ -65,7 +65,8 @@ SAYS: Mapping[str, str] = {
     "of unknown parameters, beside what the inputs can make",
     "gain_not_covered": "the theorem is stated for a B that is known; parameters known by ranges in B are what "
     "certificate H alone covers",
-    "gain_unmatched": "the inputs must be proven to act where those of the middles do: B(x, theta) = B B^+ B(x, theta)",
+    "gain_unmatched": "the inputs must be proven to act where those of the middles do: B(x, theta) = B B^+ B(x, theta)"
+    "; what acts elsewhere can be written as a disturbance (docs/hardware.md)",
     "gain_range": "the gain of the inputs must be proven to be off by less than itself, |B^+ B(x, theta) - I| < 1",
     "corrected_formulas": "the paper's printed formulas are reproduced; several are wrong, so they certify nothing",
     "proven_gains": "gains that seem to serve were found, but none could be proven to; the constants may be too wide "
