@@ -1,8 +1,9 @@
-"""Findings of part R that have no other place: what plans owe (R6), which file a certificate is of (R4, R5), R7."""
+"""Findings that have no other place: what plans owe (R6), which file a certificate is of (R4, R5), R7, S7, S8."""
 
 from __future__ import annotations
 
 import copy
+import math
 from fractions import Fraction
 
 import pytest
@@ -232,3 +233,45 @@ def test_what_is_not_certified_is_not_told_as_if_it_were(case):
     """An attack: gains that do not serve, with the margins of gains that do, in a section that is not certified."""
     key, told = NOT_CERTIFIED[case]
     assert f"{case[0]}: what is told of it" in not_certified(certified(SMALL), key, **told)
+
+
+ONE = """tubecert: 1
+name: one
+system: {states: [x], inputs: [u], f: [-x], B: [[1]]}
+safe_set: {x: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: PLAN
+initial_state: START
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+"""
+REST = ONE.replace("PLAN", "{kind: equilibrium, at: [0], horizon: 2}").replace("START", "{at: [0.05]}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        (REST + "adaptation: {A_m: -1/3}\n", {}),
+        (SMALL.replace("A_m: -10", "A_m: [[-10, 1/7], [0, -10]]"), {}),
+        (REST, {"bandwidth": Fraction(100, 3), "adaptation_rate": Fraction(10**9)}),
+    ],
+    ids=["A_m", "a matrix A_m", "a bandwidth"],
+)
+def test_numbers_without_a_short_decimal_are_certified_and_confirmed(text, asked):
+    """S7: they ended the program."""
+    assert text != SMALL
+    document = certified(text, conditions="all" if not asked else None, **asked)
+    assert document["result"]["verdict"] == "certified"
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+def test_a_start_that_is_the_rounded_start_of_an_irrational_plan_is_bounded():
+    """S8: of all digits of a float d0 could not be bounded, of six it could."""
+    plan = '{kind: expressions, x: ["sin(t + 1)/3"], u: ["cos(t + 1)/3 + sin(t + 1)/3"], horizon: 2}'
+    text = ONE.replace("PLAN", plan).replace("START", f"{{at: [{math.sin(1) / 3!r}]}}")
+    document = certified(text, conditions="distance")
+    assert document["result"]["verdict"] == "certified"
+    assert document["result"]["constants"]["initial_distance"]["above"] < 1e-9
+    assert failing(examine(document)) == []
