@@ -195,6 +195,7 @@ FORGED = {
     "a smaller input below": own(0.99, "inputs", "u", 0),
     "no input": gone("hardware", "inputs", "u"),
     "a smaller share": own(0.99, "budget", "bias"),
+    "a small share, by less than what is dust": own(1 - 2e-7, "budget", "lag"),
     "no share": gone("hardware", "budget", "lag"),
     "no budget": put(None, "hardware", "budget"),
     "an infeasible curve": put([{"sample_time": 1.0, "level": 0.05}], "hardware", "curve"),

@@ -181,7 +181,8 @@ def _told_of_windows(
 
 
 def _share(found: Loop, key: str, share: Fraction) -> Outcome:
-    return at_most((found.shares[key] - _DUST).max(0), share, f"the share of {key}")
+    filled = found.shares[key]
+    return at_most(filled if share else (filled - _DUST).max(0), share, f"the share of {key}")
 
 
 # -- reading
