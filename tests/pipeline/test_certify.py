@@ -17,7 +17,7 @@ from tubecert.claims.family import Reason
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift
 from tubecert.errors import SpecError
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Memory, Options, certify
 from tubecert.records import from_json
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
@@ -212,15 +212,21 @@ def test_a_smaller_tube_never_has_larger_constants(three):
     assert smaller["constants"]["lower"]["below"] >= three["constants"]["lower"]["below"] * 0.99
 
 
+@pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 def test_gains_asked_for_are_judged_as_given(three):
+    memory, spec = Memory(), load_text(THREE, "spec.yaml")  # the constants are those of all three
+
+    def judged(**options):
+        return certify(spec, Options(**options), memory=memory).to_json()
+
     omega = Fraction(repr(three["conditions_26"]["bandwidth"]))
     Gamma = Fraction(three["conditions_26"]["adaptation_rate"])
-    assert run(THREE, bandwidth=omega, adaptation_rate=Gamma)["verdict"] == "certified"
-    slow = run(THREE, bandwidth=omega / 2, adaptation_rate=Gamma)
+    assert judged(bandwidth=omega, adaptation_rate=Gamma)["verdict"] == "certified"
+    slow = judged(bandwidth=omega / 2, adaptation_rate=Gamma)
     assert slow["verdict"] == "refuted"
     assert any(reason["condition"] == "26a" for reason in slow["reasons"])
-    weak = run(THREE, bandwidth=omega, adaptation_rate=Gamma / 2)
+    weak = judged(bandwidth=omega, adaptation_rate=Gamma / 2)
     assert weak["verdict"] == "refuted"
     assert any(reason["condition"] == "26c" for reason in weak["reasons"])
 

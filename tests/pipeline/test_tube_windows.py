@@ -127,7 +127,7 @@ def test_a_radius_beyond_the_tube_is_refused(bounded):
 @pytest.mark.slow
 def test_the_report_tells_where_the_tube_is_widest(tmp_path):
     path = tmp_path / "moving.json"
-    path.write_text(json.dumps(proven.proven(MOVING)), encoding="utf-8")
+    path.write_text(json.dumps(proven.proven(MOVING, bare=True)), encoding="utf-8")
     page = tc.report(tc.read(path)).html
     assert "3 windows: radius" in page
     assert "figure-along" in page
