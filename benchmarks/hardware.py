@@ -1,6 +1,7 @@
 """Certificate H with proven constants: the numbers of the notes, and what it costs over B.
 
     python benchmarks/hardware.py numbers   # largest sample times, noise and wind, and least tubes, as Markdown tables
+    python benchmarks/hardware.py cells     # each sample time that is more than 5 % off those of the notes, and why
     python benchmarks/hardware.py cost      # CPU time of certify with B, and with H, on each machine in configs/
 
 In the tables the numbers behind a stroke are those of the notes, for which constants were sampled and the free numbers
@@ -12,20 +13,22 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from tubecert.conditions.decimals import round_down
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.problem import TubeProblem
+from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import plan, tube
 from tubecert.search.hardware import Setting, recipe_at
-from tubecert.search.lanes import Lanes, Search
+from tubecert.search.lanes import DEADBEAT, Choice, Lanes, Search
 from tubecert.search.scan import serves
 from tubecert.spec import Hardware, load, load_text
 from tubecert.stages.bounded import bound, enclose
@@ -33,6 +36,8 @@ from tubecert.stages.metric import prove_metric
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 WIND = {"two_state_orbit": "0.05", "two_state": "0.05", "three_state": "0.005"}
+Of = TypeVar("Of")
+OF_NOTES = {"symbols_slope": 36.0, "feedback_curvature": 2.9}  # L_G, and D_Fx, of three states
 LATE = (Fraction(0), Fraction(1, 2), Fraction(1))  # delays, in sample times
 NOISES = (("clean", "0", False), ("n 1e-4", "1e-4", False), ("n 1e-3", "1e-3", False))
 COLUMNS = (*NOISES, ("wind", "0", True), ("n 1e-3, wind", "1e-3", True))
@@ -150,11 +155,15 @@ def downwards(value: float) -> Iterator[Fraction]:
     return (round_down(value * (1 - step), 3) for step in (0.0, 2e-3, 1e-2) if value > 0)
 
 
+def longest(search: Search, late: Fraction, noise: Fraction, wind: Fraction) -> float:
+    """The largest sample time in s, in floats."""
+    fixed = np.array(float(noise)), np.array(float(wind))
+    return largest(search, lambda x: lanes(x, float(late), *fixed), 0.1 / search.rate)
+
+
 def slowest(problem: TubeProblem, late: Fraction, noise: Fraction, wind: Fraction) -> float:
     """The largest sample time in ms that is proven to serve."""
-    search = Search(problem, problem.machine)
-    fixed = np.array(float(noise)), np.array(float(wind))
-    found = largest(search, lambda x: lanes(x, float(late), *fixed), 0.1 / search.rate)
+    found = longest(Search(problem, problem.machine), late, noise, wind)
     served = (Ts for Ts in downwards(found) if proven(problem, machine(Ts, late * Ts, noise, wind)))
     return 1e3 * float(next(served, 0))
 
@@ -223,6 +232,82 @@ def numbers() -> None:
             print(f"| {place.name}, rho {float(problem.rho):.3g} | " + " | ".join(cells) + " |", flush=True)
 
 
+class Coarse(Search):
+    """What is free looked for as in the notes: at the largest level, on a grid of bandwidths and floors."""
+
+    points = 20
+
+    def least(self, at: Lanes, dhat: Array | None = None) -> tuple[Array, Choice]:
+        """The best point of the grid in every lane."""
+        top = self.dbar - at.nu * float(self.plant.m.n_M) if dhat is None else dhat
+        level = np.maximum(top * (1 - 1e-6), 1e-9 * self.dbar)[:, None]
+        share = np.linspace(0, 1, self.points)
+        low, high = np.log(self.rate / 4), np.log(DEADBEAT / at.Ts)[:, None]
+        omega = np.repeat(np.exp(low + (high - low) * share), self.points, axis=1)
+        f0 = np.tile(level * np.exp(-9 * share), (1, self.points))
+        found = Choice(dhat=level + 0 * f0, omega=omega, f0=f0)
+        values = self.needed(at[:, None], found)
+        best = np.argmin(values, axis=1)
+        lanes = np.arange(len(at.Ts))
+        chosen = Choice(dhat=level[:, 0], omega=omega[lanes, best], f0=f0[lanes, best])
+        return values[lanes, best], chosen
+
+
+def attained(problem: TubeProblem) -> TubeProblem:
+    """With every constant at the end of its enclosure that is attained."""
+    assert problem.machine is not None
+    assert problem.wind is not None
+    machine = problem.machine
+    own = replace(machine, constants=_attained(machine.constants), covariant=_attained(machine.covariant))
+    wind = replace(problem.wind, constants=_attained(problem.wind.constants))
+    return replace(problem, constants=_attained(problem.constants), machine=own, wind=wind)
+
+
+def _attained(constants: Of) -> Of:
+    if constants is None:
+        return constants
+    found = {}
+    for item in fields(constants):  # type: ignore[arg-type]
+        value = getattr(constants, item.name)
+        if isinstance(value, Constant) and np.isfinite(value.above) and value.below > 0:
+            at = value.above if item.name == "lower" else value.below
+            found[item.name] = Constant(below=at, above=at)
+    return replace(constants, **found)  # type: ignore[type-var]
+
+
+def in_coordinates(problem: TubeProblem) -> TubeProblem:
+    """Without the covariant forms of the theorem, and where the notes took L_G and D_Fx with these."""
+    assert problem.machine is not None
+    machine = replace(problem.machine, covariant=None)
+    of_notes = {name: Constant(below=value, above=value) for name, value in OF_NOTES.items()}
+    return replace(problem, machine=replace(machine, constants=replace(machine.constants, **of_notes)))
+
+
+def cells() -> None:
+    """Every sample time that is more than 5 % off the notes, and what one difference after another makes of it."""
+    print("| place | delay | machine | notes | proven | constants attained | notes' forms | and grid |")
+    print("|---|---|---|---|---|---|---|---|")
+    for place in PLACES:
+        problem = problem_of(place)
+        curved = place.name == "three_state"
+        forms = in_coordinates(problem) if curved else problem
+        tried = ((problem, Search), (attained(problem), Search), (forms, Search), (forms, Coarse))
+        for i, late in enumerate(LATE):
+            for (name, noise, blows), notes in zip(COLUMNS, place.times, strict=True):
+                if not notes[i]:
+                    continue
+                wind = Fraction(WIND[place.name]) if blows else Fraction(0)
+                found = []
+                for each, kind in tried:
+                    found.append(1e3 * longest(kind(each, each.machine), late, Fraction(noise), wind))
+                    if abs(found[0] / notes[i] - 1) <= 0.05:
+                        break
+                else:
+                    own = " | ".join(f"{x:.3g}" for x in found)
+                    where = f"{place.name} {float(problem.rho):.3g} | {float(late):g} | {name}"
+                    print(f"| {where} | {notes[i]:g} | {own} |", flush=True)
+
+
 def cost(
     names: Sequence[str] = (
         "hardware_orbit",
@@ -249,9 +334,9 @@ def cost(
 def main() -> None:
     """What is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("numbers", "cost"))
+    parser.add_argument("what", choices=("numbers", "cells", "cost"))
     asked = parser.parse_args()
-    {"numbers": numbers, "cost": cost}[asked.what]()
+    {"numbers": numbers, "cells": cells, "cost": cost}[asked.what]()
 
 
 if __name__ == "__main__":
