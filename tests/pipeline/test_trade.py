@@ -86,7 +86,7 @@ def test_on_a_front_every_dot_is_a_certificate_and_a_wider_tube_allows_more(tmp_
 def test_sensitivities_are_told_and_their_settings_give_the_tube_again(tmp_path, monkeypatch):
     for name in ("_FARTHEST", "_NARROWINGS"):
         monkeypatch.setattr(design, name, 0)
-    monkeypatch.setattr(sensitivities, "_NARROWINGS", 1)
+    monkeypatch.setattr(sensitivities, "_NARROWINGS", 0)
     spec = written(tmp_path / "s.yaml", SCALAR.replace("0.001", "0.05"))
     done = run(spec, "--sensitivities", "--json", "-o", tmp_path / "d.json")
     assert done.exit_code == 0, done.output
