@@ -14,6 +14,7 @@ from tubecert.recheck.balls import Ball, Balls, exact, is_indefinite, is_positiv
 from tubecert.recheck.boxes import Box, Field, Found, Values
 from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.program import Program
+from tubecert.recheck.quotients import cancelled
 from tubecert.recheck.terms import Rows, Term
 
 
@@ -109,7 +110,7 @@ class PositiveDefinite:
 
     def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
         self._n = n = len(S)
-        self._field = Field([S[i][j] for i in range(n) for j in range(i + 1)], values)
+        self._field = Field(cancelled([S[i][j] for i in range(n) for j in range(i + 1)]), values)
         self._place = [max(i, j) * (max(i, j) + 1) // 2 + min(i, j) for i in range(n) for j in range(n)]
         self.variables = self._field.variables
         self._unit = (
