@@ -12,6 +12,7 @@ processor times in s. Numbers are in the units of the file: the rows of a system
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import re
@@ -224,19 +225,29 @@ def row(spec: Spec, units: Units, folder: Path, until: str) -> list[str]:
     ]
 
 
+def _parser() -> argparse.ArgumentParser:
+    described = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=described)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}; all by default")
+    parser.add_argument("--units", type=int, choices=range(1, len(UNITS) + 1), default=len(UNITS))
+    parser.add_argument("--folder", default="robots.runs", help="where rows are kept with their files")
+    parser.add_argument("--until", choices=[words[0] for words in COMMANDS], default=COMMANDS[-1][0])
+    return parser
+
+
 def main(arguments: list[str]) -> None:
     """Prints the table, a row as soon as it is known."""
-    count = int(arguments[arguments.index("--units") + 1]) if "--units" in arguments else len(UNITS)
-    kept = Path(arguments[arguments.index("--folder") + 1] if "--folder" in arguments else "robots.runs")
-    until = arguments[arguments.index("--until") + 1] if "--until" in arguments else COMMANDS[-1][0]
-    names = [word for word in arguments if word in NAMES] or NAMES
+    given = _parser().parse_args(arguments)
+    kept, names = Path(given.folder), given.names or NAMES
     heads = ("system", "units", "rate", "omega", "Gamma", "half-widths", *(c[0] for c in COMMANDS), "ended")
     print("| " + " | ".join(heads) + " |")
     print("|---" * len(heads) + "|")
     for name in names:
         spec = load(str(FOLDER / f"{name}.yaml"))
-        for number, units in enumerate(UNITS[:count], 1):
-            print("| " + " | ".join(row(spec, units, kept / f"{name}-{number}", until)) + " |", flush=True)
+        for number, units in enumerate(UNITS[: given.units], 1):
+            print(
+                "| " + " | ".join(row(spec, units, kept / f"{name}-{number}", given.until)) + " |", flush=True
+            )
 
 
 if __name__ == "__main__":
