@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from proven import barely as in_brief
 from rechecked import certified, examine, failing, respecified, sealed
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.library import designing
+from tubecert.pipeline import Options, certify
 from tubecert.pipeline.width import measure_in, measure_of
+from tubecert.simulate.certified import read_numbers
 from tubecert.spec import canonical, load_text
 
 TEXT = (Path(__file__).parents[1] / "specs/ok/outputs.yaml").read_text("utf-8")
@@ -136,3 +139,11 @@ def test_designs_and_metrics_may_be_compared_by_outputs():
         designing._minimised(spec, ["tipp"], str)
     wanted = TEXT.replace("metric: {rate: 0.8", "metric: {synthesise: {outputs: [tip, x]}} #")
     assert load_text(wanted).synthesis.outputs == ("tip", "x")
+
+
+@pytest.mark.slow
+def test_simulate_reads_the_half_widths_of_outputs():
+    with in_brief():
+        result = certify(load_text(TEXT), Options())
+    widths = result.tube.half_widths
+    assert read_numbers(result).output_widths == tuple(widths[name] for name in ("m", "tip", "twice"))

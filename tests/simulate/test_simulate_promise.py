@@ -15,6 +15,7 @@ from tubecert.simulate.compare import compare
 from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.promise import KINDS, promise
 from tubecert.simulate.uncertainty import class_of
+from tubecert.spec.types import Output
 
 T = np.linspace(0, 4, 81)
 
@@ -146,6 +147,22 @@ def test_half_widths_count_to_both_sides(sign):
     promised = promise(where.certified, KINDS["distance"])
     narrow = replace(promised, half_widths=(1.0, 0.4 * where.rho), decay=None)
     assert [item.name for item in compare(where, found, narrow).violations] == ["half-width of v"]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("width", "broken"), [(1.01, []), (0.99, ["half-width of both"])])
+def test_outputs_keep_to_their_half_widths(sign, width, broken):
+    """2 v goes to rho and back."""
+    where, found = around(0.5, sign=sign)
+    where = replace(
+        where, spec=replace(where.spec, outputs=(Output(name="both", row=(Fraction(1), Fraction(2))),))
+    )
+    promised = replace(
+        promise(replace(where.certified, output_widths=(width * where.rho,)), KINDS["distance"]),
+        half_widths=(1.0, where.rho),
+        decay=None,
+    )
+    assert [item.name for item in compare(where, found, promised).violations] == broken
 
 
 @pytest.mark.parametrize(("share", "left"), [(1.9, False), (2.1, True)])

@@ -103,7 +103,7 @@ class Certified:
 
     `S` (n, n): the tube and the loop are designed in z = S x. `reach` is dbar = sqrt(a) rho; `rate` lambda in 1/s;
     `upper` the bound A of lmax(M), where there is one; `constants` the safe sides, by their names in the certificate;
-    `sections` by the names in `proof`. `beside`: what acts and is no input.
+    `sections` by the names in `proof`. `beside`: what acts and is no input. `output_widths`: those of the outputs.
     """
 
     rho: float
@@ -115,6 +115,7 @@ class Certified:
     constants: Values
     sections: Mapping[str, Section]
     beside: Acting
+    output_widths: tuple[float, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         """The safe side of a constant."""
@@ -204,6 +205,7 @@ def read_numbers(result: Result) -> Certified:
         rate=float(metric.rate),
         upper=upper if upper is None or math.isfinite(upper) else None,
         half_widths=widths,
+        output_widths=tuple(tube.half_widths[name] for name in result.spec.effective.system.outputs),
         S=np.eye(len(widths))
         if rows is None
         else np.array([[float(Fraction(q)) for q in row] for row in rows]),

@@ -193,6 +193,11 @@ def _violations(
     for i, width in enumerate(promise.half_widths):
         name = f"half-width of {setting.spec.states[i]}"
         found += _over_time(name, gap[:, :, i], np.full(len(runs.t), width), runs.t, room * width)
+    for output, width in zip(setting.spec.outputs, promise.output_widths, strict=False):
+        values = np.abs((runs.x - runs.x_plan) @ np.array([float(q) for q in output.row]))
+        found += _over_time(
+            f"half-width of {output.name}", values, np.full(len(runs.t), width), runs.t, room * width
+        )
     for name, values, bound, size in beyond(runs, promise.ranges):
         excess = np.where(usable, values - bound - (slack - 1) * size, -np.inf)
         found += _broken(name, excess, values, np.full(runs.lanes, bound), np.full(runs.lanes, np.nan))

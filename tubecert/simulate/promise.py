@@ -68,7 +68,7 @@ class Promise:
     """Bounds of one loop: `rho`, `reach` = dbar, per-state `half_widths` (n,), and others by the names of peaks.
 
     `ultimate` is the radius in the long run, `decay` the bound of the distance over time; either may be missing.
-    `ranges`: those of inputs that have limits.
+    `ranges`: those of inputs that have limits; `output_widths` those of the outputs, in the order of the specification.
     """
 
     title: str
@@ -79,6 +79,7 @@ class Promise:
     ultimate: float | None
     decay: Decay | Levels | None
     ranges: tuple[InputRange, ...] = ()
+    output_widths: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +135,7 @@ def promise(certified: Certified, kind: Kind) -> Promise | None:
         ultimate=section.ultimate,
         decay=None if section.windows else kind.decay(certified, recipe),
         ranges=section.ranges,
+        output_widths=certified.output_widths,
     )
     return _in_windows(section, whole) if section.windows else whole
 
@@ -181,6 +183,7 @@ def _promise_of_machine(certified: Certified, kind: Kind, section: Section, own:
         ultimate=section.ultimate,
         decay=Levels(ends=ends, levels=levels) if own.levels else None,
         ranges=section.ranges,
+        output_widths=certified.output_widths,
     )
 
 
