@@ -33,6 +33,7 @@ from tubecert.claims.advice import (
 from tubecert.claims.failures import (
     ConditionNumber,
     Failure,
+    NoneCertified,
     NotProvenAsWritten,
     NotWritable,
     RankUnproven,
@@ -49,18 +50,16 @@ from tubecert.letters import HARDWARE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
-from tubecert.pipeline.certification import answer, explain
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
-from tubecert.pipeline.unfound import equilibria, none_certified, remedies, tried
+from tubecert.pipeline.unfound import equilibria, lacking, nearest, none_certified, remedies, tried
 from tubecert.pipeline.width import half_widths, measure_in
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.metric_file import FORMAT, with_metric_text
-from tubecert.stages.judged import Judged
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
@@ -360,33 +359,25 @@ class SynthesisRun:
                     LowerRate(),
                 )
         if (failure := none_certified(self._table())) is not None:
-            room: tuple[Relax, ...] = (ReduceRadii(), EnlargeSafeSet())
-            relax = room if isinstance(failure.slow, TubeInSafeSet) else ()
-            if self.told is not None and self._nearest is not None:
-                self.told(self._failed(failure, *relax))
-            return self._failed(failure, *relax, *self._lacking())
+            return self._none(failure)
         if self.told is not None:
             self.told(self._failed(tried(self.ladder.attempts)))
         return self._failed(
             tried(self.ladder.attempts), *remedies(self.ladder, rate, self.wanted.degree, self._say)
         )
 
-    @property
-    def _nearest(self) -> Row | None:
-        """The metric with which a machine's loop comes nearest to a proof; None where certificate H does not decide."""
-        judged = [row for row in self.rows.values() if row.by_machine]
-        return min(judged, key=lambda row: row.demand, default=None)
-
-    def _lacking(self) -> tuple[Relax, ...]:
-        """What fills the level of the loop that comes nearest, and machines that would serve with its metric."""
-        nearest = self._nearest
-        if nearest is None or self.cut is not None:
-            return ()
-        try:
-            end = answer(self.ask(self._with(nearest.metric), self._judging(), self._watch, self.memory))
-        except OutOfTime:
-            return ()
-        return explain(end).reasons[0].relax if isinstance(end, Judged) else ()
+    def _none(self, failure: NoneCertified) -> Synthesised:
+        """Why none of the metrics certifies, first as it stands, then with what a machine would need."""
+        small = isinstance(failure.slow, TubeInSafeSet)
+        found = self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
+        closest = None if self.cut is not None else nearest(self.rows.values())
+        if closest is None or found.reason is None:
+            return found
+        if self.told is not None:
+            self.told(found)
+        asked = self.ask(self._with(closest.metric), self._judging(), self._watch, self.memory)
+        reason = replace(found.reason, relax=(*found.reason.relax, *lacking(asked)))
+        return replace(found, reason=reason)
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""

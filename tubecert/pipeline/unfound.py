@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 
 from tubecert.claims.advice import (
@@ -17,8 +17,12 @@ from tubecert.claims.failures import (
     NothingFound,
 )
 from tubecert.claims.family import Relax
+from tubecert.pipeline.certification import answer, explain
+from tubecert.pipeline.deadline import OutOfTime
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
+from tubecert.stages.judged import Judged
+from tubecert.stages.question import Question
 from tubecert.synthesis.attempts import Attempt
 from tubecert.synthesis.family import suggested
 from tubecert.synthesis.ladder import Ladder
@@ -44,6 +48,20 @@ def none_certified(rows: Sequence[Row]) -> NoneCertified | None:
         fast=fast_claim,
         fast_verdict=fast.verdict or Verdict.UNDECIDED,
     )
+
+
+def nearest(rows: Iterable[Row]) -> Row | None:
+    """The metric with which a machine's loop comes nearest to a proof; None where certificate H does not decide."""
+    return min((row for row in rows if row.by_machine), key=lambda row: row.demand, default=None)
+
+
+def lacking(question: Question) -> tuple[Relax, ...]:
+    """What fills the level of a loop, and machines that would serve with its metric; nothing if time is up."""
+    try:
+        end = answer(question)
+    except OutOfTime:
+        return ()
+    return explain(end).reasons[0].relax if isinstance(end, Judged) else ()
 
 
 def tried(attempts: Sequence[Attempt]) -> NothingFound:
