@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
+_HARDLY = 1.05  # times as much
 _CUT = {
     "deadline": "cut short by the deadline: this is the best of what was proven by then",
     "interrupted": "interrupted: this is the best of what was proven by then",
@@ -102,6 +103,8 @@ def _limits(limits: RateLimits) -> list[Text]:
         if limit is None:
             continue
         more = "more gain" if limit.factor is None else f"{short(limit.factor, 2)} times the gain"
+        if limit.factor is not None and limit.factor < _HARDLY:
+            more = "hardly more gain"
         lines.append(Text(f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"))
     return lines
 
