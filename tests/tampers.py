@@ -16,7 +16,7 @@ from collections import defaultdict
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.run import recheck
 
-BUDGET = 2_000
+BUDGETS = 2_000, 20_000, 200_000
 
 
 def anything(old, new):
@@ -230,10 +230,20 @@ def is_harmless(result, path, old, new):
     )
 
 
-def verdict_on(certificate, memory):
+def confirming(certificate, memory):
+    """The first budget with which the certificate is confirmed: where it is not, every change is refused for that."""
+    for budget in BUDGETS:
+        tried = {}
+        if verdict_on(certificate, tried, budget) == ExitCode.CERTIFIED:
+            memory |= tried
+            return budget
+    raise AssertionError("there is nothing to forge: it is not confirmed as it stands")
+
+
+def verdict_on(certificate, memory, budget):
     """What recheck says: an exit code; findings of an invalid document count as their code."""
     try:
-        found = recheck(json.dumps(certificate), "tampered", BUDGET, memory=memory, to_first_failure=True)
+        found = recheck(json.dumps(certificate), "tampered", budget, memory=memory, to_first_failure=True)
     except TubecertError as error:
         return error.exit_code
     return found.exit_code
@@ -248,6 +258,7 @@ def campaign(certificate, count, seed, report=None):
     shapes = fields(certificate["result"])
     names = sorted(shapes)
     refused, accepted, wrong = 0, defaultdict(int), []
+    budget = confirming(certificate, memory)
     for done in range(count):
         if report is not None and done % 100 == 0:
             report(
@@ -260,7 +271,7 @@ def campaign(certificate, count, seed, report=None):
         kind, new = changed(random_, old)
         if kind == "changed" and type(new) is type(old) and new == old:
             continue
-        code = verdict_on(applied(certificate, path, kind, new), memory)
+        code = verdict_on(applied(certificate, path, kind, new), memory, budget)
         assert code in (ExitCode.CERTIFIED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID, ExitCode.UNDECIDED)
         if code != ExitCode.CERTIFIED:
             refused += 1
@@ -485,6 +496,7 @@ def structural_campaign(certificate, count, seed, report=None):
     """`count` changes of structure: refused, accepted by kind and shape, and those that must not be (or crash)."""
     random_, memory = random.Random(seed), {}
     refused, accepted, wrong, done = 0, defaultdict(int), [], 0
+    budget = confirming(certificate, memory)
     same = json.dumps(certificate["result"])
     while done < count:
         kind = STRUCTURES[done % len(STRUCTURES)]
@@ -501,7 +513,7 @@ def structural_campaign(certificate, count, seed, report=None):
                 f"{done} changes: {refused} refused, {sum(accepted.values())} harmless, {len(wrong)} wrong"
             )
         try:
-            code = recheck(text, "tampered", BUDGET, memory=memory, to_first_failure=True).exit_code
+            code = recheck(text, "tampered", budget, memory=memory, to_first_failure=True).exit_code
         except TubecertError as error:
             code = error.exit_code
         except Exception as error:  # an internal error is a finding too
