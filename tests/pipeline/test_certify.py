@@ -415,3 +415,15 @@ def test_a_constant_without_a_bound_stops_only_what_needs_it(supremum, loser, mo
     ]
     assert sections == (["undecided", "certified", "certified"] if loser else [])
     assert (by_distance["verdict"] == "certified") == (loser is not None)
+
+
+def test_who_gives_no_radii_is_told_of_half_widths_and_who_gives_one_is_not():
+    """Nobody who is new knows what epsilon is; how far each state may be off, in its unit, they know."""
+    with pytest.raises(SpecError) as caught:
+        run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "gap: auto")))
+    both = [finding.help for finding in caught.value.findings if finding.help]
+    assert any("half_widths: {x1: ..., x2: ..., x3: ...}" in each for each in both)
+    with pytest.raises(SpecError) as caught:
+        run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "rho_a: 0.01")))
+    (one,) = (finding.help for finding in caught.value.findings)
+    assert "half_widths" not in one

@@ -75,10 +75,17 @@ def missing_radii(spec: Spec) -> list[Finding]:
     if spec.tube.half_widths:
         return [_beside_half_widths(spec)] if spec.tube.epsilon is not None else []
     if spec.tube.epsilon is None:
-        found.append(_missing(spec, "tube.epsilon", "give tube.epsilon, or --epsilon E"))
+        whole = "" if spec.tube.rho_a is not None else f"; or {_half_widths(spec)}"
+        found.append(_missing(spec, "tube.epsilon", f"give tube.epsilon, or --epsilon E{whole}"))
     if spec.tube.rho_a is None:
         found.append(_missing(spec, "tube.rho_a", "give tube.rho_a, or --rho-a R"))
     return found
+
+
+def _half_widths(spec: Spec) -> str:
+    """A tube that is asked for in the units of its states."""
+    shown = ", ".join(f"{name}: ..." for name in spec.states[:3])
+    return f"how far states may be off, in their units: tube: {{half_widths: {{{shown}}}}}"
 
 
 def _beside_half_widths(spec: Spec) -> Finding:
