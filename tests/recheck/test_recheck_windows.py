@@ -170,6 +170,7 @@ STRUCTURAL = {
     "a list for an object": put([], *W, 1, "constants"),
     "a constant of no window": put(1.0, *W, 1, "constants", "h_initial"),
     "a constant that is not known": put(1.0, *W, 1, "constants", "speed"),
+    "a constant that is added, and too small": put(1e-9, *W, 1, "constants", "noise_explained"),
     "a constant that is no number": put(None, *W, 1, "constants", "h"),
     "a state without a half-width": gone(*W, 1, "half_widths", "x"),
     "an input without a range": gone(*W, 1, "inputs", "u"),
