@@ -53,6 +53,21 @@ def rounded_lower(old, new):
     return new is None or (number(old) and lower(old + 1e-8 * abs(old), new))
 
 
+def within_gap(old, new):
+    """A bound that is as sharp as this verification proves, within the gap to which it was known; or left out."""
+    return new is None or (number(old) and higher(old * (1 - 1e-3), new))
+
+
+def left_out(old, new):
+    """A claim less."""
+    return new is None
+
+
+def not_certified(old, new):
+    """What a section is called that does not decide, and is not certified: it claims nothing (and that is listed)."""
+    return new in ("undecided", "refuted")
+
+
 def verified(old, new):
     """Numbers of a point or pair or plan that are examined anew as they stand."""
     return number(new) or isinstance(new, str) or new is None
@@ -105,6 +120,17 @@ HARMLESS = [
     (r"hardware\.inputs\.\w+\[1\]", higher),
     (r"hardware\.clip\[\]\[\]", verified),
     (r"proof\.hardware\.(floor|speed|bias|ripple|prediction)", verified),
+    # windows: the same, and their tubes, which are examined as they stand
+    (r"\w+\.windows\[\]\.(radius|supremum|half_widths\.\w+)", rounded_higher),
+    (r"\w+\.windows\[\]\.inputs\.\w+\[0\]", lower),
+    (r"\w+\.windows\[\]\.inputs\.\w+\[1\]", higher),
+    (r"\w+\.windows\[\]\.tube", verified),
+    (r"\w+\.windows\[\]\.constants\.\w+", within_gap),
+    (r"inputs\[\]\.windows(\.\w+)?", left_out),
+    (r"proof\.hardware\.windows\[\]\.(floor|speed|bias|ripple|prediction)", verified),
+    (r"proof\.(distance|sampled)\.windows\[\]\.(speed|prediction_error|uncertainty)", verified),
+    (r"proof\.distance\.settling", verified),
+    (r"(conditions_26|no_adaptation)\.verdict", not_certified),
     (r"decided_by\[\]", anything),  # any certified section may decide
     (r"overrides\b.*", anything),
     (r"(conditions_26|no_adaptation)\.shortfalls.*", anything),
@@ -120,6 +146,8 @@ HARMLESS = [
 ]
 # geodesics of a constant metric are straight lines whatever is said of a test: the words of the assumption are the same
 OF_CONSTANT_METRICS = [(r"metric\.unique_geodesics(\..*)?", anything)]
+# gains of a section that is not certified claim nothing
+OF_NO_RATES = [(r"conditions_26\.(bandwidth|adaptation_rate|projection_radius)", verified)]
 
 
 def leaves(value, path=()):
@@ -222,11 +250,13 @@ def is_harmless(result, path, old, new):
     if path and isinstance(path[-1], int):
         names.add(f"{shape(path[:-1])}[{path[-1]}]")
     constant = all(re.fullmatch(r"[-+0-9.e/]+", e) for row in result["metric"]["dual_metric"] for e in row)
+    rates = result.get("conditions_26")
+    idle = OF_NO_RATES if rates is not None and rates["verdict"] != "certified" else []
     return same(old, new) or any(
         re.fullmatch(pattern, name)
         and (serves(old, new) or (serves in (lower, higher) and between_ends(result, path, new)))
         for name in names
-        for pattern, serves in (*HARMLESS, *(OF_CONSTANT_METRICS if constant else ()))
+        for pattern, serves in (*HARMLESS, *idle, *(OF_CONSTANT_METRICS if constant else ()))
     )
 
 

@@ -56,9 +56,13 @@ def test_a_planted_fault_is_refused(calm, fault):
 def test_what_it_prints_is_examined_where_another_kind_decides(calm):
     other = certified(CALM, conditions="B")
     assert not failing(examine(other))
+    assert "no_adaptation.verdict" not in examine(other).unread
     forged = copy.deepcopy(other)
     forged["result"]["no_adaptation"]["uncertainty_limit"] *= 1.01
     assert unconfirmed(forged)
+    refuted = copy.deepcopy(other)
+    refuted["result"]["no_adaptation"]["verdict"] = "refuted"
+    assert "no_adaptation.verdict" in examine(refuted).unread, "it is not examined, and that is said"
 
 
 @pytest.mark.slow

@@ -98,8 +98,15 @@ def recheck(
         stated=certificate.result.verdict,
         hash=certificate.stated_hash,
         claims=tuple(found),
-        unread=NOT_EXAMINED,
+        unread=(*NOT_EXAMINED, *_refuted_beside(certificate)),
     )
+
+
+def _refuted_beside(certificate: Certificate) -> Iterator[str]:
+    """Sections that are called refuted beside what is certified: why they are is not examined."""
+    sections = certificate.result.sections
+    if certificate.result.verdict == "certified" and sections is not None:
+        yield from (f"{key}.verdict" for key, own in sections.by_key.items() if own.verdict == "refuted")
 
 
 def _claims(certificate: Certificate, budget: int) -> Iterator[Claim]:
