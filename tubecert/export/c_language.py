@@ -10,6 +10,20 @@ from tubecert.export.listing import decimal
 from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE
 
 
+def last_not_after(begins: str, count: int, value: str) -> Iterator[str]:
+    """Statements that leave in `low` the last of `count` numbers that a value is not below, by so many halvings."""
+    yield f"    for (k = 0; k < {max(1, (count - 1).bit_length())}; k++) {{"
+    yield "        const int middle = (low + high + 1) / 2;"
+    yield "        if (low < high) {"
+    yield f"            if ({value} >= {begins}[middle]) {{"
+    yield "                low = middle;"
+    yield "            } else {"
+    yield "                high = middle - 1;"
+    yield "            }"
+    yield "        }"
+    yield "    }"
+
+
 @dataclass(frozen=True, slots=True)
 class C:
     """Expressions of C99, in `float` or in `double`."""

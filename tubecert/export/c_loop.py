@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.c_language import C
+from tubecert.export.c_language import C, last_not_after
 from tubecert.export.controller import Controller
 
 
@@ -14,21 +14,11 @@ def plan_in_c(c: Controller, language: C) -> Iterator[str]:
     """x*(t) and u*(t); where the plan has knots, also the search of the piece."""
     yield ""
     if c.pieces is not None:
-        steps = max(1, (len(c.pieces.start) - 1).bit_length())
         yield "/* The piece that a time lies in. */"
         yield "static int piece(real t)"
         yield "{"
         yield "    int low = 0, high = PIECES - 1, k;"
-        yield f"    for (k = 0; k < {steps}; k++) {{"
-        yield "        const int middle = (low + high + 1) / 2;"
-        yield "        if (low < high) {"
-        yield "            if (t >= START[middle]) {"
-        yield "                low = middle;"
-        yield "            } else {"
-        yield "                high = middle - 1;"
-        yield "            }"
-        yield "        }"
-        yield "    }"
+        yield from last_not_after("START", len(c.pieces.start), "t")
         yield "    return low;"
         yield "}"
         yield ""

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.export.c_language import C
+from tubecert.export.c_language import C, last_not_after
 from tubecert.export.listing import decimal
 from tubecert.expression.lookup import Lookup
 
@@ -34,16 +34,7 @@ def in_c(table: Lookup, language: C) -> Iterator[str]:
     yield "{"
     yield f"    int low = 0, high = {count - 1}, k;"
     yield "    real s;"
-    yield f"    for (k = 0; k < {max(1, (count - 1).bit_length())}; k++) {{"
-    yield "        const int middle = (low + high + 1) / 2;"
-    yield "        if (low < high) {"
-    yield f"            if (x >= at_{own}[middle]) {{"
-    yield "                low = middle;"
-    yield "            } else {"
-    yield "                high = middle - 1;"
-    yield "            }"
-    yield "        }"
-    yield "    }"
+    yield from last_not_after(f"at_{own}", count, "x")
     yield f"    s = x - at_{own}[low];"
     c = [f"cubic_{own}[low][{k}]" for k in range(4)]
     yield f"    return {c[0]} + s * ({c[1]} + s * ({c[2]} + s * {c[3]}));"
