@@ -150,7 +150,9 @@ def test_a_certificate_its_code_and_what_is_refused(tmp_path):
     constants_are_read_back(folder, own, (text, target.name))
     other = exported(controller_of(own), "python")
     other.save(str(tmp_path / "python"))
-    assert examined(str(tmp_path / "python"), own, text, target.name).difference < 1e-13
+    in_python = examined(str(tmp_path / "python"), own, text, target.name)
+    assert in_python.difference < 1e-13
+    assert not in_python.unread
     with pytest.raises(TubecertError, match="in Python is not driven"):
         tc.drive(certification_of(data), tmp_path / "python", runs=1, duration="0.1")
     in_the_loop(target, folder)

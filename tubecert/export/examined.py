@@ -24,6 +24,7 @@ from tubecert.export.folder import Exported
 from tubecert.export.vectors import Vectors, vectors
 from tubecert.recheck.code.constants import entries, literals, miscompiled
 from tubecert.recheck.code.examination import Agreement, Allowed, examine
+from tubecert.recheck.code.python_reader import read_python
 from tubecert.recheck.code.reader import Code, read_code
 from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.controller import Column, answers
@@ -36,8 +37,8 @@ class Answers:
     """How far what code answers is from what recheck computes, at most, over `samples`.
 
     `ran`: it was compiled and run; else its text was. `constants`: so many were read back from the object.
-    `losses`: what rounding costs it, and what it may; empty where the certificate is not about rounding, or the code is
-    not C. `unread`: why the text was not followed.
+    `losses`: what rounding costs it, and what it may; empty where the certificate is not about rounding.
+    `unread`: why the text was not followed.
     """
 
     difference: float
@@ -89,7 +90,7 @@ def examined(folder: str, certificate: Certificate, text: str, name: str) -> Ans
     else:
         raise undecided(f"the controller in {folder} was neither compiled nor followed: {unread}")
     _require(difference <= own.tolerance, agreement, folder, difference)
-    if unread and found.language == "c" and found.controller.lost is not None:
+    if unread and found.controller.lost is not None:
         raise undecided(f"recheck has no bound of what the controller in {folder} rounds: {unread}")
     return Answers(
         difference=difference,
@@ -123,11 +124,11 @@ def _require(near: bool, agreement: Agreement | None, folder: str, difference: f
 
 
 def _code(found: Exported) -> tuple[Code | None, str]:
-    """The text of C as recheck reads it, or why it does not."""
-    if found.language == "python":
-        return None, ""
+    """The text as recheck reads it, or why it does not."""
     own = found.controller.name
     try:
+        if found.language == "python":
+            return read_python(found.files[f"{own}.py"]), ""
         return read_code(found.files[f"{own}.h"], found.files[f"{own}.c"]), ""
     except UnreadError as error:
         return None, str(error)

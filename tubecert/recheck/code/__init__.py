@@ -1,4 +1,5 @@
-"""The C that `export` writes, read, run on balls, and followed operation by operation: what its rounding can lose.
+"""The C and the Python that `export` writes, read, run on balls, and followed: what their rounding can lose.
 
-Nothing is shared with the exporter but the text: a closed grammar, of which everything else is refused.
+Both become the same program. Nothing is shared with the exporter but the text: a closed grammar, of which everything
+else is refused.
 """

@@ -1,4 +1,4 @@
-"""The text of exported C against the certificate: what it computes, and what its rounding loses.
+"""The text of exported code against the certificate: what it computes, and what its rounding loses.
 
 The text is run on measurements in balls with bounds of what rounding does at every operation, where a decimal stands
 for any number that it is the nearest one to, and compared with the formulas of section 8 (`controller`): a sign, an

@@ -18,7 +18,7 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.terms import slopes
 
 # what a bound is derived for: every piece that a sample meets, with its share of the sample and u* in its middle
-_MEAN = """
+MEAN = """
 static void mean_of_plan(real begin, real end, real mean[M])
 {
     const real length = end - begin;
@@ -45,7 +45,7 @@ def mean_of(own: Function, real: str) -> int:
     for each in own.body:
         match each:
             case Loop("j", _, Binary("<", Name("j"), Number(passes)), _):
-                wanted = _MEAN % {"suffix": "f" if real == "float" else "", "passes": passes}
+                wanted = MEAN % {"suffix": "f" if real == "float" else "", "passes": passes}
                 if own == function_of(wanted):
                     return int(passes)
     raise UnreadError("the mean of a feedforward through knots is computed in another way")

@@ -95,9 +95,9 @@ def read_code(header: str, source: str) -> Code:
     )
 
 
-def function_of(text: str) -> Function:
-    """One function, alone."""
-    own = _Reader("")
+def function_of(text: str, name: str = "") -> Function:
+    """One function, alone, of the controller of a name."""
+    own = _Reader(name)
     own.read(words(text))
     (found,) = own.functions.values()
     return found
