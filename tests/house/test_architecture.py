@@ -10,6 +10,7 @@ import pytest
 import tubecert
 from tubecert import kinds
 from tubecert.recheck.kinds import table as recheck_kinds
+from tubecert.recheck.specified.loop import LETTERS
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
@@ -136,7 +137,9 @@ def test_recheck_shares_nothing_with_the_producer(path):
 
 def test_recheck_knows_every_kind_and_no_other():
     """By a table of its own; beside the file of a kind, no file of the room names one."""
-    assert [kind.key for kind in recheck_kinds.KINDS] == [name.key for name in kinds.NAMES]
+    own = [(kind.key, kind.adapts) for kind in recheck_kinds.KINDS]
+    assert own == [(name.key, name.adapts) for name in kinds.NAMES]
+    assert [*LETTERS.items()] == [(name.letter, name.key) for name in kinds.NAMES]
     for path in (PACKAGE / "recheck").glob("*.py"):
         texts = {n.value for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Constant)}
         assert not texts & set(recheck_kinds.KEYS), path.name

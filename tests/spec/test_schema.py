@@ -16,6 +16,7 @@ import jsonschema
 import proven
 import pytest
 import yaml
+from systems import IN_WINDOWS, SCALAR
 
 import tubecert
 from tubecert import certificate, spec
@@ -229,7 +230,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
 
 
 def test_the_choices_are_those_of_the_readers():
-    from tubecert.letters import ADAPTIVE, words_of
+    from tubecert.letters import ADAPTIVE, ALL, NAMES, words_of
     from tubecert.spec.plan import KINDS
     from tubecert.spec.settings import RANGES, VERDICTS
     from tubecert.spec.simulation import CONTROLLERS
@@ -239,6 +240,12 @@ def test_the_choices_are_those_of_the_readers():
     assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
     assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
     assert set(properties["expect"]["properties"]) == {"verdict", *RANGES}
+    decides = properties["conditions"]["properties"]["decides"]["enum"]
+    assert set(map(str, decides)) == {*words_of(), ALL}
+    result = SCHEMAS["certificate"]["properties"]["result"]["properties"]
+    assert result["decided_by"]["items"]["enum"] == [name.key for name in NAMES]
+    assert {name.key for name in NAMES} <= set(result)
+    assert result["plan"]["properties"]["kind"]["enum"] == list(KINDS)
     simulation = properties["simulation"]["properties"]
     assert simulation["controllers"]["items"]["enum"] == list(CONTROLLERS)
     assert set(map(str, simulation["gains"]["enum"])) == set(words_of(ADAPTIVE))
@@ -289,6 +296,9 @@ VARIANTS = {
     "metric refuted": (ROOT / "configs/three_state.yaml", "rate: 0.9999", "rate: 1", {}),
     "leaves": (ROOT / "configs/three_state.yaml", "epsilon: 0.01", "epsilon: 0.1", {}),
     "too much": (ROOT / "configs/three_state.yaml", "0.1*sin(2*t)", "10*sin(2*t)", {}),
+    "a machine": (SCALAR, "", "", {}),
+    "a machine in windows": (IN_WINDOWS, "", "", {"conditions": "hardware", "bare": True}),
+    "a machine that does not serve": (SCALAR, "rate: 200", "rate: 2", {}),
     "state-dependent": (ROOT / "configs/state_dependent_input.yaml", "", "", {}),
 }
 
@@ -296,8 +306,8 @@ VARIANTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(VARIANTS))
 def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
-    path, old, new, options = VARIANTS[name]
-    text = path.read_text("utf-8")
+    source, old, new, options = VARIANTS[name]
+    text = source if isinstance(source, str) else source.read_text("utf-8")
     assert old in text
     result = proven.result(text.replace(old, new) if old else text, **options).to_json()
     sealed = json.loads(

@@ -21,6 +21,7 @@ from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.records import from_json, keyed, to_json
 from tubecert.spec import Interpolation, Knots
+from tubecert.spec.types import PlanKind
 from tubecert.verdict import Verdict
 
 Json = Any
@@ -127,7 +128,7 @@ class Samples:
 class PlanData:
     """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps."""
 
-    kind: Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
+    kind: PlanKind
     interpolation: Literal["exact", "hold", "linear", "hermite-simpson"] | None = None
     curve: Literal["hermite"] | None = None
     knots: KnotTexts | None = None

@@ -43,7 +43,7 @@ def plan_findings(spec: Spec) -> list[Finding]:
     findings = [*_start(spec)]
     outside = list(_outside(spec, curve))
     findings += outside or _room(spec, curve)
-    if not outside and spec.trajectory.kind in ("equilibrium", "expressions"):
+    if not outside and spec.trajectory.written:
         findings += _defect(spec, curve, build(spec))
     if spec.trajectory.table is not None:  # exchanged columns leave the safe set, too
         findings += table_findings(spec, spec.trajectory.table, build(spec), _least_radius(spec))
@@ -159,7 +159,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     x, u = list(curve.x.T), list(curve.u.T)
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
     rate = drift.run_floats([*x, *u, curve.t], curve.t.shape)
-    if spec.trajectory.kind == "expressions":
+    if spec.trajectory.kind != "equilibrium":
         from tubecert.expression import derivatives
 
         slope = Tape(derivatives([term.expression for term in spec.trajectory.x], TIME), (TIME,))

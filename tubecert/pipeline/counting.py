@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from tubecert.bounds.constants import TABLE
 from tubecert.kinds.table import KINDS
 from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
@@ -15,11 +16,10 @@ from tubecert.stages.question import Question
 
 METRIC: Final = "metric"
 PLAN: Final = "plan"
-_TUBE: Final = (  # in the order in which they are bounded; one that is zero, or declared, is not looked for
-    *("lower", "upper", "h_x", "h", "h_t", "h_initial", "plan_defect", "plan_defect_metric", "f", "f_x"),
-    *("B", "B_x", "b_x", "B_pinv", "B_pinv_x", "M_x", "u_star", "feedback_gain", "metric_input_gain"),
-    *("drift_on_plan", "input_gain_least", "contraction_excess", "geodesics"),
-)
+_FIRST: Final = ("lower", "upper", "h_x", "h", "h_t", "h_initial", "plan_defect", "plan_defect_metric")
+_SOUGHT: Final = (name for name in TABLE if name not in (*_FIRST, "initial_distance"))  # which has no search
+# in the order in which they are bounded; one that is zero, or declared, is not looked for
+_TUBE: Final = (*_FIRST, *_SOUGHT, "geodesics")
 _MACHINE: Final = (
     *("feedback_slope", "feedback_curvature", "plan_tilt", "plan_speed", "input_rate", "drift_difference"),
     *("drift_slope_metric", "drift_explained", "noise_size", "noise_metric", "noise_explained"),

@@ -10,12 +10,13 @@ from collections.abc import Iterator
 from tubecert.recheck import clearances, inputs
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
-from tubecert.recheck.kinds.table import KINDS, LETTERS
+from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
 from tubecert.recheck.result import Geodesics, Result, TubeSection
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Disturbance
+from tubecert.recheck.specified.loop import LETTERS
 from tubecert.recheck.specified.metric import Metric, Wanted
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 from tubecert.recheck.system import System
@@ -191,8 +192,9 @@ def _as_wanted(result: Result, deciding: tuple[str, ...]) -> bool:
     if wanted is None or result.sections is None:
         return instead is None
     letter = instead or wanted
-    adaptive = result.sections.by_key.keys() - {LETTERS["0"]}
-    return set(deciding) == (adaptive if letter == "all" else {LETTERS[letter]})
+    if letter != "all":
+        return set(deciding) == {LETTERS[letter]}
+    return set(deciding) == {kind.key for kind in KINDS if kind.adapts and kind.key in result.sections.by_key}
 
 
 def assumptions(result: Result, s: System) -> Outcome:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tubecert.recheck.document import Node
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.numbers import Numbers, Rows
-from tubecert.recheck.specified.trajectory import AnyPlan, Resting, Tabled
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Tabled
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,7 @@ def read_plan(node: Node, specification: Specification) -> Plan:
     optional = (
         ["interpolation"] if isinstance(specification.trajectory, AnyPlan) else ["interpolation", "samples"]
     )
-    if (
-        not isinstance(specification.trajectory, (Resting, AnyPlan))
-        and specification.trajectory.kind != "expressions"
-    ):
+    if not isinstance(specification.trajectory, (Resting, Expressed, AnyPlan)):
         optional += ["curve", "knots"]
     if isinstance(specification.trajectory, Tabled):
         optional += ["file", "file_hash"]

@@ -222,7 +222,7 @@ def _read_named(
         computed = hardware is not None and hardware.geodesic is not None
         check_gains(
             B,
-            plan.kind,
+            plan,
             has_hardware="hardware" in entries,
             has_windows=windows,
             has_geodesic=computed,

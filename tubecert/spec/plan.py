@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, get_args
 
 from tubecert.expression import ZERO, constant, substitute, to_text
 from tubecert.spec import codes
@@ -14,9 +14,19 @@ from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.table import read_table
-from tubecert.spec.types import Bundle, Interpolation, Matrix, Task, Term, Trajectory, Uncertainty, Vector
+from tubecert.spec.types import (
+    Bundle,
+    Interpolation,
+    Matrix,
+    PlanKind,
+    Task,
+    Term,
+    Trajectory,
+    Uncertainty,
+    Vector,
+)
 
-KINDS: Final = ("equilibrium", "expressions", "csv", "ilqr", "any")
+KINDS: Final[tuple[PlanKind, ...]] = get_args(PlanKind)
 MAX_KNOTS: Final = 2_001
 MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 

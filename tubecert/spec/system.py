@@ -15,11 +15,10 @@ from tubecert.spec.document import MappingNode
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.synthesis import read_synthesis
-from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
+from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Trajectory, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
 _LONG: Final = 10**12  # s, or that many times pi
-WRITTEN: Final = ("equilibrium", "expressions")  # kinds of plans
 
 
 def read_dynamics(
@@ -72,7 +71,7 @@ def returns(terms: Sequence[Term]) -> bool:
 
 
 def check_gains(
-    field: Field, kind: str, *, has_hardware: bool, has_windows: bool, has_geodesic: bool
+    field: Field, plan: Trajectory, *, has_hardware: bool, has_windows: bool, has_geodesic: bool
 ) -> None:
     """What is covered where parameters known by ranges stand in B."""
     if not has_hardware:
@@ -93,11 +92,11 @@ def check_gains(
             "a parameter known by a range stands in B, beside hardware.geodesic",
             "leave hardware.geodesic out, or give the parameter one value",
         )
-    elif kind not in WRITTEN:
+    elif not plan.written:
         field.fail(
             codes.RANGE,
-            f"a parameter known by a range stands in B, beside a trajectory of kind {kind}",
-            f"for an uncertain gain u* has to be written down: kind {' or '.join(WRITTEN)}",
+            f"a parameter known by a range stands in B, beside a trajectory of kind {plan.kind}",
+            "for an uncertain gain u* has to be written down: kind equilibrium or expressions",
         )
 
 

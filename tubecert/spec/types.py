@@ -114,6 +114,9 @@ class Bundle:
     defect: Fraction
 
 
+PlanKind = Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
     """The plan: horizon in s, and what its kind needs.
@@ -122,7 +125,7 @@ class Trajectory:
     a `bundle` instead.
     """
 
-    kind: Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
+    kind: PlanKind
     x: tuple[Term, ...] = ()
     u: tuple[Term, ...] = ()
     horizon: Fraction | None
@@ -134,6 +137,11 @@ class Trajectory:
         assert (self.table is not None) == (self.kind == "csv")
         assert (self.task is not None) == (self.kind == "ilqr")
         assert (self.bundle is not None) == (self.kind == "any")
+
+    @property
+    def written(self) -> bool:
+        """Whether x* and u* are written down as expressions, and neither data nor still to be found."""
+        return bool(self.x)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

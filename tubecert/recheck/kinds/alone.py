@@ -39,6 +39,7 @@ class Alone(Kind[AloneSection, NoGains]):
 
     key: ClassVar = "no_adaptation"
     conditions: ClassVar = ("no_adaptation",)
+    adapts: ClassVar = False
 
     def read(self, node: Node, n: int) -> AloneSection:
         """The section `no_adaptation`."""

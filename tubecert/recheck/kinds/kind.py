@@ -112,13 +112,15 @@ class Kind(ABC, Generic[S, R]):
     """One kind: S is its section, R its recipe.
 
     `conditions` are those that it may say are not proven, `unread` the members of its section that are shown and not
-    verified; `elastic` says whether a certificate tells how its least rate reacts to each constant.
+    verified; `elastic` says whether a certificate tells how its least rate reacts to each constant, `adapts` whether it
+    is about the adaptive loop, and so one of those that decide where all do.
     """
 
     key: ClassVar[str]
     conditions: ClassVar[tuple[str, ...]]
     unread: ClassVar[tuple[str, ...]] = ()
     elastic: ClassVar[bool] = False
+    adapts: ClassVar[bool] = True
 
     @abstractmethod
     def read(self, node: Node, n: int) -> S:

@@ -13,5 +13,4 @@ from tubecert.recheck.kinds.sampled import Sampled
 
 KINDS: Final[tuple[Kind[Any, Any], ...]] = (Alone(), Rates(), Distance(), Sampled(), OfMachines())
 KEYS: Final = tuple(kind.key for kind in KINDS)
-LETTERS: Final = dict(zip(("0", "A", "B", "C", "H"), KEYS, strict=True))
 CONDITIONS: Final = tuple(condition for kind in KINDS for condition in kind.conditions)

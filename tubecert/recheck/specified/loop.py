@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Final
 
 from tubecert.recheck.document import Node
 from tubecert.recheck.specified.numbers import Rows, positive, square
 
-DECIDES = ("0", "A", "B", "C", "H", "all")
+LETTERS: Final = {
+    "0": "no_adaptation",
+    "A": "conditions_26",
+    "B": "distance",
+    "C": "sampled",
+    "H": "hardware",
+}
+"""The key of every kind of certificate by the letter that a specification names it with, in the order of the table."""
+
+DECIDES: Final = (*LETTERS, "all")
 
 
 @dataclass(frozen=True, slots=True)
