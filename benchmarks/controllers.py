@@ -25,7 +25,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import Compiled, compiled, compiler
 from tubecert.export.controller import Controller
-from tubecert.export.driven import driven
+from tubecert.export.driven import Given, driven
 from tubecert.export.folder import Exported, exported
 from tubecert.export.vectors import vectors
 from tubecert.library.driving import Attack
@@ -133,7 +133,8 @@ def _row(words: str, config: str, changes: tuple[tuple[str, str], ...], precisio
     attack = Attack(runs=LANES)
     with compiled(files, lanes=LANES) as code, tempfile.TemporaryDirectory() as folder:
         both = Both(code, _module(controller, folder))
-        done = driven(setting, both, controller, count=LANES, seed=attack.seed, precision=precision)  # type: ignore[arg-type]
+        given = Given(count=LANES, seed=attack.seed, precision=precision)
+        done = driven(setting, both, controller, given)  # type: ignore[arg-type]
     nanoseconds, stack = _costs(files, controller)
     return (
         f"| {words} (`{config}`) | {len(controller.states)}, {len(controller.inputs)} | {done.runs * done.samples} "

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.conditions.sampled import SampledRecipe
 from tubecert.export.assembly import assembled
 from tubecert.export.blocks import Machine
-from tubecert.export.controller import Controller
+from tubecert.export.continuous.assembly import Loop, together
+from tubecert.export.controller import Continuous, Controller
 from tubecert.model import build
 from tubecert.spec import Knots, Picard, load_text
 from tubecert.trajectory import Plan
@@ -156,6 +158,47 @@ SLOW = machine(
 )
 CONTROLLERS = {name: partial(assembled, given) for name, given in GIVEN.items()}
 orbit, turning = CONTROLLERS["orbit"], CONTROLLERS["turning"]
+
+
+def loop(text: str, plan: Plan | None = None, **values: Any) -> Loop:
+    """A loop of certificate C for a specification."""
+    own = machine(text, plan)
+    given: dict[str, Any] = {
+        "name": own.name,
+        "hash": HASH,
+        "model": own.model,
+        "plan": own.plan,
+        "recipe": SampledRecipe(
+            sample_time=Fraction(1, 100),
+            bandwidth=Fraction("25.5"),
+            predictor_gain=Fraction("30.25"),
+            projection_radius=Fraction("0.9"),
+            speed=Fraction("8.1"),
+        ),
+        "reach": Fraction("0.19"),
+        "coordinates": None,
+        "horizon": own.horizon,
+        "ranges": ((-4.0, 4.0),) * len(own.model.inputs),
+        "feedback_gain": Fraction("6.302"),
+    }
+    return Loop(**(given | values))
+
+
+def _together(name: str) -> Continuous:
+    return together(looped(name))
+
+
+@cache
+def looped(name: str) -> Loop:
+    """One of `CONTINUOUS`."""
+    if name == "orbit":  # a moving plan
+        return loop((CONFIGS / "two_state_orbit.yaml").read_text("utf-8"))
+    if name == "turning":  # B(x), a table, two inputs, coordinates of the tube
+        return loop(TURNING, coordinates=(("1", "0", "0"), ("0", "2", "0"), ("0", "1/3", "1")))
+    return loop(PATH, piecewise_plan(build(load_text(PATH)), KNOTS), horizon=Fraction("0.31"))  # knots
+
+
+CONTINUOUS = {name: partial(_together, name) for name in ("orbit", "turning", "path")}
 
 
 def wandering(controller: Controller, samples: int, lanes: int, seed: int) -> np.ndarray:

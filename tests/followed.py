@@ -22,9 +22,11 @@ from tubecert.recheck.code.about import About
 from tubecert.recheck.code.examination import moves_of
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.continuous import Adapted
 from tubecert.recheck.controller import Machine
 from tubecert.recheck.curve import Knots, hermite
 from tubecert.recheck.document import read
+from tubecert.recheck.sampling import SampledGains
 from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import curve_of, system_of
 from tubecert.spec import load_text
@@ -40,6 +42,7 @@ TEXTS = {
     "steep": controllers.STEEP,
     "bent": controllers.BENT,
 }
+LOOPED = {"orbit": (controllers.CONFIGS / "two_state_orbit.yaml").read_text("utf-8")}
 
 
 def in_recheck(name: str) -> Machine:
@@ -47,11 +50,28 @@ def in_recheck(name: str) -> Machine:
     kind = name.removeprefix("held_").removeprefix("seldom_").removeprefix("predicting_")
     given = controllers.SLOW if name == "steep" else controllers.GIVEN[name]
     controller = controllers.assembled(given)
-    data = {"format": certificate.FORMAT, "spec": canonical(load_text(TEXTS[kind]))}
+    case = _case(TEXTS[kind], given, knotted=kind == "path")
+    section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
+    return Machine(case, section, given.recipe, held=given.held)
+
+
+def adapted_in_recheck(name: str) -> Adapted:
+    """The loop of a hand-made controller of certificate C, as recheck reads it."""
+    given = controllers.looped(name)
+    own = given.recipe
+    gains = SampledGains(own.sample_time, own.bandwidth, own.predictor_gain, own.projection_radius)
+    case = _case(LOOPED.get(name, TEXTS[name]), given, knotted=name == "path")
+    case.metric = SimpleNamespace(lower=SimpleNamespace(below=Fraction(1)))
+    case.tube.rho = given.reach
+    return Adapted(case, gains)
+
+
+def _case(text: str, given: Any, *, knotted: bool) -> SimpleNamespace:
+    data = {"format": certificate.FORMAT, "spec": canonical(load_text(text))}
     read_again = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
     system = system_of(read_again)
     knots = None
-    if kind == "path":
+    if knotted:
         own = controllers.KNOTS
         knots = Knots(t=own.t, x=own.x, u=own.u, held=False)
         curve = hermite(knots, [row[0] for row in system.drift], system.states, system.inputs, own.t[-1])
@@ -59,15 +79,13 @@ def in_recheck(name: str) -> Machine:
         curve = curve_of(read_again, SimpleNamespace(knots=None), system)
     rows = given.coordinates
     S = None if rows is None else tuple(tuple(map(Fraction, row)) for row in rows)
-    case = SimpleNamespace(
+    return SimpleNamespace(
         system=system,
         curve=curve,
         tube=SimpleNamespace(coordinates=S),
         result=SimpleNamespace(plan=SimpleNamespace(knots=knots), specification=read_again),
         bound={"feedback_gain": given.feedback_gain}.__getitem__,
     )
-    section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
-    return Machine(case, section, given.recipe, held=given.held)
 
 
 def covered(name: str = "held_orbit", **values: Any) -> Controller:

@@ -21,7 +21,7 @@ Examples:
   tubecert export plant.certificate.json -o controller --language python
 
 \b
-Exit codes: 0 written; 2 no certificate, one whose certificate H is not certified or cannot be exported (the
+Exit codes: 0 written; 2 no certificate, one whose certificates H and C are not certified or cannot be exported (the
 message says why), or a folder that cannot be written.
 """
 
@@ -59,7 +59,7 @@ def export(
     certificate: Annotated[
         str,
         typer.Argument(
-            metavar="CERT", help="A certificate (JSON) whose certificate H holds.", show_default=False
+            metavar="CERT", help="A certificate (JSON) whose certificate H or C holds.", show_default=False
         ),
     ],
     *,
@@ -77,7 +77,7 @@ def export(
     ] = None,
     how: Output,
 ) -> None:
-    """Write the controller that a certificate H is about: C99 without dependencies, or Python."""
+    """Write the controller that a certificate H or C is about: C99 without dependencies, or Python."""
     if language is Languages.PYTHON and precision is Precisions.SINGLE:
         raise typer.BadParameter("Python computes in double", ctx=context)
     with guarded(how):

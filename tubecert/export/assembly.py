@@ -1,16 +1,13 @@
-"""From a certificate to its controller: the question that it answers, what cannot be exported, and the parts together.
+"""From a certificate to its controller: what cannot be exported, and the parts together.
 
-In: a `Certificate` whose section `hardware` is certified. Out: a `Controller`, or the reason why there is none.
+In: a `Certificate` whose section `hardware` or `sampled` is certified. Out: a `Controller` or a `Continuous`, or the
+reason why there is none.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import re
-from collections.abc import Mapping
 from fractions import Fraction
-from itertools import pairwise
 from typing import Final
 
 from tubecert.certificate.file import incomplete
@@ -18,42 +15,48 @@ from tubecert.certificate.result import Certificate
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.hardware.geodesics import error_of_speed
 from tubecert.coordinates import inverse
-from tubecert.enclosure.interval import Array, Interval, sqrt
+from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.export import blocks, geodesics
 from tubecert.export.blocks import INTEGRATION, Machine, forgotten
-from tubecert.export.controller import Controller, Pieces, refused
+from tubecert.export.continuous.assembly import of_samples
+from tubecert.export.controller import Continuous, Controller, refused
+from tubecert.export.question import gain_of, horizon_of, identifier, pieces_of, question
 from tubecert.expression import free_symbols, topological
-from tubecert.kinds import HARDWARE
+from tubecert.kinds import HARDWARE, SAMPLED
 from tubecert.kinds.hardware import HardwareData
-from tubecert.model import ControlAffineModel, build
-from tubecert.spec import Picard, Spec, load_text
-from tubecert.trajectory import Plan
-from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
+from tubecert.model import ControlAffineModel
+from tubecert.spec import Picard
+from tubecert.trajectory.pieces import PiecewisePlan
 from tubecert.verdict import Verdict
 
 _NOISE: Final = "noise_metric"  # n_M of one unit of noise
 _SIZE: Final = "noise_size"  # n_E
-_GAIN: Final = "feedback_gain"
 _BENT: Final = ("lower", "symbols", "symbols_slope")
-_LONGEST: Final = 32  # characters of a name
 _MOST_EVERY: Final = 1000  # samples from one feedback to the next
 
 
-def controller_of(certificate: Certificate, name: str = "the certificate") -> Controller:
-    """The controller that a certificate is about.
+def controller_of(certificate: Certificate, name: str = "the certificate") -> Controller | Continuous:
+    """The controller that a certificate is about: H where there is a machine, unless C decides; else C.
 
     Raises `TubecertError` (TC710) with the reason where it certifies none that can be exported.
     """
-    data = certificate.result.sections.get(HARDWARE.key)
-    if not isinstance(data, HardwareData) or data.verdict is not Verdict.CERTIFIED:
+    result = certificate.result
+    data, decided = result.sections.get(HARDWARE.key), result.decided_by
+    if isinstance(data, HardwareData) and (SAMPLED.key not in decided or HARDWARE.key in decided):
+        return _of_machine(certificate, data, name)
+    return of_samples(certificate, name)
+
+
+def _of_machine(certificate: Certificate, data: HardwareData, name: str) -> Controller:
+    if data.verdict is not Verdict.CERTIFIED:
         raise refused(
-            f"{name} certifies no controller of a machine",
-            "export is about certificate H: give the specification a section hardware, and certify it",
+            f"{name} certifies no controller of a machine: its certificate H does not hold",
+            "advice in its report says which machine would serve",
         )
     recipe = certificate.result.proof.of.get(HARDWARE.key)
     if not isinstance(recipe, HardwareRecipe) or data.level is None:
         raise incomplete(name, "the recipe of certificate H is missing")
-    spec, plan, model = _question(certificate)
+    spec, plan, model = question(certificate)
     if spec.hardware is None:
         raise incomplete(name, "its specification has no section hardware")
     tube = certificate.result.tube
@@ -67,9 +70,9 @@ def controller_of(certificate: Certificate, name: str = "the certificate") -> Co
         clip=data.clip,
         coordinates=None if tube is None else tube.coordinates,
         held=spec.hardware.held,
-        horizon=_horizon(certificate),
+        horizon=horizon_of(certificate),
         ranges=tuple(data.inputs.get(each, (-math.inf, math.inf)) for each in model.inputs),
-        feedback_gain=_gain(certificate, name),
+        feedback_gain=gain_of(certificate, name),
         geodesic=spec.hardware.geodesic,
         noise_size=_noise_size(certificate),
     )
@@ -85,7 +88,7 @@ def assembled(machine: Machine) -> Controller:
     model, plan, recipe = machine.model, machine.plan, machine.recipe
     _require(model, recipe, machine.geodesic)
     bent = geodesics.varies(model)
-    pieces = _pieces(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
+    pieces = pieces_of(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
     still, m = pieces is None and not free_symbols(plan.u), len(model.inputs)
     played, covered = not still and not machine.held, bool(recipe.rounding)
     if played and pieces is None and any(node.op == "table" for node in topological(plan.u)):
@@ -94,7 +97,7 @@ def assembled(machine: Machine) -> Controller:
             "certify with hardware: {feedforward: held}, or write the plan into a CSV file",
         )
     return Controller(
-        name=_identifier(machine.name),
+        name=identifier(machine.name),
         system=machine.name,
         hash=machine.hash,
         states=model.states,
@@ -143,33 +146,6 @@ def _moves(machine: Machine) -> tuple[Fraction, ...]:
     far = recipe.speed * recipe.sample_time + 2 * recipe.noise * machine.noise_size
     sizes = [Fraction(1) if back is None else sum((q * q for q in back[i]), Fraction(0)) for i in range(n)]
     return tuple(Fraction(float((Interval.of(far) * sqrt(Interval.of(size))).hi)) for size in sizes)
-
-
-def _question(certificate: Certificate) -> tuple[Spec, Plan, ControlAffineModel]:
-    """The specification in the certificate, its plan as it was certified, and its model."""
-    data, knots = certificate.result.spec.effective.data, certificate.result.plan.exact_knots()
-    if knots is not None:  # its plan was in a file
-        rest = {"kind": "equilibrium", "at": ["0"] * len(certificate.result.spec.effective.system.states)}
-        apart = ("initial_state", "obstacles", "simulation", "expect", "conditions")
-        kept = {key: value for key, value in data.items() if key not in apart} | {"trajectory": rest}
-        data = {key: _anytime(value) if key == "tube" else value for key, value in kept.items()}
-    spec = load_text(json.dumps(dict(data)), "certificate")
-    trajectory, model = spec.trajectory, build(spec)
-    if knots is not None:
-        if knots.interpolation == "hermite-simpson":
-            raise refused(
-                "a plan with quadratic inputs (interpolation: hermite-simpson) is not exported yet",
-                "give its rows with interpolation: linear, and certify that",
-            )
-        horizon = certificate.result.spec.effective.trajectory.horizon
-        return spec, piecewise_plan(model, knots, horizon), model
-    x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
-    return spec, Plan(x, u, trajectory.horizon), model
-
-
-def _anytime(tube: Mapping[str, object]) -> Mapping[str, object]:
-    """A tube without its windows, which are times of a plan."""
-    return {key: value for key, value in tube.items() if key != "windows"}
 
 
 def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard | None) -> None:
@@ -230,44 +206,3 @@ def looked_at(recipe: HardwareRecipe, noise: float, upper: float) -> Fraction:
     if recipe.prediction is not None:
         looked = max(looked, recipe.prediction * Fraction(math.nextafter(math.sqrt(upper), math.inf)))
     return recipe.level + Fraction(f"{float(looked) * (1 + 1e-6):.6e}")
-
-
-def _gain(certificate: Certificate, name: str) -> Fraction:
-    """du, from above: what the feedback is clipped by; one that is missing would be a controller without feedback."""
-    gain = certificate.result.constants.get(_GAIN)
-    if gain is None or gain.above is None:
-        raise incomplete(name, f"the constant {_GAIN} has no bound")
-    return Fraction(gain.above)
-
-
-def _horizon(certificate: Certificate) -> Fraction | None:
-    """How long the claim holds; None for ever."""
-    claim = certificate.result.claim
-    return None if claim.for_all_time or claim.horizon is None else Fraction(claim.horizon)
-
-
-def _identifier(name: str) -> str:
-    """A name of C and Python."""
-    found = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:_LONGEST] or "controller"
-    return found if found[0].isalpha() else f"c_{found}"
-
-
-def _pieces(plan: PiecewisePlan, sample_time: Fraction) -> Pieces:
-    """Coefficients in the middle of their enclosures."""
-    found = plan.pieces
-    start = plan.data.t[: len(found)]
-    shortest = min((b - a for a, b in pairwise(start)), default=sample_time)
-    return Pieces(
-        start=start,
-        x=_table(found.x.mid),
-        u=_table(found.u.mid),
-        most=int(sample_time / shortest) + 2,
-        x_off=_table(found.x.rad),
-        u_off=_table(found.u.rad),
-        length=tuple(map(Fraction, found.length.hi.tolist())),
-        continuous=plan.data.interpolation == "linear" or len(found) == 1,
-    )
-
-
-def _table(values: Array) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
-    return tuple(tuple(tuple(map(Fraction, row)) for row in piece) for piece in values.tolist())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from tubecert.errors import ExitCode, TargetError
-from tubecert.export.controller import Controller, refused
+from tubecert.export.controller import Continuous, Controller, refused
 from tubecert.export.folder import FORMAT, MANIFEST, Exported, Language, Precision, exported
 from tubecert.files import Kind, read
 from tubecert.findings import Finding
@@ -26,7 +26,7 @@ _KIND: Final = Kind(
 )
 
 
-def belonging(folder: str, controller: Controller) -> Exported:
+def belonging(folder: str, controller: Controller | Continuous) -> Exported:
     """The controller in a folder; raises TC711 where it is not that of the certificate, and `TargetError`."""
     language, precision = _kind(folder, controller)
     wanted = exported(controller, language, precision)
@@ -48,7 +48,7 @@ class Manifest:
     precision: Precision
 
 
-def _kind(folder: str, controller: Controller) -> tuple[Language, Precision]:
+def _kind(folder: str, controller: Controller | Continuous) -> tuple[Language, Precision]:
     """Language and precision, as the folder says; it says of which certificate it is as well."""
     path = Path(folder) / MANIFEST
     try:

@@ -224,12 +224,16 @@ def _clipped(writer: Writer, q: Sequence[Place], machine: Machine) -> list[Place
     return [writer.mul(share, each) for each in q]
 
 
-def _explained(machine: Machine) -> Matrix:
+def explained(model: ControlAffineModel, S: Coordinates | None) -> Matrix:
     """(S B)^+ S, (m, n): what of a speed the inputs can make."""
+    pinv = Fields(model, S).B_pinv
+    return pinv if S is None else multiply(pinv, S.S)
+
+
+def _explained(machine: Machine) -> Matrix:
     rows = machine.coordinates
     S = None if rows is None else Coordinates(tuple(tuple(Fraction(q) for q in row) for row in rows))
-    pinv = Fields(machine.model, S).B_pinv
-    return pinv if S is None else multiply(pinv, S.S)
+    return explained(machine.model, S)
 
 
 def forgotten(recipe: HardwareRecipe) -> Fraction:

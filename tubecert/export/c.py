@@ -9,7 +9,7 @@ from typing import Final
 from tubecert.export import tables
 from tubecert.export.c_language import C, comment
 from tubecert.export.c_loop import entries_in_c, feedback_in_c, mean_in_c, plan_in_c, prediction_in_c
-from tubecert.export.controller import Controller, Pieces
+from tubecert.export.controller import Controller, Pieces, Steering
 from tubecert.export.listing import lines
 from tubecert.export.program import Port, Program
 from tubecert.export.sweeps import in_c
@@ -101,8 +101,21 @@ def _out(c: Controller, name: str, size: str) -> str:
 
 
 def _source(c: Controller, language: C) -> Iterator[str]:
+    yield from preamble(c, language, (heading(c), f"Certificate: {c.hash}", "", *promise(c)))
+    yield from plan_in_c(c, language)
+    yield from mean_in_c(c, language)
+    if c.swept is not None:
+        yield from in_c(c.swept, len(c.states), language.number(Fraction(0)))
+    yield from feedback_in_c(c, language)
+    if c.predicts:
+        yield from prediction_in_c(c, language)
+    yield from entries_in_c(c, language)
+
+
+def preamble(c: Steering, language: C, notes: Sequence[str]) -> Iterator[str]:
+    """What a source begins with: what is asked of the compiler, the hash, tables and every program."""
     big = c.name.upper()
-    yield from comment((heading(c), f"Certificate: {c.hash}", "", *promise(c)))
+    yield from comment(notes)
     yield f'#include "{c.name}.h"'
     yield ""
     yield "#include <float.h>"
@@ -142,14 +155,6 @@ def _source(c: Controller, language: C) -> Iterator[str]:
         yield from tables.in_c(table, language)
     for program in c.programs:
         yield from _function(program, language)
-    yield from plan_in_c(c, language)
-    yield from mean_in_c(c, language)
-    if c.swept is not None:
-        yield from in_c(c.swept, len(c.states), language.number(Fraction(0)))
-    yield from feedback_in_c(c, language)
-    if c.predicts:
-        yield from prediction_in_c(c, language)
-    yield from entries_in_c(c, language)
 
 
 def _tables(pieces: Pieces, language: C) -> Iterator[str]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
 from tubecert.export.c_language import C, last_not_after
-from tubecert.export.controller import Controller
+from tubecert.export.controller import Controller, Steering
 
 
-def plan_in_c(c: Controller, language: C) -> Iterator[str]:
+def plan_in_c(c: Steering, language: C) -> Iterator[str]:
     """x*(t) and u*(t); where the plan has knots, also the search of the piece."""
     yield ""
     if c.pieces is not None:
@@ -78,11 +79,14 @@ def mean_in_c(c: Controller, language: C) -> Iterator[str]:
     yield "}"
 
 
-def feedback_in_c(c: Controller, language: C) -> Iterator[str]:
+_FED: Final = "The feedback at (x*(t), y), with u* where that is held; what step returns."
+
+
+def feedback_in_c(c: Steering, language: C, words: str = _FED) -> Iterator[str]:
     """The feedback at one time and state."""
     big, zero = c.name.upper(), language.number(Fraction(0))
     yield ""
-    yield "/* The feedback at (x*(t), y), with u* where that is held; what step returns. */"
+    yield f"/* {words} */"
     yield "static int feedback(const real y[N], real t, real u[M])"
     yield "{"
     ends = "" if c.swept is None else ", first[N], last[N]"

@@ -16,7 +16,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
-from tubecert.export.controller import Controller, refused
+from tubecert.export.controller import Controller, Steering, refused
 from tubecert.export.folder import Exported
 from tubecert.printable import visible
 
@@ -27,13 +27,33 @@ _PATIENCE: Final = 120  # s
 _SHOWN: Final = 400  # characters of what a compiler says
 
 
-class Compiled:
+class Read:
+    """Compiled code, of which numbers are read back."""
+
+    def __init__(self, library: ctypes.CDLL, controller: Steering, *, single: bool) -> None:
+        self._real = ctypes.c_float if single else ctypes.c_double
+        self._type = np.float32 if single else np.float64
+        self._library, self._name = library, controller.name
+
+    def literals(self, texts: Sequence[str]) -> dict[str, float]:
+        """What the compiler made of the literals that it was asked for."""
+        found = (self._real * len(texts)).in_dll(self._library, f"{self._name}_literals")
+        return {text: float(value) for text, value in zip(texts, found, strict=True)}
+
+    def tables(self, sizes: Mapping[str, int]) -> dict[str, list[float]]:
+        """The tables that the code reads, as they lie in the object."""
+        pointer = ctypes.POINTER(self._real)
+        found = (pointer * (len(sizes) + 1)).in_dll(self._library, f"{self._name}_tables")
+        own = zip(sizes.items(), found, strict=False)
+        return {name: [float(start[k]) for k in range(size)] for (name, size), start in own}
+
+
+class Compiled(Read):
     """N controllers side by side, as `Reference`, but of the compiled code; `seconds` of every step."""
 
     def __init__(self, library: ctypes.CDLL, controller: Controller, *, single: bool, lanes: int) -> None:
+        super().__init__(library, controller, single=single)
         n, m = len(controller.states), len(controller.inputs)
-        self._real = ctypes.c_float if single else ctypes.c_double
-        self._type = np.float32 if single else np.float64
         self._shape = (lanes, m)
         fields: list[tuple[str, type]] = [("sample", ctypes.c_uint32)]
         fields += [("since", ctypes.c_uint32)] if controller.every > 1 else []
@@ -43,7 +63,6 @@ class Compiled:
         self._states = [kind() for _ in range(lanes)]
         self._start = self._function(library, f"{controller.name}_start")
         self._step = self._function(library, f"{controller.name}_step")
-        self._library, self._name = library, controller.name
         self.seconds: list[float] = []
         self.status = np.zeros(lanes, dtype=np.intp)
 
@@ -57,18 +76,6 @@ class Compiled:
         found = self._run(self._step, y)
         self.seconds.append((time.perf_counter() - begin) / len(y))
         return found
-
-    def literals(self, texts: Sequence[str]) -> dict[str, float]:
-        """What the compiler made of the literals that it was asked for."""
-        found = (self._real * len(texts)).in_dll(self._library, f"{self._name}_literals")
-        return {text: float(value) for text, value in zip(texts, found, strict=True)}
-
-    def tables(self, sizes: Mapping[str, int]) -> dict[str, list[float]]:
-        """The tables that the code reads, as they lie in the object."""
-        pointer = ctypes.POINTER(self._real)
-        found = (pointer * (len(sizes) + 1)).in_dll(self._library, f"{self._name}_tables")
-        own = zip(sizes.items(), found, strict=False)
-        return {name: [float(start[k]) for k in range(size)] for (name, size), start in own}
 
     def _function(self, library: ctypes.CDLL, name: str) -> Callable[..., int]:
         function = getattr(library, name)
@@ -99,19 +106,27 @@ def compiled(
 
     `read` are literals, and `tables` names of tables that are to be read back.
     """
+    with library_of(exported, probe(exported, read, tables)) as library:
+        assert isinstance(exported.controller, Controller)
+        yield Compiled(library, exported.controller, single=exported.precision == "single", lanes=lanes)
+
+
+@contextmanager
+def library_of(exported: Exported, source: str) -> Iterator[ctypes.CDLL]:
+    """Exported code, compiled within a source that includes it; raises TC712."""
     with tempfile.TemporaryDirectory() as folder:
         exported.save(folder)
-        (Path(folder) / _PROBE).write_text(_probe(exported, read, tables), "utf-8")
+        (Path(folder) / _PROBE).write_text(source, "utf-8")
         library = ctypes.CDLL(built(exported, folder))
         own = ctypes.string_at(
             ctypes.addressof(ctypes.c_char.in_dll(library, f"{exported.controller.name}_certificate"))
         )
         if own.decode(errors="replace") != exported.controller.hash:
             raise _failed("the compiled code is that of another certificate")
-        yield Compiled(library, exported.controller, single=exported.precision == "single", lanes=lanes)
+        yield library
 
 
-def _probe(exported: Exported, read: Sequence[str], tables: Sequence[str]) -> str:
+def probe(exported: Exported, read: Sequence[str], tables: Sequence[str]) -> str:
     """The source, and what is to be read back from the same object."""
     name = exported.controller.name
     starts = [f"(const {name}_real *){table}" for table in tables]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.export.compiled import Compiled
-from tubecert.export.controller import Controller
+from tubecert.export.controller import Controller, Steering
 from tubecert.export.program import Program, Writer
-from tubecert.export.reference import Reference, execute
+from tubecert.export.reference import Around, Reference, execute
 from tubecert.expression import ZERO
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.feedback import force
@@ -30,6 +30,15 @@ _STEPS: Final = 2  # of the integration, at least, between instants at which an 
 _SQUARE, _GREEDY = 1.0, 2.0  # choices of noise, see `simulate.problem.Beside`
 _MIXED, _ADDED, _MODULUS = 1103515245, 12345, 2**31  # the draws of `simulate.machine`
 _STEEP, _THIN = 3.0, 0.05  # of winds, see `simulate.feedback`
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """How many runs, drawn from which seed, of code in which precision."""
+
+    count: int
+    seed: int
+    precision: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,21 +78,18 @@ def driven(
     setting: Setting,
     code: Compiled,
     controller: Controller,
-    *,
-    count: int,
-    seed: int,
-    precision: str,
+    given: Given,
     report: Progress | None = None,
 ) -> Driven:
     """Random runs and adversaries, as `simulate` draws them; every run is a lane of `code`."""
     kind = setting.on_machine or setting.uncertainty
-    cases = [case(setting, kind, seed, number) for number in range(count)]
+    cases = [case(setting, kind, given.seed, number) for number in range(given.count)]
     plant = Plant(setting, controller, disturbance_of(setting, kind, cases))
     reference = Reference(controller=controller)
     x = np.array([item.start for item in cases])
     samples = int(Fraction(setting.horizon).limit_denominator(10**9) / controller.sample_time)
-    seen = Seen(np.zeros(count))
-    acting: Array = np.zeros((count, len(controller.inputs)))
+    seen = Seen(np.zeros(given.count))
+    acting: Array = np.zeros((given.count, len(controller.inputs)))
     for k in range(samples):
         if report is not None and k % 100 == 0:
             report(Step(phase=Phase.DRIVE, done=k, of=samples))
@@ -103,7 +109,7 @@ def driven(
                 x = plant.moved(x, (k * controller.sample_time + begin, length), u, seen)
         acting = new
     return Driven(
-        runs=count,
+        runs=given.count,
         samples=samples,
         difference=seen.difference,
         scale=seen.scale,
@@ -113,7 +119,7 @@ def driven(
         told=seen.told,
         step=float(np.median(code.seconds)),
         worst=float(np.max(code.seconds)),
-        precision=precision,
+        precision=given.precision,
     )
 
 
@@ -135,11 +141,11 @@ class Seen:
 class Plant:
     """N plants under a disturbance, as `simulate.feedback` and `simulate.machine` have it, in numpy."""
 
-    def __init__(self, setting: Setting, controller: Controller, disturbance: Disturbance) -> None:
+    def __init__(self, setting: Setting, controller: Steering, disturbance: Disturbance) -> None:
         self._force = force(disturbance)
         self._own: Beside = self._force.beside
         self._layer = disturbance.layer
-        self._plan = Reference(controller=controller)
+        self._plan = Around(controller=controller)
         self._adds_plan = controller.adds_plan
         self._program = _plant(setting)
         self._sizes = len(setting.model.states), len(setting.model.inputs), self._own.blowing.shape[1]
@@ -194,19 +200,23 @@ class Plant:
         h = float(length / _STEPS)
         for k in range(_STEPS):
             t = float(begin + k * length / _STEPS)
-            k1 = self._rate(x, t, u)
-            k2 = self._rate(x + h / 2 * k1, t + h / 2, u)
-            k3 = self._rate(x + h / 2 * k2, t + h / 2, u)
-            k4 = self._rate(x + h * k3, t + h, u)
+            k1 = self.rate(x, t, u)
+            k2 = self.rate(x + h / 2 * k1, t + h / 2, u)
+            k3 = self.rate(x + h / 2 * k2, t + h / 2, u)
+            k4 = self.rate(x + h * k3, t + h, u)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            distance = self._plan.distance(x, np.asarray(t + h))
-            seen.distance = np.fmax(seen.distance, np.nan_to_num(distance, nan=np.inf))
+            self.look(x, t + h, seen)
         return x
+
+    def look(self, x: Array, t: float, seen: Seen) -> None:
+        """Notes how far the states are from the plan."""
+        distance = self._plan.distance(x, np.asarray(t))
+        seen.distance = np.fmax(seen.distance, np.nan_to_num(distance, nan=np.inf))
 
     def _on_plan(self, t: float) -> tuple[Array, Array]:
         return self._plan.plan(np.asarray(t))
 
-    def _rate(self, x: Array, t: float, u: Array) -> Array:
+    def rate(self, x: Array, t: float, u: Array) -> Array:
         """x' = f + B (u + h) + E w + r."""
         f, B, wind, c = self._at(x, t)
         acting = u if self._adds_plan else u + self._on_plan(t)[1]

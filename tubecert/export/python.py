@@ -8,7 +8,7 @@ from typing import Final
 
 from tubecert.export import tables
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.controller import Controller, Pieces
+from tubecert.export.controller import Controller, Pieces, Steering
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE, Program
 from tubecert.export.sweeps import in_python
@@ -63,8 +63,8 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield "import numpy as np"
     yield ""
     yield f'CERTIFICATE = "{c.hash}"'
-    yield f"STATES = {_tuple([repr(name) for name in c.states])}"
-    yield f"INPUTS = {_tuple([repr(name) for name in c.inputs])}"
+    yield f"STATES = {entries([repr(name) for name in c.states])}"
+    yield f"INPUTS = {entries([repr(name) for name in c.inputs])}"
     yield f"SAMPLE_TIME = {decimal(c.sample_time)}  # s"
     yield f"DELAY = {decimal(c.delay)}  # s, from a sample to the input that is computed from it"
     yield f"HORIZON = {'math.inf' if c.horizon is None else decimal(c.horizon)}  # s"
@@ -75,32 +75,38 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     if c.every > 1:
         yield f"EVERY = {c.every}  # samples from one feedback to the next"
     yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add feedforward(t) all the time"
+    yield from functions(c)
+    if c.swept is not None:
+        yield from in_python(c.swept, len(c.states))
+    yield from plan_in_python(c)
+    yield from _mean(c)
+    yield from _class(c)
+    yield from _test(c, vectors)
+
+
+def functions(c: Steering) -> Iterator[str]:
+    """Tables and every program."""
     if c.pieces is not None:
         yield from _tables(c.pieces)
     for table in c.tables:
         yield from tables.in_python(table)
     for program in c.programs:
         yield from _function(program)
-    if c.swept is not None:
-        yield from in_python(c.swept, len(c.states))
-    yield from _plan(c)
-    yield from _mean(c)
-    yield from _class(c)
-    yield from _test(c, vectors)
 
 
-def _tuple(texts: Sequence[str]) -> str:
+def entries(texts: Sequence[str]) -> str:
+    """A tuple."""
     return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
 
 
 def _tables(pieces: Pieces) -> Iterator[str]:
     yield ""
     yield "# The plan: every piece begins at START; x* and u* are polynomials of the time since then."
-    yield f"START = {_tuple([decimal(q) for q in pieces.start])}"
+    yield f"START = {entries([decimal(q) for q in pieces.start])}"
     for name, table in (("X", pieces.x), ("U", pieces.u)):
         yield f"{name} = ("
         for piece in table:
-            yield f"    {_tuple([_tuple([decimal(q) for q in row]) for row in piece])},"
+            yield f"    {entries([entries([decimal(q) for q in row]) for row in piece])},"
         yield ")"
 
 
@@ -121,7 +127,8 @@ def _function(program: Program) -> Iterator[str]:
     yield f"    return {', '.join(f'out_{port.name}' for port in program.outputs)}"
 
 
-def _plan(c: Controller) -> Iterator[str]:
+def plan_in_python(c: Steering) -> Iterator[str]:
+    """x*(t) and u*(t); where the plan has knots, also the search of the piece."""
     yield ""
     yield ""
     yield "def on_plan(t):"
@@ -255,11 +262,11 @@ def _test(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield "# What is measured, and what the producer of this file computed for it: the self-test."
     yield "MEASURED = ("
     for row in vectors.y:
-        yield f"    {_tuple([repr(value) for value in row])},"
+        yield f"    {entries([repr(value) for value in row])},"
     yield ")"
     yield "EXPECTED = ("
     for row in vectors.u:
-        yield f"    {_tuple([repr(value) for value in row])},"
+        yield f"    {entries([repr(value) for value in row])},"
     yield ")"
     yield f"TOLERANCE = {vectors.tolerance!r}"
     yield ""

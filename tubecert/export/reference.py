@@ -14,7 +14,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.controller import Controller, Pieces
+from tubecert.export.controller import Controller, Pieces, Steering
 from tubecert.export.geodesics import Swept
 from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE, Program, Step
 from tubecert.export.tables import looked_up
@@ -93,14 +93,56 @@ def _chosen(name: str, a: Array, b: Array, real: type) -> Array:
 
 
 @dataclass(slots=True, kw_only=True)
-class Reference:
+class Around:
+    """Plan, feedback and distance of a controller, for N states side by side."""
+
+    controller: Steering
+    real: type = np.float64
+
+    def plan(self, t: Array) -> tuple[Array, Array]:
+        """x* (1, n) and u* (1, m) at a time; beyond the horizon those at its end."""
+        c, real = self.controller, self.real
+        if c.horizon is not None:
+            t = min(t, real(float(c.horizon)))
+        if c.plan is not None:
+            x, u = execute(c.plan, np.array([[t]]), real=real)
+            return x, u
+        return _on_pieces(c.pieces, t, real) if c.pieces is not None else (t, t)
+
+    def kappa(self, y: Array, t: Array) -> tuple[Array, Array]:
+        """The feedback (N, m) of (0.5) at (x*(t), y), and d(x*, y)^2 (N,)."""
+        c, real = self.controller, self.real
+        x, u = self.plan(t)
+        (f,), (v,) = execute(c.drift, y, real=real), execute(c.flow, x, u, real=real)
+        ends = () if c.swept is None else speeds(c.swept, x, y, real)
+        found, told = execute(c.law, y, f, x, v, u, *ends, real=real)
+        return found, told[:, 0]
+
+    def metric(self, x: Array) -> Array:
+        """M (N, n, n) at states (N, n)."""
+        c, n = self.controller, len(self.controller.states)
+        if c.swept is None:
+            M = np.array([[float(q) for q in row] for row in c.metric])
+            return np.broadcast_to(M, (len(x), n, n))
+        (W,) = execute(c.swept.dual, x)
+        return np.asarray(np.linalg.inv(W.reshape(len(x), n, n)))
+
+    def distance(self, x: Array, t: Array) -> Array:
+        """d(x*(t), x) (N,) of states (N, n), as the controller computes it."""
+        plan = self.plan(t)[0]
+        swept = self.controller.swept
+        last = x - plan if swept is None else speeds(swept, plan, x, np.float64)[1]
+        return np.asarray(np.sqrt(np.einsum("li,lij,lj->l", last, self.metric(x), last)))
+
+
+@dataclass(slots=True, kw_only=True)
+class Reference(Around):
     """N controllers side by side; `start` and `step` are those of the exported code.
 
     `feedback` is kappa, with u* where that is held; `held` acts now, `before` acted until it did.
     """
 
     controller: Controller
-    real: type = np.float64
     sample: int = 0
     y: Array = field(default_factory=lambda: np.zeros((0, 0)))
     f: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -138,41 +180,6 @@ class Reference:
         begin = self.real(self.sample) * self.real(float(self.controller.sample_time))
         return np.asarray(begin + self.real(float(after)))
 
-    def plan(self, t: Array) -> tuple[Array, Array]:
-        """x* (1, n) and u* (1, m) at a time; beyond the horizon those at its end."""
-        c, real = self.controller, self.real
-        if c.horizon is not None:
-            t = min(t, real(float(c.horizon)))
-        if c.plan is not None:
-            x, u = execute(c.plan, np.array([[t]]), real=real)
-            return x, u
-        return _on_pieces(c.pieces, t, real) if c.pieces is not None else (t, t)
-
-    def kappa(self, y: Array, t: Array) -> tuple[Array, Array]:
-        """The feedback (N, m) of (0.5) at (x*(t), y), and d(x*, y)^2 (N,)."""
-        c, real = self.controller, self.real
-        x, u = self.plan(t)
-        (f,), (v,) = execute(c.drift, y, real=real), execute(c.flow, x, u, real=real)
-        ends = () if c.swept is None else speeds(c.swept, x, y, real)
-        found, told = execute(c.law, y, f, x, v, u, *ends, real=real)
-        return found, told[:, 0]
-
-    def metric(self, x: Array) -> Array:
-        """M (N, n, n) at states (N, n)."""
-        c, n = self.controller, len(self.controller.states)
-        if c.swept is None:
-            M = np.array([[float(q) for q in row] for row in c.metric])
-            return np.broadcast_to(M, (len(x), n, n))
-        (W,) = execute(c.swept.dual, x)
-        return np.asarray(np.linalg.inv(W.reshape(len(x), n, n)))
-
-    def distance(self, x: Array, t: Array) -> Array:
-        """d(x*(t), x) (N,) of states (N, n), as the controller computes it."""
-        plan = self.plan(t)[0]
-        swept = self.controller.swept
-        last = x - plan if swept is None else speeds(swept, plan, x, np.float64)[1]
-        return np.asarray(np.sqrt(np.einsum("li,lij,lj->l", last, self.metric(x), last)))
-
     def _law(self, y: Array, t: Array) -> tuple[Array, Array]:
         """The same, with u* where that is held."""
         kappa, square = self.kappa(y, t)
@@ -208,8 +215,8 @@ class Reference:
 
 def _place(pieces: Pieces, t: Array, real: type) -> int:
     """The piece that a time lies in."""
-    begins = [real(float(q)) for q in pieces.start]
-    return max(k for k, begin in enumerate(begins) if k == 0 or t >= begin)
+    begins: Array = np.array(pieces.begins, dtype=real)
+    return max(0, int(np.max(np.searchsorted(begins, t, side="right"))) - 1)
 
 
 def _on_pieces(pieces: Pieces, t: Array, real: type) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.controller import Controller
+from tubecert.export.controller import Continuous, Controller
 from tubecert.export.program import TABLE
 from tubecert.export.sweeps import counted
 
@@ -42,8 +42,10 @@ def promise(controller: Controller) -> tuple[str, ...]:
     return rounding if controller.swept is None else (*rounding, *_SWEPT)
 
 
-def brief(controller: Controller) -> str:
+def brief(controller: Controller | Continuous) -> str:
     """The same in a line."""
+    if isinstance(controller, Continuous):
+        return "the proof is about feedback in continuous time, which no program is: that is assumed"
     if controller.lost is None:
         return "the proof is about exact arithmetic: rounding is not covered"
     return "the proof covers the rounding of this code"
@@ -113,13 +115,13 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield "|---|---|"
     for name, count in sorted(operations(c).items()):
         what = "a search, a cubic" if name.startswith(TABLE) else ""
-        yield f"| {_OPERATIONS.get(name, name)}{what and f' ({what})'} | {count} |"
+        yield f"| {OPERATIONS.get(name, name)}{what and f' ({what})'} | {count} |"
     if precision is not None:
         yield ""
         yield "There is no allocation, no recursion, and no loop without a bound."
 
 
-_OPERATIONS: Final = {
+OPERATIONS: Final = {
     "add": "addition",
     "sub": "subtraction",
     "mul": "multiplication",

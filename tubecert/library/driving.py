@@ -112,7 +112,10 @@ def attacked(
     from tubecert.export.assembly import controller_of
     from tubecert.export.belonging import belonging
     from tubecert.export.compiled import compiled
-    from tubecert.export.driven import driven
+    from tubecert.export.continuous import compiled as all_the_time
+    from tubecert.export.continuous.driven import driven as all_the_time_driven
+    from tubecert.export.controller import Continuous
+    from tubecert.export.driven import Given, driven
     from tubecert.simulate.certified import adopted, require_tube
     from tubecert.simulate.setting import setting_of
 
@@ -124,14 +127,12 @@ def attacked(
         message = "a controller in Python is not driven: it computes what the reference computes"
         raise TubecertError([Finding(code="TC712", message=message, help="export it in C")])
     lanes = max(1, attack.runs)
-    with compiled(found, lanes) as code:
-        done = driven(
-            setting_of(system, certificate.result, attack.duration),
-            code,
-            found.controller,
-            count=lanes,
-            seed=attack.seed,
-            precision=found.precision,
-            report=report,
-        )
+    setting = setting_of(system, certificate.result, attack.duration)
+    controller, given = found.controller, Given(count=lanes, seed=attack.seed, precision=found.precision)
+    if isinstance(controller, Continuous):
+        with all_the_time.compiled(found, lanes) as acting:
+            done = all_the_time_driven(setting, acting, controller, given, report)
+    else:
+        with compiled(found, lanes) as code:
+            done = driven(setting, code, controller, given, report)
     return Drive(found=done, folder=folder)

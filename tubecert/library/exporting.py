@@ -12,7 +12,7 @@ from tubecert.library.certification import Certification, read
 from tubecert.library.specification import File
 
 if TYPE_CHECKING:
-    from tubecert.export.controller import Controller
+    from tubecert.export.controller import Continuous, Controller
 
 Language = Literal["c", "python"]
 Precision = Literal["double", "single"]
@@ -24,10 +24,10 @@ _PLATFORMS: Final[tuple[Platform, ...]] = ("arduino", "ros2", "px4")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exported:
-    """The controller of a certificate H: its `files` by their names, and as a value, all exact."""
+    """The controller of a certificate H or C: its `files` by their names, and as a value, all exact."""
 
     files: Mapping[str, str] = field(repr=False)
-    controller: Controller = field(repr=False)
+    controller: Controller | Continuous = field(repr=False)
 
     @property
     def certificate(self) -> str:
@@ -53,7 +53,7 @@ def export(
 
     `tubecert export`. `platform`: beside it a program around it, of which what measures and acts is left open (C only;
     `--for`). In C everything is `double`, or `float` if the precision is `single`; in Python `double`.
-    Raises `TubecertError` where certificate H does not hold or cannot be exported, and `TargetError`.
+    Raises `TubecertError` where neither certificate H nor C holds, or what holds cannot be exported, and `TargetError`.
     """
     from tubecert.export.assembly import controller_of
     from tubecert.export.folder import exported

@@ -22,6 +22,7 @@ from tubecert.recheck.code.tree import (
     parts,
 )
 from tubecert.recheck.controller import Machine
+from tubecert.recheck.steering import Steering
 from tubecert.recheck.terms import in_order, table_of
 
 
@@ -32,7 +33,7 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
     if f"{big}_HORIZON" in code.macros and case.curve.horizon is not None:
         wanted["HORIZON"] = case.curve.horizon
     for name, value in wanted.items():
-        if not _is(code, code.macros.get(f"{big}_{name}"), value):
+        if not is_number(code, code.macros.get(f"{big}_{name}"), value):
             yield name
     every = recipe.feedback_time / recipe.sample_time
     if code.macros.get(f"{big}_EVERY", Number("1")) != Number(str(every)):
@@ -42,20 +43,20 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
     box = box_of(own, m)
     ends = [(Number(low), Number(high)) for low, high in box or ()]
     if box is None:
-        if not _is(code, Number(ball_of(own, m)), recipe.clip_radius):
+        if not is_number(code, Number(ball_of(own, m)), recipe.clip_radius):
             yield "the radius of the clip"
     elif len(ends) != len(formulas.section.clip) or not all(
-        _is(code, low, a) and _is(code, high, b)
+        is_number(code, low, a) and is_number(code, high, b)
         for (low, high), (a, b) in zip(ends, formulas.section.clip, strict=True)
     ):
         yield "the clip"
-    if recipe.losses is not None and not _is(
+    if recipe.losses is not None and not is_number(
         code, Number(law_of(code.functions["law"], m).gain), case.bound("feedback_gain")
     ):
         yield "the gain"
 
 
-def of_tables(code: Code, formulas: Machine) -> Iterator[str]:
+def of_tables(code: Code, formulas: Steering) -> Iterator[str]:
     """Names of functions given by tables of which a number in the code is another one, or is missing."""
     system, curve = formulas.case.system, formulas.case.curve
     roots = [*(row[0] for row in system.f), *(e for row in system.B for e in row), *curve.x, *curve.u]
@@ -67,12 +68,12 @@ def of_tables(code: Code, formulas: Machine) -> Iterator[str]:
         for kind, wanted in (("at", begins), ("cubic", cubics)):
             found = list(entries(code.tables.get(f"{kind}_{table.name}", ())))
             if len(found) != len(wanted) or not all(
-                _is(code, Number(text), value) for text, value in zip(found, wanted, strict=True)
+                is_number(code, Number(text), value) for text, value in zip(found, wanted, strict=True)
             ):
                 yield f"{kind}_{table.name}"
 
 
-def _is(code: Code, tree: Expr | None, value: Fraction) -> bool:
+def is_number(code: Code, tree: Expr | None, value: Fraction) -> bool:
     """Whether a number of the code is the one of its kind that is nearest to another one."""
     if not isinstance(tree, Number):
         return False

@@ -7,7 +7,7 @@ index or a digit is seen. That examines, and proves nothing; the bounds of `loss
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -21,8 +21,9 @@ from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, known
 from tubecert.recheck.code.words import UnreadError
-from tubecert.recheck.controller import BITS, Column, machine_of
+from tubecert.recheck.controller import BITS, machine_of
 from tubecert.recheck.controller import Machine as Formulas
+from tubecert.recheck.steering import Column, Steering
 
 _SLACK = 16  # units of rounding of the largest input, for integrals that are computed by fine steps
 _FEWEST = 8  # samples
@@ -95,36 +96,41 @@ def agreement(
     Raises `UnreadError` where what the numbers of the text are off has no bound.
     """
     expected = list(formulas.answers(measured))
+    slack = _PREDICTED if formulas.section.predict else _SLACK
+    return apart(code.real, expected, _answers(code, formulas, measured), answered, slack)
+
+
+def apart(
+    real: str,
+    expected: Sequence[Column],
+    found: Iterable[Vector],
+    answered: Sequence[Sequence[float]] | None,
+    units: int = _SLACK,
+) -> tuple[float, float]:
+    """The largest difference of an entry, and of what it may be; raises `UnreadError` where that has no bound."""
     largest = arb(0)
     for row in expected:
         for each in row:
             largest = larger(largest, magnitude(each))
-    slack = largest * KINDS[code.real].unit * (_PREDICTED if formulas.section.predict else _SLACK)
+    slack = largest * KINDS[real].unit * units
     worst, share = arb(0), arb(0)
-    for k, (found, own) in enumerate(zip(_answers(code, formulas, measured), expected, strict=True)):
-        for j, (a, b) in enumerate(zip(numbers(found), own, strict=True)):
+    for k, (answer, own) in enumerate(zip(found, expected, strict=True)):
+        for j, (a, b) in enumerate(zip(numbers(answer), own, strict=True)):
             if not (a.error.is_finite() and a.value.is_finite()):
                 if k > _FEWEST:  # errors of a prediction feed themselves
                     return float(worst), float(share.upper())
                 raise UnreadError("what its numbers are off has no bound from one sample to the next")
-            apart = magnitude(a.value.mid() - b)
+            off = magnitude(a.value.mid() - b)
             if answered is not None:
-                apart = larger(apart, magnitude(arb(answered[k][j]) - b))
-            worst, share = larger(worst, apart), larger(share, apart / (a.error + slack))
+                off = larger(off, magnitude(arb(answered[k][j]) - b))
+            worst, share = larger(worst, off), larger(share, off / (a.error + slack))
     return float(worst), float(share.upper())
 
 
 def _answers(code: Code, formulas: Formulas, measured: Sequence[Column]) -> Iterator[Vector]:
     """Of the text: start, and a step for every sample."""
-    parts = formulas.case.curve.parts
-
-    def piece(t: Value) -> int:
-        (own,) = numbers([t])
-        begun = [k for k, part in enumerate(parts) if not own.value.mid() + _CLOSE < part.start]
-        return max(begun, default=0)
-
     own = Rounded(KINDS[code.real], decides=True)
-    machine = Machine(code, own, {"piece": piece})
+    machine = Machine(code, own, {"piece": place_of(formulas)})
     m, state = len(formulas.case.system.inputs), machine.state()
     for k, row in enumerate((measured[0], *measured)):
         u: Vector = [None] * m
@@ -134,6 +140,18 @@ def _answers(code: Code, formulas: Formulas, measured: Sequence[Column]) -> Iter
 
 
 _CLOSE = arb(10) ** -10  # s, of a knot
+
+
+def place_of(formulas: Steering) -> Callable[[Value], int]:
+    """Which piece of its plan a time lies in."""
+    parts = formulas.case.curve.parts
+
+    def piece(t: Value) -> int:
+        (own,) = numbers([t])
+        begun = [k for k, part in enumerate(parts) if not own.value.mid() + _CLOSE < part.start]
+        return max(begun, default=0)
+
+    return piece
 
 
 def _losses(code: Code, formulas: Formulas) -> Iterator[Allowed]:
