@@ -39,6 +39,7 @@ def theorem(g: Given) -> dict[str, Any]:
         s1 * Ts / 2
         + b0 * (g.Dus + acts * (ups + kb + g.R + g.Dh)) * step
         + g.D_pf * (g.Y * Ts / 4 + nbar)
+        + g.D_pt * Ts / 4
         + (g.eps_w + g.DBpx * g.D_E * step) * g.wbar
         + g.DBpx * g.D_r * step
         + g.D_b * (kb + ups + g.S + g.N + s1 * (Ts / 2 + tau))
@@ -92,6 +93,7 @@ def theorem(g: Given) -> dict[str, Any]:
         if chi_c > 0:
             ell0, ell1 = min(ell0, c0), min(ell1, c1)
     ell0 += r_g
+    ell1 += g.D_Ft / 2 * wide
     if g.nodes:
         q["length"] = r_k / g.du
         bend = g.G * (g.dhat + n_fb) / mp.sqrt(g.a)
@@ -245,6 +247,8 @@ def given(problem: Any, recipe: Any) -> Given:
         "D_A": most(m.drift_slope_metric),
         "flat": m.drift_slope_metric is not None,
         "D_pf": most(m.drift_explained),
+        "D_Ft": most(m.feedback_drift) if m.feedback_drift else mp.mpf(0),
+        "D_pt": most(m.drift_rate) if m.drift_rate else mp.mpf(0),
         "n_E": most(m.noise_size),
         "n_M": most(m.noise_metric),
         "n_B": most(m.noise_explained),

@@ -26,6 +26,8 @@ ALIVE = {
     "drift_difference_metric": None,
     "drift_slope_metric": None,
     "drift_explained": 0.6,
+    "feedback_drift": 0.4,
+    "drift_rate": 0.5,
     "noise_size": 1.0,
     "noise_metric": 1.25,
     "noise_explained": 1.05,

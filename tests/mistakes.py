@@ -227,7 +227,7 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("c/m*v", "c/m*zdot", "TC110", 8, 24, "names: c, k, m, pi, t, v, z"),
     ("c/m*v", "c/m*x[1]", "TC110", 8, 24, "names: c, k, m, pi, t, v, z"),
     ("c/m*v", "c/m*x2", "TC110", 8, 24, "names: c, k, m, pi, t, v, z"),
-    ("c/m*v", "c/m*v*cos(t)", "TC112", 8, 6, "f depends on t"),
+    ('"1/m"', '"(1 + 0.1*sin(t))/m"', "TC110", 9, 27, "B and the metric depend on the state alone"),
     ("c/m*v", "", "TC109", 8, 19, "the expression ends where a value is expected"),
     ("c/m*v", "* c/m*v", "TC109", 8, 20, "a value is missing before *"),
     ("c/m*v", "lambda v: v", "TC110", 8, 20, "names: c, k, m, pi, t, v, z"),

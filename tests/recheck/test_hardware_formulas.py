@@ -31,6 +31,7 @@ LOST = theorem.Rounding(
     feedback=Fraction(1, 300), input=Fraction(1, 70), estimate=Fraction(1, 50), prediction=Fraction(1, 900)
 )
 BENT = ("drift_slope", "form_slope", "input_slope", "input_gain", "drift_metric", "curvature")
+MOVING = ("feedback_drift", "drift_rate")
 APART = ("windows", "losses")
 WIND = ("push", "size", "explained")
 
@@ -57,6 +58,8 @@ def problems(draw):
     own = some(machines.ALIVE) | some(("symbols", "symbols_slope"), 0.0 if flat else 0.1)
     if not flat:
         own |= {"drift_difference_metric": None, "drift_slope_metric": None}
+    if draw(st.booleans()):
+        own |= {"feedback_drift": None, "drift_rate": None}
     held, predicts = draw(st.booleans()), draw(st.booleans())
     if not held:
         own["input_rate"] = None
@@ -134,7 +137,7 @@ def own_reading(problem, recipe) -> tuple[Setting, MachineNumbers, Promise, Digi
     known = {name: ball(value) for name, value, _ in m.constants.items()} | {
         "plan_defect": ball(c.plan_defect)
     }
-    absent = dict.fromkeys(("drift_difference_metric", "drift_slope_metric", "input_rate"))
+    absent = dict.fromkeys(("drift_difference_metric", "drift_slope_metric", "input_rate", *MOVING))
     bent = None
     if m.covariant is not None:
         bent = Bent(**{name: ball(getattr(m.covariant, name)) for name in BENT})

@@ -118,16 +118,76 @@ def test_a_longer_horizon_is_not_confirmed():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda e: e["system"].update(B=[["0.001*t"], ["1"]]),
-        lambda e: e["tube"].update(windows=["1"]),
-    ],
-)
-def test_what_no_theorem_covers_is_refused(change):
-    with pytest.raises(TubecertError, match=r"f that depends on t|no expression"):
-        examine(respecified(made(), change))
+def test_what_no_theorem_covers_is_refused():
+    with pytest.raises(TubecertError, match="no expression"):
+        examine(respecified(made(), lambda e: e["system"].update(B=[["0.001*t"], ["1"]])))
+
+
+# -- in windows (theory 4e.5), and under a machine (8.13)
+
+MACHINE = (Path(__file__).parents[1] / "specs/ok/moving_machine.yaml").read_text(encoding="utf-8")
+WINDOWS = MACHINE.replace("hardware: {rate: 500, noise: 0.0001}\n", "")
+
+
+def on_machine():
+    return copy.deepcopy(certified(MACHINE, conditions="hardware"))
+
+
+@pytest.mark.slow
+def test_windows_have_their_own_times():
+    """x, 0.2 t x: |f| is larger later, and so are the bounds of the second window; recheck knows both times."""
+    document = copy.deepcopy(certified(WINDOWS, conditions="distance"))
+    first, second = document["result"]["distance"]["windows"]
+    assert first["level"] < second["level"]
+    assert failing(examine(document)) == []
+    slower = respecified(document, lambda e: e["system"]["f"].__setitem__(0, "-x + y + 0.1*sin(2*t + 1)*x"))
+    assert failing(examine(slower, to_first_failure=True))
+
+
+@pytest.mark.slow
+def test_a_plan_is_found_and_its_windows_begin_between_knots():
+    """iLQR integrates f at its times, so little is missing; windows at no knot count from there on."""
+    rest = "{kind: equilibrium, at: [0, 0], input: [0], horizon: 1}"
+    task = "{kind: ilqr, target: [0.1, 0.1], goal: false, horizon: 1, knots: 6}"
+    document = copy.deepcopy(
+        certified(WINDOWS.replace(rest, task).replace("[0.5]", "[0.47]"), conditions="distance")
+    )
+    assert value(document, "plan_defect")[1] < 1e-3
+    assert failing(examine(document)) == []
+    slower = respecified(document, lambda e: e["system"]["f"].__setitem__(1, "-y + 0.3*t*x"))
+    assert failing(examine(slower, to_first_failure=True))
+
+
+@pytest.mark.slow
+def test_what_f_does_by_itself_between_samples_is_bounded():
+    """D_pt of B^+ = (0, 1) is sup |f_t| in y; D_Ft that of eigenvalues of (F_t, W), F_t = f_tx W + W f_tx'."""
+    document = on_machine()
+    assert document["result"]["verdict"] == "certified"
+    rho = float(document["result"]["tube"]["rho"])
+    t, x = np.meshgrid(np.linspace(0, 1, 301), np.linspace(-rho, rho, 81))
+    below, above = value(document, "drift_rate")
+    assert 0.98 * below <= np.abs(0.2 * x).max() <= above
+    W = np.array([[1, -0.3], [-0.3, 2]])
+    back = np.linalg.inv(np.linalg.cholesky(W))
+    slope = np.zeros((*t.shape, 2, 2))
+    slope[..., 0, 0], slope[..., 1, 0] = 0.2 * np.cos(2 * t), 0.2
+    form = back @ (slope @ W + W @ slope.swapaxes(-1, -2)) @ back.T
+    below, above = value(document, "feedback_drift")
+    assert 0.98 * below <= np.abs(np.linalg.eigvalsh(form)).max() <= above
+    assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["feedback_drift", "drift_rate"])
+def test_a_machine_knows_how_f_changes_by_itself(name):
+    document = on_machine()
+    del document["result"]["constants"][name]
+    with pytest.raises(TubecertError, match=name):
+        examine(sealed(document))
+    document = on_machine()
+    constant = document["result"]["constants"][name]
+    constant |= {"above": 0.97 * constant["above"], "below": 0.9 * constant["below"]}
+    assert any(claim.startswith(name) for claim, _ in failing(examine(sealed(document))))
 
 
 def test_no_metric_is_searched_for():

@@ -80,14 +80,14 @@ def test_derivatives_of_a_step_are_those_of_the_step():
     dynamics = Dynamics(MODEL)
     rng = np.random.default_rng(0)
     x, left, right = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), rng.normal(size=(1, 5))
-    slopes = dynamics.step_slopes(x, left, right, 0.1, 3)
+    slopes = dynamics.step_slopes(np.zeros(x.shape[1]), x, left, right, 0.1, count=3)
     small = 1e-6
     for column, (dx, dl, dr) in enumerate(
         [((small, 0), 0, 0), ((0, small), 0, 0), ((0, 0), small, 0), ((0, 0), 0, small)]
     ):
         change = np.array(dx)[:, None]
-        ahead = dynamics.step(x + change, left + dl, right + dr, 0.1, 3)
-        behind = dynamics.step(x - change, left - dl, right - dr, 0.1, 3)
+        ahead = dynamics.step(0.0, x + change, left + dl, right + dr, 0.1, count=3)
+        behind = dynamics.step(0.0, x - change, left - dl, right - dr, 0.1, count=3)
         assert (ahead - behind).T / (2 * small) == pytest.approx(slopes[:, :, column], abs=1e-7)
 
 
@@ -420,3 +420,17 @@ def test_the_wrong_interpolation_costs_most_of_the_tube_and_is_named(tmp_path, p
 @pytest.mark.slow
 def test_certificates_of_plans_are_deterministic(planned):
     assert certify(SPEC, Options(conditions="distance")).to_json() == planned
+
+
+def test_the_time_in_f_is_that_of_the_step():
+    """x' = t x: x(t) = x(s) exp((t^2 - s^2)/2)."""
+    text = (
+        "tubecert: 1\nname: n\nsystem: {states: [x], inputs: [u], f: [t*x], B: [[1]]}\nsafe_set: {x: [-2, 2]}\n"
+        'uncertainty: {h: ["0.1"]}\ntrajectory: {kind: equilibrium, at: [0], horizon: 2}\n'
+        "initial_state: {at: [0]}\n"
+    )
+    dynamics, nothing = Dynamics(build(load_text(text))), np.zeros((1, 1))
+    x = dynamics.step(1.0, np.ones((1, 1)), nothing, nothing, 0.5, count=20)
+    assert abs(x[0, 0] - np.exp((1.5**2 - 1) / 2)) < 1e-6
+    slopes = dynamics.step_slopes(np.array([1.0]), np.ones((1, 1)), nothing, nothing, 0.5, count=20)
+    assert abs(slopes[0, 0, 0] - x[0, 0]) < 1e-9

@@ -68,6 +68,8 @@ def hardware_constants(
         drift_difference_metric=search.drift_difference_metric(known.upper, slope),
         drift_slope_metric=slope,
         drift_explained=search.drift_explained(known),
+        feedback_drift=search.feedback_drift(),
+        drift_rate=search.drift_rate(known),
         noise_size=search.noise_size(noise),
         noise_metric=search.noise_metric(noise),
         noise_explained=search.noise_explained(noise),
@@ -123,6 +125,15 @@ class HardwareSuprema(Suprema):
             return Constant.exactly(0.0)
         found = self._over_tube("feedback_curvature", above)
         return _reached(objective, found, self._white.of_form(self._constant(found)))
+
+    def feedback_drift(self) -> Constant | None:
+        """D_Ft = sup |dF~/dt|: the largest |eigenvalue| of the pencil (dF/dt, W); None where f is free of t."""
+        if self.model.time is None:
+            return None
+        slope = tuple(tuple(derivatives(row, TIME)) for row in self.model.F)
+        if not _moves(slope):
+            return Constant.exactly(0.0)
+        return self._constant(self._over_tube("feedback_drift", SumOfPencils([slope], self.model.W)))
 
     def plan_tilt(self, beta: Constant) -> Constant:
         """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|; `beta` is that of the tube."""
@@ -227,6 +238,17 @@ class HardwareSuprema(Suprema):
             return self.norms("drift_explained", [multiply(self.fields.B_pinv, self.fields.f_x)])
         pinv, f_x = (Interval(c.below, c.above) for c in (known.B_pinv, known.f_x))
         total = pinv * f_x
+        return Constant(below=max(0.0, float(total.lo)), above=float(total.hi))
+
+    def drift_rate(self, known: BoundConstants) -> Constant | None:
+        """D_pt = sup |B^+ f_t| where B is constant, else DBp sup |f_t|; None where f is free of t."""
+        if self.model.time is None:
+            return None
+        slope = self.fields.of_vector(column(derivatives(self.model.f, TIME)))
+        if self.model.constant_input:
+            return self.norms("drift_rate", [multiply(self.fields.B_pinv, slope)])
+        own, pinv = self.norms("drift_rate", [slope]), known.B_pinv
+        total = Interval(own.below, own.above) * Interval(pinv.below, pinv.above)
         return Constant(below=max(0.0, float(total.lo)), above=float(total.hi))
 
     def _from_plan(self, drift: Matrix) -> Matrix:

@@ -44,6 +44,13 @@ class HardwareConstants:
     drift_explained: Constant = field(
         metadata=_of("D_pf", "u/x", "sup |B^+ f_x|: how the drift between two samples enters the estimate")
     )
+    feedback_drift: Constant | None = field(
+        default=None,
+        metadata=_of("D_Ft", "1/s^2", "sup |F~_t|: how fast F~ changes by itself, where f depends on t"),
+    )
+    drift_rate: Constant | None = field(
+        default=None, metadata=_of("D_pt", "u/s", "sup |B^+ f_t|: what D_pf is by x, by t")
+    )
     noise_size: Constant = field(metadata=_of("n_E", "x", "size of one unit of noise"))
     noise_metric: Constant = field(metadata=_of("n_M", "d", "sup |Theta n| over one unit of noise"))
     noise_explained: Constant = field(metadata=_of("n_B", "u s", "sup |B^+ n| over one unit of noise"))

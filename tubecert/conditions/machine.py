@@ -128,6 +128,8 @@ class MachineNumbers(Generic[T]):
     phi_relM: T | None
     D_A: T | None
     D_pf: T
+    D_Ft: T | None = None  # None where f is free of t
+    D_pt: T | None = None
     n_E: T  # |n| of one unit of noise
     n_M: T  # |Theta n|
     n_B: T  # |B^+ n|
@@ -161,6 +163,8 @@ def proven(machine: Machine) -> MachineNumbers[Interval]:
         phi_relM=None if c.drift_difference_metric is None else _most(c.drift_difference_metric),
         D_A=None if c.drift_slope_metric is None else _most(c.drift_slope_metric),
         D_pf=_most(c.drift_explained),
+        D_Ft=None if c.feedback_drift is None else _most(c.feedback_drift),
+        D_pt=None if c.drift_rate is None else _most(c.drift_rate),
         n_E=_most(c.noise_size),
         n_M=_most(c.noise_metric),
         n_B=_most(c.noise_explained),

@@ -167,6 +167,11 @@ def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard
             "the samples of the feedback are no samples of the estimate: step is called at hardware.rate",
             f"take a hardware.rate that is 1, 2, ... or {_MOST_EVERY} times hardware.feedback_rate",
         )
+    if model.time is not None:
+        raise refused(
+            "f depends on t, and exported code reads f(x)",
+            "replay it: simulate knows the time; to export, take what depends on t into uncertainty.h",
+        )
     unknown = free_symbols([*model.f, *(e for row in model.B for e in row)]) - {*model.states}
     if unknown:
         raise refused(

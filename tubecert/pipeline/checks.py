@@ -8,6 +8,7 @@ from tubecert.letters import ALL, HARDWARE, name_of
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec
+from tubecert.spec.system import NO_SEARCH
 from tubecert.stages.time import time_of
 from tubecert.verdict import Verdict
 
@@ -65,8 +66,8 @@ def moving_drift(spec: Spec) -> list[Finding]:
     """What no metric is found for: an f that depends on t."""
     if build(spec).time is None:
         return []
-    message, help = "f depends on t, and metrics are not found for that", "give one: metric, or --metric FILE"
-    return [Finding(code="TC112", message=message, location=spec.location("system.f"), help=help)]
+    message = "f depends on t, and metrics are not found for that"
+    return [Finding(code="TC112", message=message, location=spec.location("system.f"), help=NO_SEARCH)]
 
 
 def missing_radii(spec: Spec) -> list[Finding]:

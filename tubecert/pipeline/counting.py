@@ -22,7 +22,8 @@ _SOUGHT: Final = (name for name in TABLE if name not in (*_FIRST, "initial_dista
 _TUBE: Final = (*_FIRST, *_SOUGHT, "geodesics")
 _MACHINE: Final = (
     *("feedback_slope", "feedback_curvature", "plan_tilt", "plan_speed", "input_rate", "drift_difference"),
-    *("drift_slope_metric", "drift_explained", "noise_size", "noise_metric", "noise_explained"),
+    *("drift_slope_metric", "drift_explained", "feedback_drift", "drift_rate"),
+    *("noise_size", "noise_metric", "noise_explained"),
     *("drift_slope", "form_slope", "input_slope", "input_gain", "drift_metric", "curvature"),
 )
 

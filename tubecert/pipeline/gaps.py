@@ -47,6 +47,7 @@ _OF_LIMITS: Final = frozenset(
 )  # what inputs with limits are judged by beside the gains
 _MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
     "drift_explained": ("drift_explained", "B_pinv", "f_x"),
+    "drift_rate": ("drift_rate", "B_pinv"),
     "drift_difference_metric": ("drift_difference_metric", "drift_slope_metric"),
     "plan_speed": ("plan_speed", "plan_defect"),
 }

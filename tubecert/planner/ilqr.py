@@ -94,7 +94,7 @@ class _System:
         """The next states for columns of states and controls."""
         n = self.dynamics.n
         left = w if self.problem.held else z[n:]
-        x = self.dynamics.step(z[:n], left, w, self.dt[k], self.problem.substeps)
+        x = self.dynamics.step(self.problem.t[k], z[:n], left, w, self.dt[k], count=self.problem.substeps)
         return x if self.problem.held else np.concatenate([x, w])
 
     def slopes(self, curve: _Curve) -> tuple[Array, Array]:
@@ -104,7 +104,8 @@ class _System:
         left = curve.w.T if self.problem.held else curve.z[:-1, n:].T
         count = len(self.dt)
         scaled = np.ones(count) * self.dt
-        D = _by_step(self.dynamics, (x, left, curve.w.T), scaled, self.problem.substeps)
+        times = self.problem.t[:-1]
+        D = _by_step(self.dynamics, (times, x, left, curve.w.T), scaled, self.problem.substeps)
         if self.problem.held:
             return D[:, :, :n], D[:, :, n : n + m] + D[:, :, n + m :]
         fz, fw = np.zeros((count, n + m, n + m)), np.zeros((count, n + m, m))
@@ -123,13 +124,14 @@ class _System:
         return np.asarray(own + 0.5 * np.einsum("k,kia,ij,kja->a", self.dt, dw, self.S, dw))
 
 
-def _by_step(dynamics: Dynamics, at: tuple[Array, Array, Array], dt: Array, substeps: int) -> Array:
+def _by_step(dynamics: Dynamics, at: tuple[Array, Array, Array, Array], dt: Array, substeps: int) -> Array:
     """Derivatives of one step for every knot; equal lengths of steps are done together."""
-    x, left, right = at
+    t, x, left, right = at
     found = np.empty((len(dt), dynamics.n, dynamics.n + 2 * dynamics.m))
     for length in np.unique(dt):
         same = dt == length
-        found[same] = dynamics.step_slopes(x[:, same], left[:, same], right[:, same], float(length), substeps)
+        ends = left[:, same], right[:, same]
+        found[same] = dynamics.step_slopes(t[same], x[:, same], *ends, float(length), count=substeps)
     return found
 
 

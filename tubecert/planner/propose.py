@@ -142,7 +142,7 @@ def _problem(course: Course, dynamics: Dynamics) -> ilqr.Problem:
         t=_floats(course.t),
         start=_floats(task.start),
         target=target,
-        input=_holding(dynamics, target) if task.input is None else _floats(task.input),
+        input=_holding(dynamics, target, float(course.t[-1])) if task.input is None else _floats(task.input),
         Q=np.array([_floats(row) for row in task.Q]),
         R=np.array([_floats(row) for row in task.R]),
         goal=task.goal,
@@ -151,11 +151,11 @@ def _problem(course: Course, dynamics: Dynamics) -> ilqr.Problem:
     )
 
 
-def _holding(dynamics: Dynamics, target: Array) -> Array:
-    """The input that best holds the target, in the sense of least squares."""
+def _holding(dynamics: Dynamics, target: Array, end: float) -> Array:
+    """The input that best holds the target at the time `end`, in the sense of least squares."""
     x = target[:, None]
-    drift = dynamics.rate(x, np.zeros((dynamics.m, 1)))
-    columns = [dynamics.rate(x, np.eye(dynamics.m)[:, j : j + 1]) - drift for j in range(dynamics.m)]
+    drift = dynamics.rate(end, x, np.zeros((dynamics.m, 1)))
+    columns = [dynamics.rate(end, x, np.eye(dynamics.m)[:, j : j + 1]) - drift for j in range(dynamics.m)]
     B = np.concatenate(columns, axis=1)
     if not (np.isfinite(B).all() and np.isfinite(drift).all()):
         return np.zeros(dynamics.m)
@@ -228,7 +228,7 @@ def _integrated(dynamics: Dynamics, course: Course, parts: int) -> Knots:
             after = right if i == parts else _between(left, right, share)
             dt = float(time - t[-1])
             ends = [np.array(row, dtype=float)[:, None] for row in (left if held else u[-1], after)]
-            x = dynamics.step(x, ends[0], ends[1], dt, count)
+            x = dynamics.step(float(t[-1]), x, ends[0], ends[1], dt, count=count)
             if not np.isfinite(x).all():
                 raise FloatingPointError
             t.append(time)
@@ -250,13 +250,17 @@ def _guessed_defect(dynamics: Dynamics, knots: Knots) -> float:
     t, x, u = (np.array(rows, dtype=float) for rows in (knots.t, knots.x, knots.u))
     left, right = u[:-1].T, (u[:-1] if knots.interpolation == "hold" else u[1:]).T
     h, a, b = np.diff(t), x[:-1].T, x[1:].T
-    m0, m1, secant = dynamics.rate(a, left), dynamics.rate(b, right), (b - a) / h
+    m0, m1, secant = dynamics.rate(t[:-1], a, left), dynamics.rate(t[1:], b, right), (b - a) / h
     a2, a3 = (3 * secant - 2 * m0 - m1) / h, (m0 + m1 - 2 * secant) / h**2
     worst = 0.0
     for share in (np.arange(_SAMPLES) + 0.5) / _SAMPLES:
         tau = share * h
         at = a + tau * (m0 + tau * (a2 + tau * a3))
-        p = m0 + tau * (2 * a2 + 3 * tau * a3) - dynamics.rate(at, left + share * (right - left))
+        p = (
+            m0
+            + tau * (2 * a2 + 3 * tau * a3)
+            - dynamics.rate(t[:-1] + tau, at, left + share * (right - left))
+        )
         worst = max(worst, float(np.sqrt((p * p).sum(axis=0)).max()))
     return worst
 

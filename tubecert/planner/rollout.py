@@ -7,7 +7,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import jacobian
-from tubecert.model import ControlAffineModel
+from tubecert.model import TIME, ControlAffineModel
 
 _STAGES = (
     (0.0, 0.0),
@@ -19,33 +19,33 @@ _WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 class Dynamics:
-    """x' = f(x) + B(x) u for N states at once: x has shape (n, N), u (m, N)."""
+    """x' = f(t, x) + B(x) u for N states at once: x has shape (n, N), u (m, N), t is a number or (N,)."""
 
     def __init__(self, model: ControlAffineModel) -> None:
         drift = [row[0] for row in model.drift_on_plan()]
-        names = (*model.states, *model.inputs)
+        names, moved = (*model.states, *model.inputs, TIME), (*model.states, *model.inputs)
         self.n, self.m = len(model.states), len(model.inputs)
         self._rate = Tape(drift, names)
-        slopes = jacobian(drift, names)
+        slopes = jacobian(drift, moved)
         self._slopes = Tape([e for row in slopes for e in row], names)
 
-    def rate(self, x: Array, u: Array) -> Array:
+    def rate(self, t: Array | float, x: Array, u: Array) -> Array:
         """f + B u, (n, N)."""
-        return self._rate.run_floats([*x, *u], x.shape[1:])
+        return self._rate.run_floats([*x, *u, np.broadcast_to(t, x.shape[1:])], x.shape[1:])
 
-    def step(self, x: Array, left: Array, right: Array, dt: float, count: int) -> Array:
-        """The states a time dt later, in `count` equal steps; u runs linearly from `left` to `right`."""
+    def step(self, t: Array | float, x: Array, left: Array, right: Array, dt: float, *, count: int) -> Array:
+        """The states a time dt after t, in `count` equal steps; u runs linearly from `left` to `right`."""
         h = dt / count
         for i in range(count):
             total, k = np.zeros_like(x), np.zeros_like(x)
             for (c, a), weight in zip(_STAGES, _WEIGHTS, strict=True):
                 share = (i + c) / count
-                k = self.rate(x + a * h * k, (1 - share) * left + share * right)
+                k = self.rate(t + share * dt, x + a * h * k, (1 - share) * left + share * right)
                 total = total + weight * k
             x = x + h * total
         return x
 
-    def step_slopes(self, x: Array, left: Array, right: Array, dt: float, count: int) -> Array:
+    def step_slopes(self, t: Array, x: Array, left: Array, right: Array, dt: float, *, count: int) -> Array:
         """The derivatives of `step` by x, left and right: (N, n, n + 2 m)."""
         n, m = self.n, self.m
         h = dt / count
@@ -58,8 +58,9 @@ class Dynamics:
             for (c, a), weight in zip(_STAGES, _WEIGHTS, strict=True):
                 share = (i + c) / count
                 at, u = x + a * h * k, (1 - share) * left + share * right
-                both = self._slopes.run_floats([*at, *u], (N,)).T.reshape(N, n, n + m)
-                k = self.rate(at, u)
+                now = np.broadcast_to(t + share * dt, (N,))
+                both = self._slopes.run_floats([*at, *u, now], (N,)).T.reshape(N, n, n + m)
+                k = self.rate(now, at, u)
                 k_d = both[:, :, :n] @ (D + a * h * k_d)
                 k_d[:, :, n : n + m] += (1 - share) * both[:, :, n:]
                 k_d[:, :, n + m :] += share * both[:, :, n:]

@@ -124,7 +124,7 @@ class Case:
                 if item.name in self.constants
             }
         absent: dict[str, Ball | None] = dict.fromkeys(
-            (*machine.OF_CONSTANT_METRICS, *machine.OF_HELD_INPUTS)
+            (*machine.OF_CONSTANT_METRICS, *machine.OF_HELD_INPUTS, *machine.OF_MOVING)
         )
         if "input_rate" in self.constants and self.bound_if_any("input_rate") is None:
             del own["input_rate"]  # u* jumps

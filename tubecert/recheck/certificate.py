@@ -310,6 +310,7 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
         names += gains.CONSTANTS
     if spec.hardware is not None:
         names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
+        names += machine.OF_MOVING if spec.plant.varies else ()
     groups = (machine.OF_CONSTANT_METRICS, covariant.NAMES) if spec.hardware is not None else ()
     optional = [name for group in groups for name in group]
     own = node.closed(*names, optional=optional)

@@ -174,6 +174,8 @@ class Evaluation:
         e = self.rate * Ts / 2 + turning * whole * apart
         e = e + m.drift_explained * (Y * Ts / 4 + self.nbar)
         e = e + self._gust() + n.B_pinv_x * self.setting.rest * apart
+        if m.drift_rate is not None:
+            e = e + m.drift_rate * Ts / 4
         e = e + self.lost_estimate
         return (1 - self.th) / self.th * self.rate * Ts + e + self._mistaken()
 
@@ -237,6 +239,8 @@ class Evaluation:
             other = self._by_metric(m.bent, slope)
             if other is not None:
                 ell0, ell = smaller(ell0, other[0]), smaller(ell, other[1])
+        if m.feedback_drift is not None:  # F~ changes by itself
+            ell = ell + m.feedback_drift * (self.level + self.n_M) / 2
         loss = arb(0) if self.bent is None else self.bent.loss
         ell0 = ell0 + loss
         # from here on by the age of the feedback: it starts at its delay, or at the instant that was predicted

@@ -19,10 +19,18 @@ from tubecert.recheck.relative import (
     drift_difference,
     drift_difference_metric,
     drift_explained,
+    drift_rate,
     drift_slope_metric,
 )
 from tubecert.recheck.specified.numbers import Numbers
-from tubecert.recheck.turning import feedback_curvature, feedback_slope, input_rate, plan_speed, plan_tilt
+from tubecert.recheck.turning import (
+    feedback_curvature,
+    feedback_drift,
+    feedback_slope,
+    input_rate,
+    plan_speed,
+    plan_tilt,
+)
 
 ALWAYS = (
     "feedback_slope",
@@ -39,8 +47,10 @@ ALWAYS = (
 )
 OF_CONSTANT_METRICS = ("drift_difference_metric", "drift_slope_metric")
 OF_HELD_INPUTS = ("input_rate",)
+OF_MOVING = ("feedback_drift", "drift_rate")
+"""Those of an f that depends on t."""
 
-NAMES = (*ALWAYS, *OF_CONSTANT_METRICS, *OF_HELD_INPUTS)
+NAMES = (*ALWAYS, *OF_CONSTANT_METRICS, *OF_HELD_INPUTS, *OF_MOVING)
 
 
 def bounded(place: Place, name: str, limit: Fraction, noise: Numbers | None, known: Known) -> Outcome:
@@ -73,12 +83,14 @@ _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {
     "drift_difference": drift_difference,
     "drift_slope_metric": drift_slope_metric,
     "input_rate": input_rate,
+    "feedback_drift": feedback_drift,
     "symbols": lambda place, limit: _symbols(place, limit, 0),
     "symbols_slope": lambda place, limit: _symbols(place, limit, 1),
 }
 _OF_OTHERS: dict[str, Callable[[Place, Fraction, Known], Outcome]] = {
     "drift_difference_metric": drift_difference_metric,
     "drift_explained": drift_explained,
+    "drift_rate": drift_rate,
 }
 _OF_NOISE: dict[str, Callable[[Place, Fraction, Numbers | None], Outcome]] = {
     "noise_size": noise_size,

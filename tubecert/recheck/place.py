@@ -10,10 +10,10 @@ from functools import cached_property
 from flint import arb
 
 from tubecert.recheck.around import Ellipsoid, Round
-from tubecert.recheck.balls import Ball
+from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.coordinates import Coordinates, Fields
-from tubecert.recheck.cover import Boxed, Outcome, Range, prove
-from tubecert.recheck.curve import CLOCK, SINCE, Curve, expressed
+from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.curve import CLOCK, SINCE, SKIPPED, Curve, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
@@ -37,7 +37,7 @@ class Place:
     budget: int
     coordinates: Coordinates | None = None
     sides: Numbers | None = None
-    when: Range | None = None
+    when: tuple[Fraction, Fraction] | None = None
 
     def during(self, begin: Fraction, end: Fraction, rho: Fraction) -> Place:
         """The tube of another radius around a part of the plan; `ValueError` with coordinates of its own."""
@@ -74,15 +74,17 @@ class Place:
 
     @property
     def _clock(self) -> dict[str, Term]:
-        """The time in f by the s of the plan: since a knot, or the same for a plan of one part that begins at 0."""
+        """The time in f by the s of the plan: since a knot, or since what is looked at of a plan of one part begins."""
         if TIME not in names(e for row in self.system.f for e in row):
             return {}
         parts = self.curve.parts
-        if self.when is None and all(SINCE in part.values for part in parts):
-            return {TIME: variable(SINCE) + variable(CLOCK)}
-        if self.when is not None or not (len(parts) == 1 and parts[0].start == 0 and not parts[0].values):
-            raise ValueError("f depends on t along a part of a plan")
-        return {TIME: variable(CLOCK)}
+        if all(SINCE in part.values for part in parts):
+            since = variable(SINCE) + variable(CLOCK)
+            return {TIME: since if self.when is None else since + variable(SKIPPED)}
+        begin = Fraction(0) if self.when is None else self.when[0]
+        if not (len(parts) == 1 and not parts[0].values and parts[0].start.overlaps(exact(begin))):
+            raise ValueError("f depends on t along a plan whose times are not known")
+        return {TIME: variable(CLOCK) + number(begin)}
 
     def around_plan(self, rows: Rows) -> Matrix:
         """A matrix in s and in x - x*, for a plan of one part: the tube stays there, whatever the plan does."""

@@ -37,6 +37,8 @@ class MachineNumbers:
     noise_size: Ball
     noise_metric: Ball
     noise_explained: Ball
+    feedback_drift: Ball | None
+    drift_rate: Ball | None
     input_rate: Ball | None
     symbols: Ball
     symbols_slope: Ball

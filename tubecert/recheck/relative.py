@@ -11,12 +11,14 @@ from tubecert.recheck.branches import norms_below
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.metric import adjugate, determinant, stated
 from tubecert.recheck.place import Place
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
 from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,
     all_zero,
     matrix_replaced,
+    matrix_slopes,
     number,
     plus,
     scaled,
@@ -124,18 +126,29 @@ def left_inverse(place: Place) -> Matrix:
 
 def drift_explained(place: Place, limit: Fraction, known: Known) -> Outcome:
     """|B^+ f_x| where B is constant; else |B^+| |f_x|, which are taken at two points."""
-    fields = place.fields
-    if all(all_zero(a) for a in fields.slopes(place.system.B)):
-        column = times(left_inverse(place), fields.f_x)
+    return _explained(place, place.fields.f_x, limit, known("B_pinv"), known("f_x"))
+
+
+def drift_rate(place: Place, limit: Fraction, known: Known) -> Outcome:
+    """|B^+ f_t| where B is constant; else |B^+| |f_t|."""
+    slope = place.fields.vector(matrix_slopes(place.system.f, TIME))
+    return _explained(place, slope, limit, known("B_pinv"), None)
+
+
+def _explained(
+    place: Place, own: Matrix, limit: Fraction, inverse: Fraction | None, size: Fraction | None
+) -> Outcome:
+    """|B^+ own| where B is constant, else |B^+| |own|; `inverse` bounds |B^+|, `size` bounds |own| if it is known."""
+    if all(all_zero(a) for a in place.fields.slopes(place.system.B)):
+        column = times(left_inverse(place), own)
         if all_zero(column):
             return stated(True, "")
         return prove(norms_below([column], limit), place.tube(), place.budget)
-    inverse, slope = known("B_pinv"), known("f_x")
-    if inverse is None or slope is None:
-        return Outcome(verdict="undecided", why="B^+ or f_x has no bound")
-    if inverse * slope <= limit or all_zero(fields.f_x):
+    if all_zero(own) or (inverse is not None and size is not None and inverse * size <= limit):
         return stated(True, "")
+    if inverse is None:
+        return Outcome(verdict="undecided", why="B^+ has no bound")
     if not inverse:
         return stated(False, "B^+ is not 0")
-    found = prove(norms_below([fields.f_x], limit / inverse), place.tube(), place.budget)
+    found = prove(norms_below([own], limit / inverse), place.tube(), place.budget)
     return found if found.holds else _not_contradicted(found)

@@ -19,6 +19,7 @@ from tubecert.recheck.family import Everyone
 from tubecert.recheck.metric import adjugate, determinant, stated, together
 from tubecert.recheck.pencils import SlopesBelow
 from tubecert.recheck.place import Place
+from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
 from tubecert.recheck.terms import (
     NOUGHT,
@@ -28,6 +29,7 @@ from tubecert.recheck.terms import (
     Term,
     all_zero,
     function,
+    matrix_slopes,
     number,
     plus,
     scaled,
@@ -65,6 +67,15 @@ def feedback_slope(place: Place, limit: Fraction) -> Outcome:
     """Both signs of F."""
     s = place.system
     return together([definite(place, plus(scaled(limit, s.W), s.F, sign), s.W) for sign in (1, -1)])
+
+
+def feedback_drift(place: Place, limit: Fraction) -> Outcome:
+    """Both signs of dF/dt."""
+    s = place.system
+    slope = matrix_slopes(s.F, TIME)
+    if all_zero(slope):
+        return stated(True, "")
+    return together([definite(place, plus(scaled(limit, s.W), slope, sign), s.W) for sign in (1, -1)])
 
 
 def _cleared(place: Place) -> tuple[Term, Matrix]:

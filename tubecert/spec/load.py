@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -31,6 +31,7 @@ from tubecert.spec.settings import (
 from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import (
+    NO_SEARCH,
     check_gains,
     check_moving,
     is_uncertain,
@@ -49,7 +50,6 @@ from tubecert.spec.types import (
     Term,
     TermMatrix,
     Trajectory,
-    Tube,
 )
 from tubecert.spec.windows import check_windows
 
@@ -231,7 +231,7 @@ def _read_named(
     if f is not None and dynamics is not None and plan is not None:
         h = () if uncertainty is None or uncertainty.h is None else uncertainty.h
         waves = (*dynamics[0], *h)
-        check_moving(f, dynamics[0], _beside_moving(entries.keys(), names, (plan, tube, synthesis), waves))
+        check_moving(f, dynamics[0], _beside_moving(plan, synthesis, waves))
     if plan is not None and tube is not None and not reader.findings:
         check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
@@ -279,19 +279,17 @@ def _read_named(
 
 
 def _beside_moving(
-    sections: Set[str],
-    names: Names,
-    parts: tuple[Trajectory, Tube | None, Synthesis | None],
-    waves: Sequence[Term],
-) -> Iterator[tuple[bool, str]]:
-    """What no theorem is stated for where f depends on t; `waves` is all that does."""
-    plan, tube, synthesis = parts
-    yield "hardware" in sections, "which certificate H is not stated for"
-    yield tube is not None and tube.windows is not None, "which is not covered beside tube.windows"
-    yield plan.task is not None, f"and plans of the kind {plan.kind} are not found for that"
+    plan: Trajectory, synthesis: Synthesis | None, waves: Sequence[Term]
+) -> Iterator[tuple[bool, str, str]]:
+    """What no theorem is stated for where f depends on t, with what to write; `waves` is all that does."""
     lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
-    yield plan.horizon is None and not returns(waves), lasting
-    yield synthesis is not None, "and metrics are not found for that: give one"
+    period = "or t in sin, cos and tan only, with frequencies that are rational multiples of each other"
+    yield (
+        plan.horizon is None and not returns(waves),
+        lasting,
+        f"add trajectory.horizon, in seconds; {period}",
+    )
+    yield synthesis is not None, "and metrics are not found for that: give one", NO_SEARCH
 
 
 def _metric(field: Field | None, names: Names) -> tuple[Metric | None, Synthesis | None]:

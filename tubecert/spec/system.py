@@ -52,15 +52,21 @@ def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
     return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
 
 
-def check_moving(f: Field, drift: Sequence[Term], beside: Iterable[tuple[bool, str]]) -> None:
-    """What is covered where f depends on t: what the theorems are proven for; `beside` is what they are not."""
+NO_SEARCH: Final = (
+    "write metric: {rate: ..., dual_metric: ...}, or --metric FILE; one that synth finds for f with t replaced by "
+    "a number may serve at all times, which certify proves"
+)
+
+
+def check_moving(f: Field, drift: Sequence[Term], beside: Iterable[tuple[bool, str, str]]) -> None:
+    """What is covered where f depends on t; `beside` is what is not, and what to write then."""
     own = [term.expression for term in drift]
     own += [owed.argument for term in drift for owed in term.obligations]
     if TIME not in free_symbols(own):
         return
-    for found, message in beside:
+    for found, message, help in beside:
         if found:
-            f.fail(codes.RANGE, f"f depends on t, {message}", "docs/language.md says what f(t, x) goes with")
+            f.fail(codes.RANGE, f"f depends on t, {message}", help)
 
 
 def returns(terms: Sequence[Term]) -> bool:

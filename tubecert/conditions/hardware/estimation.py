@@ -178,6 +178,8 @@ def error_of_estimate(p: Plant[T], loop: Loop[T], s1: T, whole: T) -> T:
         + p.m.D_pf * (loop.Y * loop.Ts / 4 + nbar)
         + n.DBpx * p.rest * moved
     )
+    if p.m.D_pt is not None:
+        found = found + p.m.D_pt * loop.Ts / 4
     return found if loop.lost is None else found + loop.lost.estimate
 
 

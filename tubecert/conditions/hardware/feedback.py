@@ -64,6 +64,8 @@ def loss(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> Loss[T]:
     if m.bent is not None:
         other = covariant_loss(p, m.bent, loop, e)
         ell0, ell1 = minimum(ell0, other[0]), minimum(ell1, other[1])
+    if m.D_Ft is not None:
+        ell1 = ell1 + m.D_Ft * (loop.dhat + e.n_fb) / 2
     if e.geodesics is not None:
         ell0 = choose(e.geodesics.within, ell0 + e.geodesics.feedback, -nothing(chi))
     return Loss(ell0=ell0, ell1=ell1, V_d=V_d, chi=chi)
