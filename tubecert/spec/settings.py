@@ -14,7 +14,7 @@ from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader
 from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
-from tubecert.spec.windows import with_windows
+from tubecert.spec.windows import KEYS, with_windows
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
 RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
@@ -38,12 +38,13 @@ def read_name(field: Field) -> str | None:
 
 def read_tube(field: Field | None, names: Names) -> Tube | None:
     """The two radii or the half-widths, as far as they are given, and the coordinates they are measured in."""
-    keys = ("epsilon", "rho_a", "coordinates", "half_widths", "windows", "gap")
-    entries = field.mapping(optional=keys, reserved=("weights",)) if field else {}
+    entries = field.mapping(optional=KEYS, reserved=("weights",)) if field else {}
     if entries is None:
         return None
     radii = {
-        key: entries[key].number(names.values, above=0, side="below") for key in keys[:2] if key in entries
+        key: entries[key].number(names.values, above=0, side="below")
+        for key in ("epsilon", "rho_a")
+        if key in entries
     }
     widths = _read_half_widths(entries.get("half_widths"), names)
     chosen = entries["coordinates"].word(("identity", "auto")) if "coordinates" in entries else None

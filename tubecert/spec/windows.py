@@ -16,6 +16,7 @@ from tubecert.spec.reader import Field
 from tubecert.spec.types import Disturbance, Hardware, Spec, Trajectory, Tube
 
 KEY: Final = "windows"
+KEYS: Final = ("epsilon", "rho_a", "coordinates", "half_widths", KEY, "gap")  # of `tube`
 MOST: Final = 200
 _USUAL: Final = 20
 
@@ -70,7 +71,7 @@ def check_windows(
     field: Field | None, tube: Tube, plan: Trajectory, machine: Hardware | None, wind: Disturbance | None
 ) -> None:
     """Reports what windows cannot be had with: `field` is that of the tube."""
-    own = None if field is None or tube.windows is None else field.mapping(optional=_ANY)
+    own = None if field is None or tube.windows is None else field.mapping(optional=KEYS)
     if own is None or KEY not in own:
         return
     at = own[KEY]
@@ -94,9 +95,6 @@ def check_windows(
         )
     else:
         _check_lengths(at, ends_of(tube.windows or 1, plan.horizon), plan.horizon, machine)
-
-
-_ANY: Final = ("epsilon", "rho_a", "coordinates", "half_widths", "gap", KEY)
 
 
 def _check_lengths(
