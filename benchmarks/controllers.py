@@ -1,10 +1,11 @@
 """Exported controllers: the compiled code against the module in Python at every sample of attacked runs, and its costs.
 
-    python benchmarks/controllers.py [orbit windows pvtol bent single]
+    python benchmarks/controllers.py [orbit windows pvtol bent single single_pvtol]
 
 For each: certify, export in C and in Python, and let the compiled code drive 8 plants against the adversaries of
-`simulate` for 1250 samples (10 000 in all). At every sample the module in Python gets the same measurement. Then the
-code is compiled once more for what it costs: the time of a step in a loop of its own, bytes of stack, what it calls.
+`simulate` for 1250 samples (10 000 in all). At every sample the module in Python gets the same measurement; where the
+certificate is about rounding, what every sample loses is compared with what that allows for. Then the code is compiled
+once more for what it costs: the time of a step in a loop of its own, bytes of stack, what it calls.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 import tubecert as tc
 from tubecert.enclosure.interval import Array
 from tubecert.export.assembly import controller_of
-from tubecert.export.compiled import Compiled, compiled, compiler
+from tubecert.export.compiled import Compiled, Memory, compiled, compiler
 from tubecert.export.controller import Controller
 from tubecert.export.driven import Given, driven
 from tubecert.export.folder import Exported, exported
@@ -41,6 +42,12 @@ ROWS = {  # words, configuration, changes of it, precision
     "pvtol": ("six states, two inputs", "hardware_pvtol", (), "double"),
     "bent": ("W and B depend on the state", "hardware_state_dependent_input", (), "double"),
     "single": ("in float", "hardware_orbit", (("rate: 500", "arithmetic: single\n  rate: 500"),), "single"),
+    "single_pvtol": (
+        "in float",
+        "hardware_pvtol",
+        (("rate: 250", "rate: 500, arithmetic: single"),),
+        "single",
+    ),
 }
 _LOOP = """
 #include "%(name)s.h"
@@ -77,6 +84,14 @@ class Both:
     others: list[object] = field(default_factory=list)
     difference: float = 0.0
 
+    def memory(self) -> Memory:
+        """What the compiled code keeps."""
+        return self.code.memory()
+
+    def measured(self, y: Array) -> Array:
+        """What it measures."""
+        return self.code.measured(y)
+
     @property
     def seconds(self) -> list[float]:
         """Of every step of the compiled code."""
@@ -109,9 +124,9 @@ def main(names: list[str]) -> None:
     """Prints one row for each."""
     print(
         "| | states, inputs | samples | C less Python, over the largest input | d(x\\*, x) over its level | escapes |"
-        " a step | stack |"
+        " rounding, of what it may | a step | stack |"
     )
-    print("|---|---|---|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|---|---|---|")
     for name in names or list(ROWS):
         print(_row(*ROWS[name]), flush=True)
 
@@ -139,7 +154,7 @@ def _row(words: str, config: str, changes: tuple[tuple[str, str], ...], precisio
     return (
         f"| {words} (`{config}`) | {len(controller.states)}, {len(controller.inputs)} | {done.runs * done.samples} "
         f"| {both.difference / done.scale:.1e} | {done.distance / done.level:.3f} | {len(done.escapes)} "
-        f"| {nanoseconds / 1000:.2f} us | {stack} B |"
+        f"| {'' if done.lost is None else f'{done.lost:.2g}'} | {nanoseconds / 1000:.2f} us | {stack} B |"
     )
 
 

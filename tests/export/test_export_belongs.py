@@ -104,7 +104,7 @@ def constants_are_read_back(folder, own, given):
     assert alone.difference < 1e-13
 
 
-@pytest.mark.parametrize("wrong", ["difference", "escapes", "told"])
+@pytest.mark.parametrize("wrong", ["difference", "escapes", "told", "lost"])
 def test_what_is_driven_is_fine_if_nothing_speaks_against_it(wrong):
     fine = Driven(
         runs=2,
@@ -118,11 +118,13 @@ def test_what_is_driven_is_fine_if_nothing_speaks_against_it(wrong):
         step=1e-6,
         worst=2e-6,
         precision="double",
+        lost=0.25,
     )
     good = Drive(found=fine, folder="orbit")
     assert good.fine
     assert str(good).startswith("not falsified: orbit drove 2 runs of 10 samples")
-    against = {"difference": 1e-3, "escapes": (1,), "told": 3}
+    assert "rounding took at most 25 % of what the certificate allows for" in str(good)
+    against = {"difference": 1e-3, "escapes": (1,), "told": 3, "lost": 1.5}
     bad = Drive(found=replace(fine, **{wrong: against[wrong]}), folder="orbit")
     assert not bad.fine
     assert str(bad).startswith("FALSIFIED")

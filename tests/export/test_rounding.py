@@ -12,12 +12,13 @@ from controllers import GIVEN, KNOTS, PATH, machine, recipe, wandering
 
 from tubecert.conditions.hardware import Rounding
 from tubecert.errors import TubecertError
+from tubecert.export.accounted import Accounted
 from tubecert.export.assembly import assembled
-from tubecert.export.compiled import compiled, compiler
+from tubecert.export.compiled import Memory, compiled, compiler
 from tubecert.export.folder import exported
 from tubecert.export.followed import FLOATS, UncoveredError
 from tubecert.export.program import GREATEST, LEAST, Program
-from tubecert.export.reference import _mean_on_pieces, execute
+from tubecert.export.reference import Reference, _mean_on_pieces, execute
 from tubecert.export.rounding import _Analysis, rounding_of, within
 from tubecert.expression import constant
 from tubecert.model import build
@@ -222,6 +223,52 @@ def test_the_float_build_stays_within_what_is_accounted_for_at_every_sample():
             }
     assert worst["estimate"] > 1e-4 * lost["estimate"]
     assert worst["input"] > 1e-5 * lost["input"]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on PATH")
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["seldom_orbit", "held_orbit"])
+def test_every_sample_is_held_to_what_is_accounted_for(name):
+    """As `simulate --controller` does; of what `double` may lose, `float` takes many times all of it."""
+    c = controller(name)
+    shares = []
+    for lost in (rounding_of(c, "single"), rounding_of(c, "double")):
+        accounted = Accounted(c, lost)
+        with compiled(exported(c, precision="single"), lanes=2) as code:
+            measured = wandering(c, 30, 2, 7)
+            code.start(measured[0])
+            for k, y in enumerate(measured):
+                before = code.memory()
+                code.step(y)
+                accounted.sample(k, code.measured(y), before, code.memory())
+        shares.append(accounted.share)
+    assert 1e-4 < shares[0] <= 1
+    assert shares[1] > 1e4
+
+
+def test_a_clip_a_feedback_and_a_filter_that_are_off_are_seen():
+    """Each against its own bound: what the code keeps is changed by twice that."""
+    c = controller("held_orbit")
+    lost = rounding_of(c, "single")
+    y = wandering(c, 3, 2, 7)
+    exact = Reference(controller=c)
+    exact.start(y[0]), exact.step(y[0])
+    names = ("y", "f", "q", "feedback", "held", "before")
+    before = Memory(**{name: getattr(exact, name) for name in names})
+    exact.step(y[1])
+    after = Memory(**{name: getattr(exact, name) for name in names})
+
+    def share(**values):
+        accounted = Accounted(c, lost)
+        accounted.sample(1, y[1], before, replace(after, **values))
+        return accounted.share
+
+    assert share() < 1e-6
+    assert 1 < share(q=after.q + 2 * float(lost.estimate * c.share)) < 1e3
+    assert 1 < share(held=after.held + 2 * float(lost.input)) < 3
+    more = 2 * np.abs(after.feedback) + 10
+    assert share(feedback=after.feedback + more, held=after.held + more) > 1e3
+    assert share(feedback=after.feedback * np.nan) == np.inf
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])

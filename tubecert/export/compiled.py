@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
 
@@ -25,6 +26,18 @@ FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 _PROBE: Final = "probe.c"
 _PATIENCE: Final = 120  # s
 _SHOWN: Final = 400  # characters of what a compiler says
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Memory:
+    """What N controllers keep: (N, n) of states, (N, m) of inputs, as in the code."""
+
+    y: Array
+    f: Array
+    q: Array
+    feedback: Array
+    held: Array
+    before: Array
 
 
 class Read:
@@ -76,6 +89,17 @@ class Compiled(Read):
         found = self._run(self._step, y)
         self.seconds.append((time.perf_counter() - begin) / len(y))
         return found
+
+    def memory(self) -> Memory:
+        """What every controller keeps now."""
+        names = (item.name for item in fields(Memory))
+        return Memory(
+            **{name: np.array([list(getattr(own, name)) for own in self._states]) for name in names}
+        )
+
+    def measured(self, y: Array) -> Array:
+        """What is measured, (N, n), as numbers of its type."""
+        return np.asarray(y, dtype=self._type).astype(np.float64)
 
     def _function(self, library: ctypes.CDLL, name: str) -> Callable[..., int]:
         function = getattr(library, name)

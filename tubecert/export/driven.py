@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
+from tubecert.export.accounted import Accounted, accounts
 from tubecert.export.compiled import Compiled
 from tubecert.export.controller import Controller, Steering
 from tubecert.export.program import Program, Writer
@@ -48,7 +49,8 @@ class Driven:
     `difference`: the largest one to the reference, at a sample; `scale` the largest input; `distance`: the largest
     d(x*, x), of which `level` is proven; `escapes`: runs that reached it; `told`: steps that returned another status
     than 0 or "the horizon is over"; `step` and `worst`: seconds of a step, the median and the largest, called from
-    Python.
+    Python. `lost`: the largest share, at a sample, of what the certificate allows rounding to cost; None where it is
+    about exact arithmetic.
     """
 
     runs: int
@@ -62,6 +64,7 @@ class Driven:
     step: float
     worst: float
     precision: str
+    lost: float | None = None
 
     @property
     def agrees(self) -> bool:
@@ -71,7 +74,8 @@ class Driven:
     @property
     def fine(self) -> bool:
         """Whether nothing speaks against the code."""
-        return self.agrees and not self.escapes and not self.told
+        within = self.lost is None or self.lost <= 1
+        return self.agrees and within and not self.escapes and not self.told
 
 
 def driven(
@@ -89,6 +93,8 @@ def driven(
     x = np.array([item.start for item in cases])
     samples = int(Fraction(setting.horizon).limit_denominator(10**9) / controller.sample_time)
     seen = Seen(np.zeros(given.count))
+    lost = controller.lost
+    accounted = None if lost is None or not accounts(controller) else Accounted(controller, lost)
     acting: Array = np.zeros((given.count, len(controller.inputs)))
     for k in range(samples):
         if report is not None and k % 100 == 0:
@@ -99,7 +105,10 @@ def driven(
         if k == 0:
             acting = code.start(y)
             seen.compare(acting, reference.start(y))
+        memory = None if accounted is None else code.memory()
         new = code.step(y)
+        if accounted is not None and memory is not None:
+            accounted.sample(k, code.measured(y), memory, code.memory())
         seen.compare(new, reference.step(y)[0])
         seen.told += int((code.status > 1).sum())
         reference.sample = k  # the plan is asked for at times after this sample
@@ -120,6 +129,7 @@ def driven(
         step=float(np.median(code.seconds)),
         worst=float(np.max(code.seconds)),
         precision=given.precision,
+        lost=None if accounted is None else accounted.share,
     )
 
 

@@ -166,7 +166,7 @@ class Reference(Around):
         (f,) = execute(c.drift, y, real=real)
         estimate = self.q
         if self.sample:
-            self.q, estimate = execute(c.estimator, y, f, self.y, self.f, self.q, self._mean(), real=real)
+            self.q, estimate = execute(c.estimator, y, f, self.y, self.f, self.q, self.mean(), real=real)
         if self.sample % c.every == 0:
             seen, after = self._predicted(y), c.delay if c.predicts else 0
             self.feedback, self.square = self._law(seen, self.time(after))
@@ -185,7 +185,7 @@ class Reference(Around):
         kappa, square = self.kappa(y, t)
         return (kappa + self.plan(t)[1] if self.controller.adds_plan else kappa), square
 
-    def _mean(self) -> Array:
+    def mean(self) -> Array:
         """The mean of the inputs over the last sample, (N, m)."""
         c, real = self.controller, self.real
         given = [self.held, self.before]

@@ -58,6 +58,10 @@ class Drive:
             f"  a step takes {near(1e6 * done.step, 2)} us here, at most {near(1e6 * done.worst, 3)} us "
             "(called from Python)",
         ]
+        if done.lost is not None:
+            lines.append(
+                f"  rounding took at most {near(100 * done.lost, 2)} % of what the certificate allows for, at a sample"
+            )
         if done.told:
             lines.append(f"  {done.told} steps said that an assumption does not hold")
         return "\n".join(lines)
