@@ -11,6 +11,7 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `reasons` | why a verdict about gains is what it is |
 | `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
+| `written` | that metric as its file holds it |
 | `design`, `trade`, `width` | the narrowest tube, what a tube asks of a machine |
 | `sensitivities` | what a better machine would make of the narrowest tube |
 | `metric_search`, `joint` | a metric for a machine: constant, and one that moves |

@@ -7,22 +7,16 @@ text that a metric file will hold, and is what its proof is about.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from typing import Literal
 
-from tubecert.certificate.metric_file import metric_file
-from tubecert.certificate.searched import SolverData
-from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import (
     AskForRateBelow,
-    ConstantInputs,
     EnlargeSafeSet,
     GiveInput,
-    LowerDegree,
     LowerRate,
     OtherVariables,
     RaiseBudget,
@@ -45,7 +39,6 @@ from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
-from tubecert.expression import to_text
 from tubecert.letters import HARDWARE
 from tubecert.metric.verify import MetricProof, verify_metric
 from tubecert.model import build, rank_decision
@@ -56,10 +49,9 @@ from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.pipeline.unfound import equilibria, lacking, nearest, none_certified, remedies, tried
 from tubecert.pipeline.width import half_widths, measure_in
+from tubecert.pipeline.written import TooLongError, file_of, read_back, shorter
 from tubecert.progress import Phase, Progress, Step, Unit
-from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
-from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
@@ -80,14 +72,6 @@ _BOXES = 100_000  # and what each claim may cost there
 
 Ask = Callable[[Spec, Options, Progress, Memory], Question]
 Told = Callable[["Synthesised"], None]
-
-
-class _TooLongError(Exception):
-    """A metric is too long for a file, and so will others be."""
-
-    def __init__(self, metric: VerifiedMetric, code: str) -> None:
-        super().__init__(code)
-        self.metric, self.code = metric, code
 
 
 class SynthesisRun:
@@ -156,8 +140,8 @@ class SynthesisRun:
             best = self._best()
         except FamilyError as error:  # what C3 forbids
             return self._failed(error.failure, OtherVariables())
-        except _TooLongError as error:
-            return self._failed(NotWritable(code=error.code), self._shorter(error.metric))
+        except TooLongError as error:
+            return self._failed(NotWritable(code=error.code), shorter(error.metric))
         except (OutOfTime, KeyboardInterrupt) as end:
             best = self._so_far(end)
         if best is None:
@@ -264,10 +248,10 @@ class SynthesisRun:
         if missing_radii(self.spec):
             return row
         try:
-            spec = self._with(metric)
+            spec = read_back(self.spec, metric)
         except SpecError as error:  # too long to be written, as the metrics of other rates are, too
             if self.climb.best is None:
-                raise _TooLongError(metric, error.findings[0].code) from None
+                raise TooLongError(metric, error.findings[0].code) from None
             return row
         self._say(f"rate {near(metric.rate, 4)}: certifying")
         outputs = measure_in(self.spec, self.wanted.outputs)
@@ -294,16 +278,12 @@ class SynthesisRun:
 
     # -- outcomes ---------------------------------------------------------------------------------------------------
 
-    def _with(self, metric: VerifiedMetric) -> Spec:
-        content = {"format": FORMAT, **_metric_data(metric)}
-        return with_metric_text(self.spec, json.dumps(content), "<synthesised>")
-
     def _written(self, metric: VerifiedMetric) -> Synthesised:
         """The metric as a file will hold it: read back, and proven as read."""
         try:
-            spec = self._with(metric)
+            spec = read_back(self.spec, metric)
         except SpecError as error:
-            return self._failed(NotWritable(code=error.findings[0].code), self._shorter(metric))
+            return self._failed(NotWritable(code=error.findings[0].code), shorter(metric))
         model = build(spec)
         same = metric.proof.is_about(model, spec.safe_set)
         proof = metric.proof if same else verify_metric(model, spec.safe_set, self.effort)
@@ -313,18 +293,12 @@ class SynthesisRun:
             verdict=proof.verdict,
             wanted=self.wanted,
             spec=spec,
-            file=metric_file(
-                dict(zip(spec.states, spec.safe_set, strict=True)), metric_data(spec, proof), _solver(metric)
-            ),
+            file=file_of(spec, proof, metric),
             rows=self._table(),
             attempts=tuple(self.ladder.attempts),
             limits=self.climb.limits(),
             cut=self.cut,
         )
-
-    def _shorter(self, metric: VerifiedMetric) -> Relax:
-        """What makes a metric shorter: where B moves, its fields are what is long."""
-        return LowerDegree() if metric.family.flat else ConstantInputs()
 
     def _table(self) -> tuple[Row, ...]:
         return tuple(sorted(self.rows.values(), key=lambda row: (row.rate, row.floor, row.degree)))
@@ -375,7 +349,7 @@ class SynthesisRun:
             return found
         if self.told is not None:
             self.told(found)
-        asked = self.ask(self._with(closest.metric), self._judging(), self._watch, self.memory)
+        asked = self.ask(read_back(self.spec, closest.metric), self._judging(), self._watch, self.memory)
         reason = replace(found.reason, relax=(*found.reason.relax, *lacking(asked)))
         return replace(found, reason=reason)
 
@@ -391,19 +365,3 @@ class SynthesisRun:
         if self.progress is not None:
             self.said += 1
             self.progress(replace(step, count=self.said, unit=Unit.STEPS))
-
-
-def _solver(metric: VerifiedMetric) -> SolverData:
-    return SolverData(
-        route=metric.proposal.route,
-        degree=metric.family.degree,
-        variables=tuple(metric.family.variables),
-        digits=metric.digits,
-    )
-
-
-def _metric_data(metric: VerifiedMetric) -> Json:
-    return {
-        "rate": exact_json(metric.rate),
-        "dual_metric": [[to_text(e) for e in row] for row in metric.dual_metric],
-    }
