@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 from systems import matrix_of
 
 from tubecert.bounds.level import Proposed, greatest_level, least_level, settled
@@ -85,7 +86,7 @@ def points(coordinates: Coordinates, rho: float, sides: np.ndarray, count: int, 
 
 
 @pytest.mark.slow
-@given(st.lists(st.fractions(-3, 3, max_denominator=7), min_size=9, max_size=9))
+@given(st.lists(fractions(-3, 3, 7), min_size=9, max_size=9))
 def test_the_inverse_is_exact(values):
     own = tuple(tuple(values[3 * i : 3 * i + 3]) for i in range(3))
     found = inverse(own)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import texts
+from strategies import fractions, texts
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import Effort
@@ -33,7 +33,7 @@ metric: {{dual_metric: [[1, 0], [0, 1]], rate: 0.1}}
 trajectory: {plan}
 """
 SHARP = 1e-4
-NUMBERS = st.fractions(-5, 5, max_denominator=1000)
+NUMBERS = fractions(-5, 5, 1000)
 
 
 def suprema(plan):
@@ -92,7 +92,7 @@ def test_of_a_family_it_is_the_box():
 @given(
     st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=6),
     st.sampled_from(["hold", "linear"]),
-    st.fractions("1/10", 1, max_denominator=100),
+    fractions("1/10", 1, 100),
 )
 def test_through_knots_it_is_the_range_of_the_knots_that_count(u, interpolation, cut):
     """The plan ends within its last piece: what comes after the horizon is no part of it."""

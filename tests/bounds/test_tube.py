@@ -10,6 +10,7 @@ from balls import evaluate, possible
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
@@ -58,7 +59,7 @@ def along(name: str, when: Fraction):
     return [evaluate(e, {"t": when}) for e in states], [evaluate(e, {"t": when}) for e in inputs]
 
 
-times = st.fractions(0, HORIZON, max_denominator=1000)
+times = fractions(0, HORIZON, 1000)
 unit = st.floats(-1, 1)
 
 
@@ -197,7 +198,7 @@ def test_a_smaller_tube_has_smaller_suprema():
 
 
 @pytest.mark.parametrize("name", TEXTS)
-@given(start=times, width=st.sampled_from([0.0, 1e-9, 0.01, 0.5]), part=st.fractions(0, 1, max_denominator=9))
+@given(start=times, width=st.sampled_from([0.0, 1e-9, 0.01, 0.5]), part=fractions(0, 1, 9))
 @settings(max_examples=25, deadline=None)
 def test_a_plan_encloses_itself_over_a_window(name, start, width, part):
     lo = float(start)

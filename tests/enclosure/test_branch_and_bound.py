@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 
 from tubecert.bounds.feedback import tangents
 from tubecert.coordinates import Fields
@@ -213,8 +214,8 @@ def test_a_range_without_a_float_is_bounded_above_only():
 
 @pytest.mark.slow
 @given(
-    coefficients=st.lists(st.fractions(-3, 3, max_denominator=8), min_size=6, max_size=6),
-    cut=st.fractions(0, 1, max_denominator=16),
+    coefficients=st.lists(fractions(-3, 3, 8), min_size=6, max_size=6),
+    cut=fractions(0, 1, 16),
 )
 @settings(max_examples=25, deadline=None)
 def test_a_smaller_set_has_no_larger_bound_beyond_the_gap(coefficients, cut):

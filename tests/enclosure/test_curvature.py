@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from itertools import combinations, product
 from math import prod
 
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 
 from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
@@ -98,9 +100,9 @@ def powers(dim, degree):
     return [p for p in product(range(degree + 1), repeat=dim) if sum(p) <= degree]
 
 
+@cache
 def polynomials(dim, degree, *, curved=True):
     """Coefficients that are no floats; `curved`: with every square."""
-    numbers = st.fractions(min_value=-3, max_value=3, max_denominator=7)
 
     def finished(values):
         terms = {p: c for p, c in zip(powers(dim, degree), values, strict=True) if c}
@@ -110,11 +112,17 @@ def polynomials(dim, degree, *, curved=True):
         return Polynomial(terms)
 
     count = len(powers(dim, degree))
-    return st.lists(numbers, min_size=count, max_size=count).map(finished)
+    return st.lists(fractions(-3, 3, 7), min_size=count, max_size=count).map(finished)
 
 
 ends = st.tuples(st.floats(-2, 2), st.sampled_from([0.0, 1e-12, 1e-5, 0.1, 1.0, 3.0]))
 shares = st.sampled_from([Fraction(0), Fraction(1), HALF, QUARTER, Fraction(2, 7), Fraction(9, 10)])
+
+
+@cache
+def of_all(one, count):
+    """One for every variable; strategies that are made anew for every example take longer than the tests."""
+    return st.lists(one, min_size=count, max_size=count)
 
 
 # -- the theorem of the module, literally
@@ -127,7 +135,7 @@ shares = st.sampled_from([Fraction(0), Fraction(1), HALF, QUARTER, Fraction(2, 7
 def test_the_enclosure_is_that_of_the_theorem(dim, data):
     """Mid part and rest of a cubic, vertex by vertex and cause by cause, are those that the docstring states."""
     p = data.draw(polynomials(dim, 3))
-    lo, width = zip(*data.draw(st.lists(ends, min_size=dim, max_size=dim)), strict=True)
+    lo, width = zip(*data.draw(of_all(ends, dim)), strict=True)
     hi = [a + w for a, w in zip(lo, width, strict=True)]
     function = MatrixFunction([[[p.expression]]])
     assume(len(function._curved) == dim)  # a square may be lost beside a cube
@@ -160,9 +168,9 @@ def test_the_enclosure_is_that_of_the_theorem(dim, data):
 def test_every_value_lies_in_the_hull_of_the_vertices(dim, degree, data):
     """Two polynomials side by side: every linear form of them is below its support over the vertices, exactly."""
     pair = [data.draw(polynomials(dim, degree, curved=False)) for _ in range(2)]
-    lo, width = zip(*data.draw(st.lists(ends, min_size=dim, max_size=dim)), strict=True)
+    lo, width = zip(*data.draw(of_all(ends, dim)), strict=True)
     hi = [a + w for a, w in zip(lo, width, strict=True)]
-    parts = data.draw(st.lists(shares, min_size=dim, max_size=dim))
+    parts = data.draw(of_all(shares, dim))
     point = exact_points(lo, hi, parts)
     function = MatrixFunction([[[p.expression for p in pair]]])
     own = [int(name[1:]) for name in function.variables]
@@ -328,9 +336,9 @@ def test_variables_beyond_the_vertices_keep_the_whole_curvature(monkeypatch):
 def test_any_number_of_vertices_contains(data, kept):
     """The order of variables and how many are expanded change how tight a bound is, nothing else."""
     p = data.draw(polynomials(3, 3, curved=False))
-    lo, width = zip(*data.draw(st.lists(ends, min_size=3, max_size=3)), strict=True)
+    lo, width = zip(*data.draw(of_all(ends, 3)), strict=True)
     hi = [a + w for a, w in zip(lo, width, strict=True)]
-    point = exact_points(lo, hi, data.draw(st.lists(shares, min_size=3, max_size=3)))
+    point = exact_points(lo, hi, data.draw(of_all(shares, 3)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(taylor, "MOST_VERTICES", kept)
         function = MatrixFunction([[[p.expression]]])
@@ -346,9 +354,9 @@ def test_any_number_of_vertices_contains(data, kept):
 @QUICK
 def test_fixed_variables_enter_with_their_whole_range(data, order):
     p = data.draw(polynomials(3, 3, curved=False))
-    lo, width = zip(*data.draw(st.lists(ends, min_size=3, max_size=3)), strict=True)
+    lo, width = zip(*data.draw(of_all(ends, 3)), strict=True)
     hi = [a + w for a, w in zip(lo, width, strict=True)]
-    point = exact_points(lo, hi, data.draw(st.lists(shares, min_size=3, max_size=3)))
+    point = exact_points(lo, hi, data.draw(of_all(shares, 3)))
     function = MatrixFunction([[[p.expression]]], order, fixed=frozenset({"v1"}))
     assert "v1" not in (*function._curved, *function._affine)
     own = [int(name[1:]) for name in function.variables]

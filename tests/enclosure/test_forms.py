@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 from systems import matrix_of
 
 from tubecert.enclosure.forms import Form, Forms, contract, least_norm, stacked, thin, unfolded_norm
@@ -44,7 +45,7 @@ def contains(form: Form, e, value) -> bool:
     return True
 
 
-positions = st.tuples(*[st.fractions(-1, 1, max_denominator=50)] * 2)
+positions = st.tuples(*[fractions(-1, 1, 50)] * 2)
 numbers = st.floats(-2, 2, allow_nan=False, allow_subnormal=False)
 
 

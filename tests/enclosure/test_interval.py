@@ -33,24 +33,26 @@ def precision():
     ctx.prec = before
 
 
-@st.composite
-def intervals(draw, within=numbers):
-    """(lo, hi), often thin, often one float wide."""
-    a, b = draw(within), draw(within)
-    kind = draw(st.sampled_from(["wide", "thin", "narrow"]))
-    if kind != "wide":
-        b = a if kind == "thin" else float(np.nextafter(a, 0.0))
-    return min(a, b), max(a, b)
+PARTS = [Fraction(0), Fraction(1), Fraction(1, 2), Fraction(1, 3), Fraction(997, 1000)]
 
 
-@st.composite
-def members(draw, bounds):
-    """An exact rational number of an interval."""
-    lo, hi = Fraction(bounds[0]), Fraction(bounds[1])
-    part = draw(
-        st.sampled_from([Fraction(0), Fraction(1), Fraction(1, 2), Fraction(1, 3), Fraction(997, 1000)])
-    )
-    return lo + part * (hi - lo)
+def intervals(of=numbers):
+    """(lo, hi), often thin, often one float wide, and an exact rational number of it.
+
+    Strategies are made once, at the head of this file: one that is made for every example takes longer than the test.
+    """
+
+    def drawn(values):
+        a, b, kind, part = values
+        if kind != "wide":
+            b = a if kind == "thin" else float(np.nextafter(a, 0.0))
+        lo, hi = min(a, b), max(a, b)
+        return (lo, hi), Fraction(lo) + part * (Fraction(hi) - Fraction(lo))
+
+    return st.tuples(of, of, st.sampled_from(["wide", "thin", "narrow"]), st.sampled_from(PARTS)).map(drawn)
+
+
+ANY = intervals()
 
 
 def ball(q):
@@ -78,20 +80,19 @@ ARITHMETIC = {
 }
 
 
-def check_arithmetic(data, name):
+def check_arithmetic(first, second, name):
     operation, exact = ARITHMETIC[name]
-    a, b = data.draw(intervals()), data.draw(intervals())
-    p, q = data.draw(members(a)), data.draw(members(b))
+    (a, p), (b, q) = first, second
     assume(name != "/" or q != 0)
     assert within(ball(exact(p, q)), operation(thin_or_wide(a), thin_or_wide(b)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARITHMETIC)
-@given(data=st.data())
+@given(first=ANY, second=ANY)
 @SETTINGS
-def test_arithmetic_contains_the_exact_result(name, data):
-    check_arithmetic(data, name)
+def test_arithmetic_contains_the_exact_result(name, first, second):
+    check_arithmetic(first, second, name)
 
 
 SMALL = [Fraction(n, 2) for n in (-7, -4, -1, 0, 2, 3, 6)]
@@ -118,11 +119,10 @@ def test_every_corner_counts(name, a):
 
 
 @pytest.mark.slow
-@given(data=st.data(), n=st.integers(-7, 9))
+@given(drawn=intervals(numbers.filter(lambda x: abs(x) < 1e40)), n=st.integers(-7, 9))
 @SETTINGS
-def test_powers_contain_the_exact_result(data, n):
-    a = data.draw(intervals(numbers.filter(lambda x: abs(x) < 1e40)))
-    p = data.draw(members(a))
+def test_powers_contain_the_exact_result(drawn, n):
+    a, p = drawn
     assume(n >= 0 or p != 0)
     assert within(ball(p**n), thin_or_wide(a) ** n)
 
@@ -164,10 +164,7 @@ DOMAINS = {
 LIBRARY = {"atan": "arctan", "asin": "arcsin", "acos": "arccos"}
 
 
-def check_function(data, name):
-    function, exact, domain = DOMAINS[name]
-    a = data.draw(intervals(domain))
-    assert within(exact(ball(data.draw(members(a)))), function(thin_or_wide(a)))
+IN_DOMAINS = {name: intervals(domain) for name, (_, _, domain) in DOMAINS.items()}
 
 
 @pytest.mark.slow
@@ -175,7 +172,9 @@ def check_function(data, name):
 @given(data=st.data())
 @SETTINGS
 def test_functions_contain_the_exact_result(name, data):
-    check_function(data, name)
+    function, exact, _ = DOMAINS[name]
+    a, p = data.draw(IN_DOMAINS[name])
+    assert within(exact(ball(p)), function(thin_or_wide(a)))
 
 
 @pytest.mark.parametrize("name", ["sin", "cos"])
@@ -207,12 +206,13 @@ def test_tangent_across_a_pole_is_undefined(k, side, width):
 
 
 @pytest.mark.slow
-@given(data=st.data(), count=st.integers(1, 4))
+@given(
+    drawn=st.lists(intervals(numbers.filter(lambda x: abs(x) < 1e150)), min_size=1, max_size=4),
+)
 @SETTINGS
-def test_norm_and_direction_contain_the_exact_result(data, count):
-    parts = [data.draw(intervals(numbers.filter(lambda x: abs(x) < 1e150))) for _ in range(count)]
-    exact = [data.draw(members(a)) for a in parts]
-    boxes = [thin_or_wide(a) for a in parts]
+def test_norm_and_direction_contain_the_exact_result(drawn):
+    exact = [q for _, q in drawn]
+    boxes = [thin_or_wide(a) for a, _ in drawn]
     square = sum((q * q for q in exact), start=Fraction(0))
     length = ball(square).sqrt()
     assert within(length, iv.norm(boxes))
@@ -239,10 +239,9 @@ UNARY = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", UNARY)
-@given(data=st.data())
+@given(ends=st.lists(numbers.filter(lambda x: abs(x) < 500), min_size=4, max_size=4).map(sorted))
 @SETTINGS
-def test_inclusion_is_monotone(name, data):
-    ends = sorted(data.draw(st.lists(numbers.filter(lambda x: abs(x) < 500), min_size=4, max_size=4)))
+def test_inclusion_is_monotone(name, ends):
     if name in ("sqrt", "log1p", "log"):
         ends = sorted(map(abs, ends))
     if name in ("asin", "acos"):
@@ -256,10 +255,9 @@ def test_inclusion_is_monotone(name, data):
         assert inner.hi - slack <= outer.hi
 
 
-@given(data=st.data())
+@given(ends=st.tuples(*[st.lists(numbers, min_size=4, max_size=4).map(sorted)] * 2))
 @SETTINGS
-def test_sums_products_and_quotients_are_inclusion_monotone(data):
-    ends = [sorted(data.draw(st.lists(numbers, min_size=4, max_size=4))) for _ in range(2)]
+def test_sums_products_and_quotients_are_inclusion_monotone(ends):
     for operation, _ in ARITHMETIC.values():
         outer = operation(*(Interval(e[0], e[3]) for e in ends)).sanitised()
         inner = operation(*(Interval(e[1], e[2]) for e in ends))
@@ -350,9 +348,10 @@ def test_pi_lies_inside():
     assert np.nextafter(float(PI.lo), np.inf) == PI.hi
 
 
-@given(bounds=intervals())
+@given(drawn=ANY)
 @SETTINGS
-def test_midpoint_and_radius_cover(bounds):
+def test_midpoint_and_radius_cover(drawn):
+    bounds, _ = drawn
     a = Interval(*bounds)
     assume(np.isfinite(a.rad))
     mid, rad = Fraction(float(a.mid)), Fraction(float(a.rad))
@@ -412,10 +411,10 @@ def unsafe(name, monkeypatch):
 def test_removed_outward_rounding_is_noticed(name, operation, monkeypatch):
     unsafe(name, monkeypatch)
 
-    @given(data=st.data())
+    @given(first=ANY, second=ANY)
     @settings(max_examples=400, deadline=None, derandomize=True, database=None, phases=[Phase.generate])
-    def contains(data):
-        check_arithmetic(data, operation)
+    def contains(first, second):
+        check_arithmetic(first, second, operation)
 
     with pytest.raises(AssertionError):
         contains()

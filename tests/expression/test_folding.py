@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 
 from tubecert.expression import (
     ZERO,
@@ -37,7 +38,7 @@ class Built:
     at: Callable[[dict[str, Any]], Any]  # of Fractions, or of dual numbers
 
 
-rationals = st.fractions(-4, 4, max_denominator=9)
+rationals = fractions(-4, 4, 9)
 points = st.fixed_dictionaries(dict.fromkeys(NAMES, rationals))
 leaves = st.one_of(
     st.sampled_from(NAMES).map(lambda name: Built(symbol(name), lambda p: p[name])),

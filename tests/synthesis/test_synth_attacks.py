@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import fractions
 from typer.testing import CliRunner
 
 from tubecert import pipeline
@@ -119,9 +120,7 @@ def test_repeated_modes_are_bounded_truly(order):
 
 
 @pytest.mark.slow
-@given(
-    entries=st.lists(st.integers(-3, 3), min_size=9, max_size=9), rate=st.fractions(-4, 4, max_denominator=9)
-)
+@given(entries=st.lists(st.integers(-3, 3), min_size=9, max_size=9), rate=fractions(-4, 4, 9))
 @QUICK
 def test_what_is_excluded_is_excluded_by_a_mode_that_no_input_reaches(entries, rate):
     """Against eigenvalues of the uncontrollable part, in coordinates that hide it."""

@@ -9,10 +9,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from proven import proven
 from proven import result as proven_result
 from rechecked import examine, failing, sealed
+from strategies import fractions
 from systems import FAMILY_TWO as FAMILY
 
 from tubecert.bounds.suprema import Suprema
@@ -41,7 +41,7 @@ initial_state: {within: 0.02}
 metric: {rate: 0.3, dual_metric: [["1 + 0.1*x**2", "0.1"], ["0.1", "1.2"]]}
 tube: {epsilon: 0.2, rho_a: 0.1}
 """
-RATIOS = st.fractions(-2, 2, max_denominator=10_000)
+RATIOS = fractions(-2, 2, 10_000)
 OWN = "trajectory: {kind: any, x: {x1: [-1, 1], x2: [-0.5, 0.5]}, u: {u: [-1, 1]}, defect: 0.01}"
 
 
