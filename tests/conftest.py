@@ -11,7 +11,9 @@ import shared
 from hypothesis import HealthCheck, settings
 
 # how long an example takes is the machine's affair, and its other users'
-settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "tests", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("tests")
 
 # the rewritten assertions of all files and the modules of every `tubecert` that a test starts, compiled once

@@ -131,7 +131,7 @@ def test_derivatives_are_by_the_components_of_z():
 # -- the domain
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(
     which=st.sampled_from([[0], [1], [2], [0, 1], [2, 0], [1, 2], [0, 1, 2], [2, 1, 0]]),
     corner=st.lists(st.floats(-1, 1), min_size=3, max_size=3),

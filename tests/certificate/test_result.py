@@ -71,7 +71,7 @@ def test_values_have_types():
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(
     where=ANY_PLACE, value=st.sampled_from([None, 7, -1.5, True, "text", [], {}, {"a": 1}, [1, 2], "absent"])
 )
@@ -102,7 +102,7 @@ def pruned(value):
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @given(where=ANY_PLACE)
 def test_a_key_that_is_not_known_is_refused(where):
     name, path = where

@@ -182,7 +182,7 @@ sizes = st.floats(0.0, 5.0)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.tuples(*[sizes] * 6), st.tuples(*[st.floats(0, 0.5)] * 6), st.floats(0.2, 5), st.floats(0.05, 50))
 def test_sup_D_rises_with_every_size_and_intervals_include(low, extra, lam, omega):
     names = ("d0", "beta", "H0", "S", "e", "delta")

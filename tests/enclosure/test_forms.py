@@ -50,7 +50,7 @@ numbers = st.floats(-2, 2, allow_nan=False, allow_subnormal=False)
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(numbers, numbers, st.floats(1e-6, 1), st.floats(1e-6, 1), positions)
 def test_a_product_of_forms_contains_the_product(x, y, rx, ry, e):
     lo, hi = [x - rx, y - ry], [x + rx, y + ry]

@@ -101,7 +101,7 @@ def test_the_function_is_hermites(table, ends):
 
 @pytest.mark.slow
 @given(tables(), st.lists(st.floats(0, 1), min_size=2, max_size=6), st.integers(0, 4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_both_enclosures_contain_every_value(table, ends, order):
     """And are as narrow as the values, and a rounding, where these are many."""
     own = derived(table, order)

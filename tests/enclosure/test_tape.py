@@ -14,7 +14,7 @@ from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, constant, norm, parse, sin, sqrt, symbol
 
-SETTINGS = settings(max_examples=150, deadline=None)
+SETTINGS = settings(max_examples=60, deadline=None)
 x, y = symbol("x"), symbol("y")
 
 

@@ -16,7 +16,7 @@ from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, calculus, derivatives, norm, parse, symbol
 from tubecert.expression import graph as graph_module
 
-SETTINGS = settings(max_examples=60, deadline=None)
+SETTINGS = settings(max_examples=40, deadline=None)
 x, y, z = (symbol(name) for name in "xyz")
 
 

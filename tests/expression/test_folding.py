@@ -94,7 +94,7 @@ def by_nodes(e: Expression, point: Point) -> Fraction:
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(built=rational_functions, point=points)
 def test_a_graph_has_the_value_of_its_construction(built: Built, point: Point) -> None:
     try:
@@ -137,7 +137,7 @@ class Dual:
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(built=rational_functions, point=points, name=st.sampled_from(NAMES))
 def test_a_derivative_is_that_of_dual_numbers(built: Built, point: Point, name: str) -> None:
     duals = {key: Dual(q, Fraction(key == name)) for key, q in point.items()}

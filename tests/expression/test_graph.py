@@ -152,7 +152,7 @@ def test_derivative_of_a_norm_is_a_direction() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(text=texts(), point=points)
 def test_derivatives_agree_with_sympy(name: str, text: str, point: dict[str, Fraction]) -> None:
     with mpmath.workdps(60):
@@ -161,7 +161,7 @@ def test_derivatives_agree_with_sympy(name: str, text: str, point: dict[str, Fra
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(text=texts(), point=points)
 def test_simplification_keeps_the_value(text: str, point: dict[str, Fraction]) -> None:
     with mpmath.workdps(60):
@@ -169,14 +169,14 @@ def test_simplification_keeps_the_value(text: str, point: dict[str, Fraction]) -
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(text=texts())
 def test_text_parses_back_to_the_same_expression(text: str) -> None:
     e = read(text)
     assert read(to_text(e)) is e
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(text=texts(leaves=5))
 def test_text_of_derivatives_parses_back(text: str) -> None:
     for slope in derivatives([read(text)], "x"):

@@ -38,7 +38,7 @@ def by_definition(rows: list[list[Fraction]]) -> Fraction:
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_determinant_and_adjugate_are_those_of_the_definition(n: int, data: st.DataObject) -> None:
     rows = data.draw(squares(n))
@@ -61,7 +61,7 @@ def test_a_symbolic_determinant_has_the_values_of_its_entries(n: int) -> None:
         assert substitute([symbolic], values)[0] is constant(by_definition(rows))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     rows=st.integers(1, 3).flatmap(
         lambda p: st.lists(st.lists(entries, min_size=4, max_size=4), min_size=p, max_size=p)

@@ -93,7 +93,7 @@ def partial(drawn: tuple[str, list[str]]) -> str:
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(text=st.tuples(texts(leaves=3), st.lists(st.sampled_from(SHAPES))).map(partial))
 def test_the_text_owes_what_was_owed(text: str) -> None:
     """Reading it gives the same expression, and the same text again: nothing was lost or made up on the way."""

@@ -310,7 +310,7 @@ def test_limits_are_not_narrower_than_promised() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(text=texts())
 def test_random_expressions_are_accepted(text: str) -> None:
     parsed = read(text)
@@ -318,7 +318,7 @@ def test_random_expressions_are_accepted(text: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     text=st.text(alphabet="xyt0123.e+-*/() ,^sincoqr", max_size=30)
     | st.text(alphabet=string.printable + "\u2212\u03bb", max_size=20)

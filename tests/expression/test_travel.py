@@ -32,7 +32,7 @@ def test_a_copy_is_the_same_object(e: Expression) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(text=texts())
 def test_identity_survives_pickle(text: str) -> None:
     e = read(text)

@@ -88,7 +88,7 @@ def test_nothing_else_is_claimed(text: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(text=texts(), point=points)
 def test_a_claim_agrees_with_the_values(text: str, point: dict) -> None:  # type: ignore[type-arg]
     e = read(text)
@@ -98,7 +98,7 @@ def test_a_claim_agrees_with_the_values(text: str, point: dict) -> None:  # type
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(a=texts(smooth=True, leaves=4), b=texts(smooth=True, leaves=4))
 def test_the_product_rule_is_proven_for_trigonometric_polynomials(a: str, b: str) -> None:
     u, v = read(a), read(b)

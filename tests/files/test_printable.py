@@ -117,7 +117,7 @@ def checked(text: str) -> list[Checked]:
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(FOREIGN)
 def test_no_format_passes_on_what_does_not_print(text):
     for name, render in FORMATS.items():
@@ -218,7 +218,7 @@ MARKUP = st.text(st.sampled_from("#*-+=_~`<>|[]()!&$\\ \t1.2)a:/w@\n") | st.char
 
 
 @pytest.mark.slow
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(MARKUP)
 def test_markdown_shows_a_text_as_it_is(text):
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown.escape(text))
@@ -232,7 +232,7 @@ def test_markdown_shows_a_text_as_it_is(text):
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(MARKUP)
 def test_nothing_in_a_certificate_is_markup_of_its_page(text):
     plain = markdown.render(Certificate.from_json(planted("x", *PLACES[0])))

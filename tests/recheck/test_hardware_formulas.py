@@ -177,7 +177,7 @@ def same(own: arb, other) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @given(problems())
 def test_both_readings_of_theorem_h_agree(case):
     problem, recipe = case

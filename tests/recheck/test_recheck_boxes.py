@@ -329,7 +329,7 @@ def test_the_weights_of_a_least_gain_are_proposals_only(y, monkeypatch):
     assert not test.over([(0.0, 0.1)]).proven  # it is 1/sqrt(1.01) at 0.1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(texts(leaves=6), st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_random_expressions_are_enclosed(text, ends):
     box = dict(zip("xyt", [tuple(sorted(ends[2 * k : 2 * k + 2])) for k in range(3)], strict=True))

@@ -194,7 +194,7 @@ def _planted(text):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(HOSTILE)
 def test_no_text_becomes_markup(text):
     text = "".join(c for c in text if c.isprintable() or c in "\n\t")
@@ -569,7 +569,7 @@ def test_markdown_says_the_same(any_certificate):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(HOSTILE)
 def test_markdown_tables_keep_their_columns(text):
     lines = markdown.render(told(_planted(text))).splitlines()

@@ -45,7 +45,7 @@ def filled(obstacle, step=0.02):
 INSIDE = filled(STAR)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.tuples(coordinates, coordinates))
 def test_distance_to_a_polygon(point):
     value = float(signed_distance(STAR, np.array([point]))[0])
@@ -81,7 +81,7 @@ def test_a_curve_meets_an_obstacle_in_the_plane_of_its_states():
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(coordinates, coordinates, st.floats(0.2, 2), st.floats(0.1, 1), st.floats(0.1, 1))
 def test_the_clearance_of_a_tube_is_never_too_large(a, c, rho, wide, high):
     corners = ", ".join(f"[{x}, {y}]" for x, y in STAR.polygon)

@@ -45,6 +45,23 @@ def test_decay_solves_its_differential_equation():
     np.testing.assert_allclose(decay(t), solved, atol=1e-8)
 
 
+def test_the_error_of_the_estimate_counts_from_the_start():
+    """(2.15) of what is certified, against its differential equation: a true loop broke a D(t) whose e came slowly."""
+    where = setting("flat")
+    own, recipe = where.certified, where.certified.proven("distance").recipe
+    rest, omega = recipe["uncertainty"], recipe["bandwidth"]
+
+    def right(t, D):
+        e = np.exp(-omega * t)
+        seen = e * own["h_initial"] + (1 - e) * rest + recipe["prediction_error"]
+        return -own.rate * D + own["metric_input_gain"] * seen + own["plan_defect"]
+
+    t = np.linspace(0, 1 / omega, 31)
+    start = [own["initial_distance"]]
+    solved = solve_ivp(right, (0, t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-14).y[0]
+    np.testing.assert_allclose(promise(own, KINDS["distance"]).decay(t), solved, rtol=1e-7)
+
+
 def test_decay_with_delay_waits_without_adaptation():
     decay = Decay(rate=1.3, bandwidth=1.3, start=0.2, beta=0.8, defect=0.0, first=1.5, rest=0.4, delay=0.5)
     t = np.linspace(0, 3, 301)

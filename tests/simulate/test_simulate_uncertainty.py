@@ -60,7 +60,7 @@ def assert_in_class(
     assert np.linalg.norm(start) + push <= max(kind.h_initial, push) * tight + 1e-12 * kind.h
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(kinds(), seeds)
 def test_random_members_are_in_the_class(kind, seed):
     rng = np.random.default_rng(seed)
@@ -68,7 +68,7 @@ def test_random_members_are_in_the_class(kind, seed):
     assert_in_class(random_member(kind, x0, centre, rng), kind, x0, centre, rng)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(kinds(), seeds)
 def test_adversaries_are_in_the_class(kind, seed):
     rng = np.random.default_rng(seed)

@@ -90,7 +90,7 @@ def test_definitions_do_not_hide_a_text_without_end() -> None:
 
 
 @given(first=texts(leaves=5), second=texts(leaves=4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @pytest.mark.slow
 def test_a_definition_is_what_it_stands_for(first: str, second: str) -> None:
     named = spec(f'{{"a": "{first}", "b": "{second}"}}', h="a*b + a")

@@ -558,7 +558,7 @@ def mutants(draw: st.DrawFn) -> str:
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(text=mutants())
 def test_a_mutated_file_loads_or_is_refused(text: str) -> None:
     try:

@@ -97,7 +97,7 @@ def pieces_at(data: Knots, t: Fraction):
 @pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 @given(ends=st.tuples(*[fractions(0, "13/10", 500)] * 3))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_windows_contain_every_point_and_both_sides_of_a_jump(interpolation, ends):
     data = knots(interpolation)
     plan = piecewise_plan(POLYNOMIAL, data)

@@ -30,7 +30,8 @@ class Decay:
     beta: float
     defect: float
     first: float  # H0
-    rest: float  # S + e_eta
+    rest: float  # S
+    error: float = 0.0  # e, of the estimate, which is there from the start
     delay: float = 0.0
 
     def __call__(self, t: Array) -> Array:
@@ -38,7 +39,7 @@ class Decay:
         before = self._idle(np.minimum(t, self.delay))
         tau = np.maximum(t - self.delay, 0.0)
         start = float(self._idle(np.array(self.delay)))
-        settled = (self.beta * self.rest + self.defect) / self.rate
+        settled = (self.beta * (self.rest + self.error) + self.defect) / self.rate
         gap = self.bandwidth - self.rate
         e_rate, e_band = np.exp(-self.rate * tau), np.exp(-self.bandwidth * tau)
         K = tau * e_rate if abs(gap) < 1e-9 * self.rate else (e_rate - e_band) / gap
@@ -222,7 +223,8 @@ def _decay_of_distance(certified: Certified, recipe: Values) -> Decay:
     return Decay(
         bandwidth=recipe["bandwidth"],
         first=certified["h_initial"],
-        rest=recipe["uncertainty"] + recipe["prediction_error"],
+        rest=recipe["uncertainty"],
+        error=recipe["prediction_error"],
         **_common(certified),
     )
 
