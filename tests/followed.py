@@ -19,7 +19,7 @@ from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
 from tubecert.recheck.balls import exact, root
 from tubecert.recheck.code.about import About
-from tubecert.recheck.code.examination import moves_of
+from tubecert.recheck.code.examination import model_of, moves_of
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.continuous import Adapted
@@ -119,6 +119,20 @@ def bounds(c: Controller, formulas: Any, files: tuple[str, str]) -> dict[str, fl
             sample_time=c.sample_time,
             held=formulas.held,
             moves=moves_of(formulas, exact(1)) if c.moves else (),  # n_E of noise that is known by its length
+            model=model_of(formulas),
         )
         found = lost_by(read_code(*files), about)
-        return {name: float(getattr(found, name).upper()) for name in ("feedback", "input", "estimate")}
+        names = ("feedback", "input", "estimate", *(("prediction",) if c.predicts else ()))
+        return {name: float(getattr(found, name).upper()) for name in names}
+
+
+def predicting(delay: str, *, held: bool) -> tuple[Controller, Machine]:
+    """The orbit's controller with a prediction, about rounding, and the machine as recheck reads it."""
+    time = max(Fraction(delay), Fraction(1, 500))
+    given = GIVEN["held_orbit" if held else "orbit"]
+    own = replace(
+        given.recipe, delay=Fraction(delay), prediction=Fraction(1, 100), sample_time=time, feedback_time=time
+    )
+    section = SimpleNamespace(predict=True, clip=given.clip)
+    c = assembled(replace(given, recipe=replace(own, rounding=(ANY,)), feedback_gain=DU))
+    return c, replace(in_recheck("orbit"), recipe=own, section=section, held=held)

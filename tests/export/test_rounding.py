@@ -353,9 +353,9 @@ def test_the_float_build_of_a_plan_through_knots_loses_no_more_than_is_said():
     assert 1e-4 * bound < worst <= bound
 
 
-@pytest.mark.parametrize("name", ["turning", "predicting_path"])
-def test_a_prediction_is_not_covered(name):
-    with pytest.raises(UncoveredError, match="prediction"):
+@pytest.mark.parametrize(("name", "why"), [("turning", "table"), ("predicting_path", "knots is played")])
+def test_what_of_a_prediction_is_not_covered(name, why):
+    with pytest.raises(UncoveredError, match=why):
         rounding_of(controller(name), "double")
 
 

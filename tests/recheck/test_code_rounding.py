@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from controllers import CONTROLLERS
 from flint import ctx
-from followed import bounds, covered, in_recheck, texts
+from followed import bounds, covered, in_recheck, predicting, texts
 
 from tubecert.enclosure.interval import Interval
+from tubecert.export import prediction as ahead
 from tubecert.export import rounding as own
 from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
@@ -20,7 +21,7 @@ from tubecert.export.vectors import run, vectors
 from tubecert.recheck.balls import exact
 from tubecert.recheck.code.constants import of_tables, otherwise
 from tubecert.recheck.code.examination import agreement
-from tubecert.recheck.code.losses import lost_by
+from tubecert.recheck.code.prediction import STEPS
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
 
@@ -105,6 +106,22 @@ def undivided():
 def exact_mean():
     """The mean of a u* through knots, and u* as it is played, without an error."""
     return own._Analysis, "_played", lambda self, us, written: [replace(u, error=0 * u.error) for u in us]
+
+
+def halved():
+    """A step whose remainder is taken for half of what it is."""
+    whole = ahead._cut
+    return ahead, "_cut", lambda *args: [own * Interval.of(Fraction(1, 2)) for own in whole(*args)]
+
+
+def known_input():
+    """A prediction that takes its input for the one of theorem H-P."""
+    whole = ahead.off
+
+    def off(c, given, follow):
+        return whole(c, replace(given, wrong=Interval.of(0)), follow)
+
+    return own, "off", off
 
 
 BUGS = {
@@ -324,14 +341,58 @@ def test_what_is_not_understood_is_refused(change):
         bounds(c, in_recheck("orbit"), (header, changed))
 
 
-def test_a_prediction_and_a_plan_without_end_are_not_followed():
-    c = CONTROLLERS["turning"]()
-    with pytest.raises(UnreadError, match="prediction"):
-        lost_by(read_code(*texts(c, "double")), None)
-    orbit, formulas = covered("held_orbit"), in_recheck("held_orbit")
+def test_a_plan_without_end_and_code_of_another_loop_are_not_followed():
+    c, formulas = predicting("0.0005", held=True)
     formulas.case.curve = replace(formulas.case.curve, horizon=None)
     with pytest.raises(UnreadError, match="without end"):
-        bounds(orbit, formulas, texts(orbit, "double"))
+        bounds(c, formulas, texts(c, "double"))
+    with pytest.raises(UnreadError, match="do not agree"):
+        bounds(covered("orbit"), formulas, texts(covered("orbit"), "double"))
+
+
+PREDICTED = {
+    "the rule is exact": ("0.01", lambda: (ahead, "_cut", lambda c, x, *_: [0 * own for own in x])),
+    "half of it": ("0.01", halved),
+    "nothing is rounded": ("0.0005", lambda: (ahead, "length_of", lambda row: Interval.of(0))),
+    "its input is exact": ("0.0005", known_input),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("delay", ["0.0005", "0.01"])
+def test_both_bounds_of_a_prediction_are_near_to_each_other(delay, held):
+    c, formulas = predicting(delay, held=held)
+    for precision in ("double", "single"):
+        found, theirs = bounds(c, formulas, texts(c, precision)), rounding_of(c, precision)
+        # a certificate allows for twice the exporter's
+        assert all(0.05 < found[each] / float(getattr(theirs, each)) < 1.2 for each in (*NAMES, "prediction"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bug", sorted(PREDICTED))
+def test_a_mistake_in_the_exporters_prediction_is_noticed(bug, monkeypatch):
+    delay, made = PREDICTED[bug]
+    c, formulas = predicting(delay, held=True)
+    precision = "single" if "rounded" in bug else "double"
+    found = bounds(c, formulas, texts(c, precision))["prediction"]
+    monkeypatch.setattr(*made())
+    assert found > float(rounding_of(c, precision).prediction)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [None, ("(2.0 * r", "(2.000000000001 * r"), ("k < 4;", "k < 3;")])
+def test_another_rule_of_integration_is_noticed(change):
+    """With losses in the certificate the rule itself is what the text is compared with, to its last digits."""
+    c, formulas = predicting("0.01", held=False)
+    header, source = texts(c, "double")
+    if change is not None:
+        assert change[0] in source
+        source = source.replace(*change)
+    with ctx.workprec(200):
+        rows = [[exact(Fraction(value)) for value in row] for row in measured(c, 6, "double").tolist()]
+        _, share = agreement(read_code(header, source), replace(formulas, steps=STEPS), rows)
+    assert (share <= 1) == (change is None)
 
 
 @pytest.mark.parametrize("change", [None, ("(-0.01), ", "(-0.0100000001), "), ("{0.02, ", "{0.020000001, ")])

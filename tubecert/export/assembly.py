@@ -130,6 +130,7 @@ def assembled(machine: Machine) -> Controller:
         bend=blocks.bend(plan) if played and pieces is None and covered else None,
         predictor=None if recipe.prediction is None else blocks.predictor(model, recipe.delay / INTEGRATION),
         estimator=blocks.estimator(machine),
+        steep=blocks.steep(model) if covered and recipe.prediction is not None else None,
         swept=geodesics.swept(model, machine.geodesic) if bent and machine.geodesic is not None else None,
         moves=_moves(machine),
         every=int(recipe.feedback_time / recipe.sample_time),

@@ -14,7 +14,7 @@ from typing import Final
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.coordinates import Coordinates, Fields, inverse
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
-from tubecert.expression import derivatives
+from tubecert.expression import derivatives, topological
 from tubecert.expression.matrix import Matrix, multiply
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Picard
@@ -110,6 +110,23 @@ def predictor(model: ControlAffineModel, length: Fraction) -> Program:
     return writer.finished(
         "predictor", "a step of y' = f(y) + B(y) u; u is a, b, c at its begin, middle, end"
     )
+
+
+def steep(model: ControlAffineModel) -> Program | None:
+    """The derivatives J (n, n) of f + B u by states, and B (n, m); None where a table has no derivative in code."""
+    if any(node.op == "table" for node in topological([*model.f, *(e for row in model.B for e in row)])):
+        return None
+    writer, n = Writer(), range(len(model.states))
+    x, u = writer.input("x", len(n)), writer.input("u", len(model.inputs))
+    names = dict(zip(model.states, x, strict=True))
+    columns = []
+    for state in model.states:
+        own = writer.expressions(derivatives(list(model.f), state), names)
+        turned = [writer.expressions(derivatives(list(row), state), names) for row in model.B]
+        columns.append([writer.add(own[i], writer.dot(turned[i], u)) for i in n])
+    writer.output("J", [columns[j][i] for i in n for j in n])
+    writer.output("B", [place for row in writer.matrix(model.B, names) for place in row])
+    return writer.finished("steep", "the derivatives of f + B u, and B")
 
 
 def applied(m: int, recipe: HardwareRecipe, *, played: bool) -> Program:

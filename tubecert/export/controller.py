@@ -112,7 +112,7 @@ class Controller(Steering):
     certificate covers it. `bend` is u*'s sixth derivative, where its mean is that of three nodes and rounding is
     covered. `still`: u* is constant; `held`: u* is played from sample to sample. `moves`: how far every measured state
     may move from one sample to the next, where rounding is covered. `every`: the feedback is computed at every so many
-    samples.
+    samples. `steep`: the derivatives of f + B u by states, and B, where it predicts and rounding is covered.
     """
 
     delay: Fraction
@@ -130,6 +130,7 @@ class Controller(Steering):
     estimator: Program
     moves: tuple[Fraction, ...] = ()
     every: int = 1
+    steep: Program | None = None
 
     @property
     def programs(self) -> tuple[Program, ...]:

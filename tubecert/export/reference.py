@@ -168,7 +168,7 @@ class Reference(Around):
         if self.sample:
             self.q, estimate = execute(c.estimator, y, f, self.y, self.f, self.q, self.mean(), real=real)
         if self.sample % c.every == 0:
-            seen, after = self._predicted(y), c.delay if c.predicts else 0
+            seen, after = self.predicted(y), c.delay if c.predicts else 0
             self.feedback, self.square = self._law(seen, self.time(after))
         self.before, self.held = self.held, self.feedback - estimate
         self.y, self.f = y, f
@@ -198,7 +198,7 @@ class Reference(Around):
         (mean,) = execute(c.applied, *given, real=real)
         return mean
 
-    def _predicted(self, y: Array) -> Array:
+    def predicted(self, y: Array) -> Array:
         """Theorem H-P: yp' = f + B (u0 + kappa) over the delay, with the feedback that acts."""
         c, real = self.controller, self.real
         if c.predictor is None:

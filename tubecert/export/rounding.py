@@ -4,9 +4,8 @@ In: a `Controller` and the type it computes in. Out: the numbers of theorem H-R 
 Every operation is followed twice: what it gives in exact arithmetic lies in an interval, and what a computer gives
 differs from that by at most an error. Both are rounded outward. Nothing is assumed of how errors cancel.
 
-What is assumed of the computer: IEEE 754, rounded to nearest, every operation in its own type or fused with the next
-one; functions of math.h within 4 units in the last place (sqrt, by IEEE 754, within half a unit). Both are in the files
-that are exported.
+Assumed of the computer, and said in the files: IEEE 754, rounded to nearest, every operation in its own type or fused
+with the next; functions of math.h within 4 units in the last place (sqrt, by IEEE 754, within half a unit).
 """
 
 from __future__ import annotations
@@ -44,6 +43,7 @@ from tubecert.export.followed import (
     size_of,
     steepest,
 )
+from tubecert.export.prediction import Predicted, off
 from tubecert.export.program import GREATEST, LEAST, Program, Step
 from tubecert.spec import Arithmetic
 
@@ -71,8 +71,6 @@ class _Analysis:
     def __init__(self, controller: Controller, real: Float) -> None:
         if controller.swept is not None:
             raise UncoveredError("geodesics that are computed")
-        if controller.predicts:
-            raise UncoveredError("the integration of a prediction")
         if controller.tables:
             raise UncoveredError("the function of a table")
         if controller.pieces is not None and not controller.pieces.continuous:
@@ -85,15 +83,23 @@ class _Analysis:
         self.norm_M, self.norm_W = frobenius(controller.metric), frobenius(W)
 
     def rounding(self) -> Rounding:
-        """r_a, r_u, r_q; nothing is predicted."""
+        """r_a, r_u, r_q and r_p."""
         xs, us = self._plan()
         law = self._law(xs, us)
         return Rounding(
             feedback=printed(law.lost),
             input=printed(law.beside + self._written(law, us) + self._clipped()),
             estimate=printed(self._estimated(xs, law, us)),
-            prediction=Fraction(0),
+            prediction=self._predicted(xs, law, us),
         )
+
+    def _predicted(self, xs: Sequence[Followed], law: _Law, us: Sequence[Followed]) -> Fraction:
+        if not self.c.predicts:
+            return Fraction(0)
+        wrong, ends = law.beside + self._written(law, us), self.c.horizon or Fraction(0)
+        near, narrow = self._near(xs), min(self.widths, key=lambda width: float(width.lo))
+        given = Predicted(near=near, us=us, feedback=law.feedback, wrong=wrong, narrow=narrow, horizon=ends)
+        return printed(off(self.c, given, self._run))
 
     # -- what goes in
 

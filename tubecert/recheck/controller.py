@@ -59,11 +59,12 @@ def machine_of(text: str, file: str) -> Machine:
 
 @dataclass(frozen=True)
 class Machine(Steering):
-    """The machine of a section and its recipe."""
+    """The machine of a section and its recipe; a prediction is integrated by so many `steps`."""
 
     section: HardwareSection
     recipe: Digital
     held: bool
+    steps: int = _STEPS
 
     @property
     def whole(self) -> bool:
@@ -148,8 +149,8 @@ class Machine(Steering):
 
     def predicted(self, y: Column, t: Fraction, feedback: Column) -> Column:
         """yp at t + tau, theorem H-P."""
-        h = self.recipe.delay / _STEPS
-        for k in range(_STEPS):
+        h = self.recipe.delay / self.steps
+        for k in range(self.steps):
             y = self._step(y, t + k * h, h, feedback)
         return y
 

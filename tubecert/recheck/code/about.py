@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.recheck.balls import Ball
+from tubecert.recheck.code.prediction import Model
 from tubecert.recheck.curve import Curve
 
 
@@ -16,6 +17,7 @@ class About:
 
     `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
     `share` is th; `held`: u* is held from sample to sample. `moves`: how far what is measured moves in one, by state.
+    `model` is what a prediction integrates; None without one.
     """
 
     curve: Curve
@@ -30,12 +32,14 @@ class About:
     sample_time: Fraction
     held: bool
     moves: Sequence[Ball] = ()
+    model: Model | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lost:
-    """Upper bounds of r_a, r_u and r_q."""
+    """Upper bounds of r_a, r_u, r_q and r_p."""
 
     feedback: Ball
     input: Ball
     estimate: Ball
+    prediction: Ball

@@ -8,15 +8,16 @@ index or a digit is seen. That examines, and proves nothing; the bounds of `loss
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from flint import arb, arb_mat, ctx
 
-from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root
+from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root, spectral_norm
 from tubecert.recheck.code.about import About
 from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.losses import lost_by
+from tubecert.recheck.code.prediction import STEPS, Model
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, known
@@ -74,6 +75,8 @@ def examine(
     `answered` is what compiled code made of what was measured, if there is a compiler.
     """
     formulas = machine_of(text, file)
+    if formulas.recipe.losses is not None:  # which bound how far the rule of the code is from a solution
+        formulas = replace(formulas, steps=STEPS)
     with ctx.workprec(BITS):
         rows = [[exact(q) for q in row] for row in measured]
         difference, share = agreement(code, formulas, rows, answered)
@@ -96,7 +99,7 @@ def agreement(
     Raises `UnreadError` where what the numbers of the text are off has no bound.
     """
     expected = list(formulas.answers(measured))
-    slack = _PREDICTED if formulas.section.predict else _SLACK
+    slack = _PREDICTED if formulas.section.predict and formulas.steps != STEPS else _SLACK
     return apart(code.real, expected, _answers(code, formulas, measured), answered, slack)
 
 
@@ -160,7 +163,7 @@ def _losses(code: Code, formulas: Formulas) -> Iterator[Allowed]:
     if allowed is None:
         return
     found = lost_by(code, about(formulas))
-    for name in ("feedback", "input", "estimate"):
+    for name in ("feedback", "input", "estimate", "prediction")[: 4 if formulas.section.predict else 3]:
         most: Ball = getattr(found, name)
         if not most.is_finite():
             raise UnreadError(f"what rounding costs the {name} has no bound")
@@ -179,13 +182,16 @@ def about(formulas: Formulas) -> About:
     noise = case.machine
     if noise is None:
         raise UnreadError("there is no machine")
+    looked = noise.noise_metric * exact(recipe.noise)
+    if recipe.prediction is not None:  # n_P of theorem H-P; what it is at the feedback is larger
+        looked = larger(looked, root(spectral_norm(formulas.metric)) * exact(recipe.prediction))
     decay = None if recipe.bandwidth is None else exact(recipe.bandwidth * recipe.sample_time)
     return About(
         curve=case.curve,
         inputs=len(case.system.inputs),
         metric=formulas.metric,
         widths=[root(row[i]) for i, row in enumerate(formulas.dual)],
-        reach=exact(recipe.level) + noise.noise_metric * exact(recipe.noise),
+        reach=exact(recipe.level) + looked,
         gain=exact(case.bound("feedback_gain")),
         estimate=exact(recipe.clip_radius + max(recipe.clip_radius, recipe.bias) + recipe.ripple),
         radius=exact(recipe.clip_radius),
@@ -193,6 +199,23 @@ def about(formulas: Formulas) -> About:
         sample_time=recipe.sample_time,
         held=formulas.held,
         moves=moves_of(formulas, noise.noise_size),
+        model=model_of(formulas),
+    )
+
+
+def model_of(formulas: Formulas) -> Model | None:
+    """What the code integrates, where it predicts."""
+    if not formulas.section.predict:
+        return None
+    system, curve = formulas.case.system, formulas.case.curve
+    if not formulas.whole and curve.parts[0].values:
+        raise UnreadError("a prediction in which a feedforward through knots is played has no bound here")
+    return Model(
+        states=tuple(system.states),
+        f=tuple(row[0] for row in system.f),
+        B=tuple(map(tuple, system.B)),
+        delay=formulas.recipe.delay,
+        u=() if formulas.whole else tuple(curve.u),
     )
 
 

@@ -1,14 +1,13 @@
 """What exported code can lose to its rounding: bounds of recheck's own for the numbers of theorem H-R.
 
-Implements: theory 8.11 (H.36), for a constant metric and no prediction. In: the text of the code, read, and
+Implements: theory 8.11 (H.36), for a constant metric. In: the text of the code, read, and
 what the certificate says of the machine. Every function of the text is run on balls that contain all that goes in, at
 stations along the plan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
@@ -25,7 +24,9 @@ from tubecert.recheck.code.pieces import (
     steepest,
     tables_of,
 )
+from tubecert.recheck.code.prediction import Model, cut
 from tubecert.recheck.code.reader import Code
+from tubecert.recheck.code.rows import Numbers, around, empty, greatest, named, near, row, slackened
 from tubecert.recheck.code.run import Counter, Machine, Own, State, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, SINCE, Rounded, Seen, known
 from tubecert.recheck.code.shape import ball_of, box_of, law_of
@@ -39,8 +40,6 @@ _GAUSS = 2016000  # of the error of Gauss's rule with three nodes
 _NODES = 3
 _MOST_SAMPLES = 2**32 - 1
 
-Numbers = list[Seen]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Fed:
@@ -53,8 +52,8 @@ class _Fed:
 
 def lost_by(code: Code, about: About) -> Lost:
     """The bounds; raises `UnreadError` for code of which none are derived."""
-    if "predicted" in code.functions:
-        raise UnreadError("the integration of a prediction has no bound here")
+    if ("predicted" in code.functions) != (about.model is not None):
+        raise UnreadError("the code and the certificate do not agree whether the state is predicted")
     return _Analysis(code, about).lost()
 
 
@@ -78,16 +77,38 @@ class _Analysis:
     def lost(self) -> Lost:
         """The worst of all stations."""
         fed = [self._fed(station) for station in self.stations]
-        above, size = (_greatest([own.above for own in fed]), _greatest([own.size for own in fed]))
+        above, size = (greatest([own.above for own in fed]), greatest([own.size for own in fed]))
         input, estimate = arb(0), arb(0)
         for station in self.stations:
             own, q = self._stepped(station, size)
             input, estimate = larger(input, own), larger(estimate, q)
         return Lost(
-            feedback=_greatest([own.lost for own in fed]),
+            feedback=greatest([own.lost for own in fed]),
             input=above + input,
             estimate=estimate / self.of.share,
+            prediction=arb(0) if self.of.model is None else self._predicted(self.of.model, above, size),
         )
+
+    def _predicted(self, model: Model, above: Ball, size: Ball) -> Ball:
+        """r_p: what the text rounds over the delay, its input being off as well, and how far exact steps are off."""
+        seen = [
+            own.value for own in any_of([[near([x], side) for x, side in zip(xs, self.box, strict=True)]
+            for xs, _ in self.plans])
+        ]  # fmt: skip
+        us, until = any_of([u for _, u in self.plans]), self.stations[-1].end
+        wrong = [above] * self.m
+        if self._whole:
+            wrong = [above + u.error + self.kind.unit * (u.most + size) + self.kind.least for u in us]
+        acting = [around(size + off) for off in wrong]  # of the loop, and of the code
+        if self._whole:
+            acting = [u.value + own for u, own in zip(us, acting, strict=True)]
+        t = Seen(between(0, until), greatest([self._sampled(own).error for own in self.stations]))
+        given: Vector = [Seen(value, error) for value, error in zip(acting, wrong, strict=True)]
+        found = empty(self.n)
+        self._machine().call("predicted", [known(own) for own in seen], t, given, found)
+        narrow = min(self.box, key=lambda side: float(side.lower()))
+        exactly = cut(model, seen, acting, narrow, until)
+        return length([own.error for own in numbers(found)]) + exactly
 
     def _machine(self, **instead: Own) -> Machine:
         return Machine(self.code, self.rounded, instead, self.tables)
@@ -97,7 +118,15 @@ class _Analysis:
     @cached_property
     def plans(self) -> list[tuple[Numbers, Numbers]]:
         """x* and u* at the samples of every station."""
-        return [self._plan(station, self._sampled(station)) for station in self.stations]
+        return [self._plan(station, self._looked(station)) for station in self.stations]
+
+    def _looked(self, station: Station) -> Seen:
+        """The time at which the feedback looks: a delay after a sample where the state is predicted."""
+        t = self._sampled(station)
+        if self.of.model is None:
+            return t
+        later = self.rounded.both("+", t, self._machine().number(f"{self.code.name.upper()}_DELAY"))
+        return Seen(between(station.begin, station.end), later.error)
 
     def _time(self, station: Station) -> Counter:
         """The number of a sample in a station, and of those before."""
@@ -117,7 +146,7 @@ class _Analysis:
 
     def _plan(self, station: Station, t: Seen) -> tuple[Numbers, Numbers]:
         """x* and u* at times of a station."""
-        machine, x, u = self._machine(piece=lambda _: station.piece), _empty(self.n), _empty(self.m)
+        machine, x, u = self._machine(piece=lambda _: station.piece), empty(self.n), empty(self.m)
         machine.call("on_plan", t, x, u)
         if "START" not in self.code.tables:
             return numbers(x), numbers(u)
@@ -126,12 +155,12 @@ class _Analysis:
         if not off < station.beside:
             raise UnreadError("times have no digit that is right")
         slack = [2 * off * steep + jump for steep, jump in self._apart]
-        return _slackened(x, slack[: self.n]), _slackened(u, slack[self.n :])
+        return slackened(x, slack[: self.n]), slackened(u, slack[self.n :])
 
     @property
     def _begun(self) -> Ball:
         """How far a knot is off."""
-        return _greatest([own.error for own in numbers(self.tables["START"])])
+        return greatest([own.error for own in numbers(self.tables["START"])])
 
     @cached_property
     def _apart(self) -> list[tuple[Ball, Ball]]:
@@ -140,13 +169,17 @@ class _Analysis:
 
     def _known(self, station: Station) -> dict[str, Own]:
         """What is known of a station: its piece, and where times near knots matter what is on the plan."""
+        looked: dict[str, Own] = {"piece": lambda _: station.piece}
+        return looked | ({"on_plan": self._on_plan(station)} if self.tables else {})
+
+    def _on_plan(self, station: Station) -> Own:
+        """What is on the plan where the feedback looks."""
 
         def on_plan(*given: Value) -> None:
             for found, own in zip(given[1:], self.plans[station.own], strict=True):
-                _list(found)[:] = own
+                row(found)[:] = own
 
-        looked: dict[str, Own] = {"piece": lambda _: station.piece}
-        return looked | ({"on_plan": on_plan} if self.tables else {})
+        return on_plan
 
     # -- the feedback
 
@@ -156,13 +189,13 @@ class _Analysis:
 
         def law(*given: Value) -> None:
             y, f, xs, *rest = given
-            machine.own("law", _named("y", y), f, _named("xs", xs), *rest)
+            machine.own("law", named("y", y), f, named("xs", xs), *rest)
             seen[:] = numbers([machine.within("law", each) for each in (*self.law.c, self.law.excess)])
-            _list(rest[-2])[:] = [known(arb(0))] * self.m
+            row(rest[-2])[:] = [known(arb(0))] * self.m
 
         machine = self._machine(**self._known(station), law=law)
-        y: Vector = [_near([own], side) for own, side in zip(x, self.box, strict=True)]
-        machine.call("feedback", y, self._sampled(station), _empty(self.m))
+        y: Vector = [near([own], side) for own, side in zip(x, self.box, strict=True)]
+        machine.call("feedback", y, self._looked(station), empty(self.m))
         *c, excess = seen
         off = [own.error for own in x]
         form = [
@@ -179,12 +212,12 @@ class _Analysis:
 
         def off(*, underflows: bool) -> Ball:
             own = Rounded(self.kind, underflows=underflows, apart=("y", "xs"))
-            y: Vector = [Seen(_around(side), arb(0), origin=("y", i)) for i, side in enumerate(self.box)]
+            y: Vector = [Seen(around(side), arb(0), origin=("y", i)) for i, side in enumerate(self.box)]
             xs: Vector = [Seen(arb(0), arb(0), origin=("xs", i)) for i in range(self.n)]
             rest = [[known(arb(0)) for _ in range(k)] for k in (self.n, self.n, self.m)]
-            told = _empty(3)
+            told = empty(3)
             f, vs, us = (list[Value](each) for each in rest)
-            Machine(self.code, own).call("law", y, f, xs, vs, us, _empty(self.m), told)
+            Machine(self.code, own).call("law", y, f, xs, vs, us, empty(self.m), told)
             square = numbers(told[:1])[0]
             if square.degree != 2:
                 raise UnreadError("the square of the distance is no form of degree 2")
@@ -229,28 +262,30 @@ class _Analysis:
 
         def law(*given: Value) -> None:
             kappa, told = given[-2:]
-            _list(kappa)[:] = [known(_around(feedback))] * self.m
-            _list(told)[:] = [known(between(0, self.kind.most))] * 3
+            row(kappa)[:] = [known(around(feedback))] * self.m
+            row(told)[:] = [known(between(0, self.kind.most))] * 3
 
         def estimator(*given: Value) -> None:
             y, f, last, *rest = given
-            machine.own("estimator", _named(SINCE[0], y), f, _named(SINCE[1], last), *rest)
+            machine.own("estimator", named(SINCE[0], y), f, named(SINCE[1], last), *rest)
             new, clipped = given[-2:]
-            q[:] = _list(new)
-            _list(clipped)[:] = [Seen(_around(self.of.radius), self._clipped())] * self.m
+            q[:] = row(new)
+            row(clipped)[:] = [Seen(around(self.of.radius), self._clipped())] * self.m
 
         def mean(*given: Value) -> None:
-            found = _list(given[-1])
+            found = row(given[-1])
             if self.tables:
                 found[:] = self._mean_through(station, numbers([*given[:2]]))
             else:
                 machine.own("mean_of_plan", *given)
-                found[:] = _slackened(found, self._bent(station))
-            found[:] = _slackened(found, played)
+                found[:] = slackened(found, self._bent(station))
+            found[:] = slackened(found, played)
 
         machine = self._machine(**self._known(station), law=law, estimator=estimator, mean_of_plan=mean)
-        u = _empty(self.m)
-        y: Vector = [_near([x], side) for x, side in zip(self.plans[station.own][0], self.box, strict=True)]
+        u = empty(self.m)
+        y: Vector = [near([x], side) for x, side in zip(self.plans[station.own][0], self.box, strict=True)]
+        if self.of.model is not None:
+            machine.instead |= self._ahead(machine, station, y)
         machine.call(f"{self.code.name}_step", self._state(station, feedback), y, u)
         lost = [own.error for own in numbers(u)]
         if self._whole:
@@ -260,16 +295,31 @@ class _Analysis:
         more = self.kind.unit * (self._largest_input + feedback + self.of.radius)
         return whole + more, length([own.error for own in numbers(q)])
 
+    def _ahead(self, machine: Machine, station: Station, y: Vector) -> dict[str, Own]:
+        """A state that is predicted lies where measured ones do; the feedback looks at the plan a delay later."""
+
+        def predicted(*given: Value) -> None:
+            row(given[-1])[:] = y
+
+        def feedback(*given: Value) -> Value:
+            before = dict(machine.instead)
+            machine.instead["on_plan"] = self._on_plan(station)
+            found = machine.own("feedback", *given)
+            machine.instead = before
+            return found
+
+        return {"predicted": predicted, "feedback": feedback}
+
     def _state(self, station: Station, feedback: Ball) -> State:
         """What is kept from a sample before."""
         before = zip(*(self.plans[k][0] for k in station.since), strict=True)
-        y: Vector = [_near(own, side) for own, side in zip(before, self.box, strict=True)]
-        f = _empty(self.n)
+        y: Vector = [near(own, side) for own, side in zip(before, self.box, strict=True)]
+        f = empty(self.n)
         machine = self._machine()
         machine.call("drift", y, f)
         acted = feedback + self._largest_input + self.of.radius * (1 + 8 * self.kind.unit)
-        rows: State = {"y": y, "f": f, "q": [known(_around(self.of.estimate))] * self.m}
-        rows |= {name: [known(_around(acted))] * self.m for name in ("feedback", "held", "before")}
+        rows: State = {"y": y, "f": f, "q": [known(around(self.of.estimate))] * self.m}
+        rows |= {name: [known(around(acted))] * self.m for name in ("feedback", "held", "before")}
         rows["since"] = 0  # the feedback is computed: where it is held, less is rounded
         state = machine.state()
         for name, old in state.items():
@@ -284,16 +334,16 @@ class _Analysis:
     @cached_property
     def _largest_input(self) -> Ball:
         """|u*|."""
-        return _greatest([length([own.most for own in u]) for _, u in self.plans])
+        return greatest([length([own.most for own in u]) for _, u in self.plans])
 
     def _played(self, station: Station) -> list[Ball]:
         """How far each input of `feedforward` is off, over the sample that ends in a station."""
         t = between(larger(station.begin - exact(self.of.sample_time), arb(0)), station.end)
 
         def on_plan(*given: Value) -> None:  # a sample may meet several pieces
-            _list(given[2])[:] = any_of([u for _, u in self.plans])
+            row(given[2])[:] = any_of([u for _, u in self.plans])
 
-        found, machine = _empty(self.m), self._machine(**({"on_plan": on_plan} if self.tables else {}))
+        found, machine = empty(self.m), self._machine(**({"on_plan": on_plan} if self.tables else {}))
         machine.call(f"{self.code.name}_feedforward", self.rounded.rounded(t, arb(0)), found)
         return [own.error for own in numbers(found)]
 
@@ -344,41 +394,3 @@ class _Analysis:
         theta = (1 + u) * root((1 + u) ** m) - 1
         unseen = 2 * root((m + 2) * eta)  # of a length of which the square underflows
         return R * ((1 + theta) ** 2 * (1 + u) ** 4 - 1) + unseen + 4 * m * eta
-
-
-def _greatest(balls: Sequence[Ball]) -> Ball:
-    found = arb(0)
-    for own in balls:
-        found = larger(found, own)
-    return found
-
-
-def _around(size: Ball) -> Ball:
-    return between(-size, size)
-
-
-def _named(name: str, row: Value) -> Vector:
-    """A vector whose entries know where they come from."""
-    return [replace(each, origin=(name, i)) for i, each in enumerate(numbers(row))]
-
-
-def _slackened(found: Vector, slack: Sequence[Ball]) -> Numbers:
-    return [replace(x, error=x.error + own) for x, own in zip(numbers(found), slack, strict=True)]
-
-
-def _near(found: Sequence[Seen], side: Ball) -> Seen:
-    """What is measured near any of these, exactly."""
-    whole = found[0].value
-    for own in found[1:]:
-        whole = whole.union(own.value)
-    return known(whole + _around(side))
-
-
-def _list(value: Value) -> Vector:
-    if not isinstance(value, list):
-        raise UnreadError("a number stands where there has to be a row")
-    return value
-
-
-def _empty(k: int) -> Vector:
-    return [None] * k
