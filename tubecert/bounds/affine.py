@@ -62,6 +62,7 @@ class NormOverRest:
     def __init__(
         self, v: Matrix, names: Sequence[str], centre: Sequence[Expression], S: Coordinates, rho: float
     ) -> None:
+        """Theory 1a.6: w, H = K E and r from S'S in exact arithmetic."""
         parts = split(v, names)
         own, rest = parts.own, parts.rest
         back = inverse(tuple(tuple(S.gram[i][j] for j in rest) for i in rest))
@@ -85,13 +86,14 @@ class NormOverRest:
         self._E = np.array([[float(value) for value in row] for row in E])
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
-        """The bound at the vertices of the affine part, plus the rest."""
+        """The bound at the vertices of the affine part, plus the rest, theory 1a.6."""
         del target
         e = self._function.expand(lo, hi)
         mid, rad, rest = e.mid[0], e.rad[0], e.rest[0]
         least, r = self._radius(lo, hi)
         value = self._bound(mid, rad, r[:, None]) + norm_bound(rest.sum(axis=0))
         caused = norm_bound(rest.max(axis=2)) + self._lost(hi - lo, r - least)
+        # a sum over at most 80 variables, and another one, of bounds: below 90 u <= 1e-14 (Higham 2002, eq. 3.5)
         return estimate_of(value * (1 + 1e-14), caused, e, lo, hi)
 
     def _lost(self, width: Array, spread: Array) -> Array:
@@ -106,11 +108,12 @@ class NormOverRest:
         return np.asarray((share * (spread * np.linalg.norm(self._H[0], 2))[:, None]).T)
 
     def _bound(self, mid: Array, rad: Array, r: Array) -> Array:
-        """|[w/a, r H/b]| with a proposed a, (N, V)."""
+        """|[w/a, r H/b]| with a proposed a, (N, V), theory 1a.6."""
         H, H_rad = self._H
         size, length = np.linalg.norm(mid[..., 0], axis=-1), float(np.linalg.norm(H, 2))
         a = _share(mid[..., 0], H, r, size, length)[..., None, None]
-        b = np.sqrt(1.0 - a * a - 1e-15) * (1 - 1e-15)  # a^2 + b^2 <= 1: 1 - a^2 is 1e-6 at least
+        # a^2 + b^2 <= 1: below the root 3 roundings of at most 1, 3 u < 1e-15, then 2 u; 1 - a^2 is 1e-6 at least
+        b = np.sqrt(1.0 - a * a - 1e-15) * (1 - 1e-15)
         wide = r[..., None, None] / b
         whole = np.concatenate([mid / a, wide * H], axis=-1)
         # a quotient, a quotient and a product are rounded: 3 u of themselves
@@ -118,7 +121,7 @@ class NormOverRest:
         return spectral_norm_midrad(whole, error).hi
 
     def lower(self, lo: Array, hi: Array) -> Array:
-        """|w + H s| for the s that looks largest."""
+        """|w + H s| for the s that looks largest, theory 1a.6."""
         w = self._function.at(lo, hi)[0]
         s = self.largest(lo, hi)
         H = Interval(self._H[0] - self._H[1], self._H[0] + self._H[1])
@@ -147,7 +150,7 @@ class NormOverRest:
         return dict(zip(self._rest, map(float, x), strict=True))
 
     def _radius(self, lo: Array, hi: Array) -> tuple[Array, Array]:
-        """Bounds of r from below and from above, (N,)."""
+        """Bounds of r from below and from above, (N,): r of theory 1a.6."""
         y = self._function.at(lo, hi)[1][..., 0]
         square = Interval.exact(np.zeros(len(lo)))
         for row in range(self._R.shape[0]):
@@ -181,7 +184,10 @@ def _share(w: Array, H: Array, r: Array, size: Array, length: float) -> Array:
 
 
 def _root_above(spread: Rows) -> Rows | None:
-    """E of floats with E E' >= spread, decided in exact arithmetic; None if what is proposed is no such thing."""
+    """E of floats with E E' >= spread, decided in exact arithmetic; None if what is proposed is no such thing.
+
+    Theory 1a.6.
+    """
     block = np.array([[float(value) for value in row] for row in spread])
     scale = np.sqrt(np.diag(block))
     try:

@@ -34,7 +34,7 @@ Vector = tuple[Fraction, ...]
 
 
 def directions() -> tuple[Vector, ...]:
-    """Vectors of length one all around, exact: ((1 - q^2)/(1 + q^2), 2q/(1 + q^2))."""
+    """Vectors of length one all around, exact: ((1 - q^2)/(1 + q^2), 2q/(1 + q^2)), theory 4c."""
     found = []
     for k in range(_QUARTER):
         q = Fraction(k, _QUARTER)
@@ -53,7 +53,7 @@ class Shape:
     high: float
 
     def square(self, c: Vector) -> Interval:
-        """An upper bound of sup c'Wc, as its upper end."""
+        """An upper bound of sup c'Wc, as its upper end: s(c)^2/dbar^2 of theory 4c."""
         x, y = map(Interval.of, c)
         turned = self.high if c[0] * c[1] > 0 else self.low
         total = (
@@ -94,7 +94,7 @@ class Section:
     upper: float
 
     def extent(self, c: Vector) -> float:
-        """s(c) = dbar sup sqrt(c'Wc), rounded up."""
+        """s(c) = dbar sup sqrt(c'Wc), rounded up, theory 4c."""
         return float((self.reach * sqrt(self.shape.square(c))).hi)
 
 
@@ -123,7 +123,7 @@ class _Gaps:
         self.size = max(reach)
 
     def over(self, lo: Array, hi: Array) -> Interval:
-        """The least gap over windows (N,): from below for all times in them."""
+        """The least gap over windows (N,): from below for all times in them, (4.12)."""
         x, _ = self._plan.enclose(lo, hi)
         p = x[:, self._columns]
         along = self._c[0] * p[:, :1] + self._c[1] * p[:, 1:]  # (N, directions)
@@ -156,7 +156,7 @@ class _Gaps:
 
 
 def _tops(obstacle: Obstacle, turned: tuple[Vector, ...]) -> list[list[float]]:
-    """The largest c'o over every convex part, rounded up: over a disc, or over each edge of a polygon."""
+    """The largest c'o over every convex part, rounded up: over a disc, or over each edge of a polygon, (4.12)."""
 
     def along(c: Vector, p: Vector) -> Fraction:
         return c[0] * p[0] + c[1] * p[1]
@@ -172,7 +172,7 @@ def _tops(obstacle: Obstacle, turned: tuple[Vector, ...]) -> list[list[float]]:
 
 
 def _least(gaps: _Gaps, plan: Plan, effort: Effort) -> Clearance:
-    """The infimum over time, by halving the windows that may hold it."""
+    """The infimum over time, by halving the windows that may hold it, (4.12)."""
     span = plan.time.get(TIME, (Fraction(0), Fraction(0)))
     first, last = fraction_bounds(Fraction(span[0]))[0], fraction_bounds(Fraction(span[1]))[1]
     edges = np.linspace(first, last, _FIRST + 1) if last > first else np.array([first, first])
@@ -199,7 +199,10 @@ def _least(gaps: _Gaps, plan: Plan, effort: Effort) -> Clearance:
 
 
 def _contains(corners: tuple[Vector, ...], point: tuple[float, float]) -> bool:
-    """Whether a polygon contains a point (exact, for a point that is on no edge)."""
+    """Whether a polygon contains a point (exact, for a point that is on no edge).
+
+    By how often a ray from it crosses the boundary: Jordan's lemma for polygons.
+    """
     x, y = map(Fraction, point)
     inside = False
     for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
@@ -212,6 +215,7 @@ def _met(gaps: _Gaps, obstacle: Obstacle, section: Section, t: float) -> tuple[f
     """A point of the obstacle, exact as floats, that is proven to lie in the tube at a time; None if none was found.
 
     |y - p| in the plane and no step in other states: the segment has the length sqrt(A)|y - p| at most.
+    Theory 4c.
     """
     p, place = gaps.around(t), gaps.place(t)
     for y in _nearest(obstacle, place):

@@ -53,7 +53,7 @@ def least_radius(
     width: Fraction,
     declared: tuple[Constant, Constant] | None,
 ) -> Radius:
-    """The least rho with rho >= sqrt(A/a)|x0* - x0| + width, where a and A are those of O(rho) itself.
+    """The least rho with rho >= sqrt(A/a)|x0* - x0| + width, where a and A are those of O(rho) itself, theory 2.11.
 
     Iterated upwards, inflated by 1e-6, and proven: with a and A over O(rho), the right-hand side is at most rho.
     With declared a and A (proven on the safe set) there is nothing to iterate.

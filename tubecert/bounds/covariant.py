@@ -42,33 +42,36 @@ class CovariantSuprema(HardwareSuprema):
     """The suprema over the tube that are free of coordinates: all in x, whatever the coordinates of the tube."""
 
     def drift_slope(self) -> Constant:
-        """D_nX = sup |Theta (X_x + Gamma(., X)) Theta^-1| of X = f + B u*."""
+        """D_nX = sup |Theta (X_x + Gamma(., X)) Theta^-1| of X = f + B u*, theory 8.6."""
         objective = Geometry(self.model).slope_of_field(self._drift)
         return self._tensor("drift_slope", objective, float(self.model.rate))
 
     def form_slope(self, least: Constant) -> Constant:
-        """D_nF = sup over |v| = 1 of |D_v F|."""
+        """D_nF = sup over |v| = 1 of |D_v F|, theory 8.6."""
         objective = Geometry(self.model).slope_of_form()
         return self._tensor("form_slope", objective, float(self.model.rate) / self._distance(least))
 
     def input_slope(self, least: Constant, beta: Constant) -> Constant:
-        """D_nb = sup on the plan over |v| = |z| = 1 of |(<D_v b_j, z>)_j|; 0 where the plan does not move."""
+        """D_nb = sup on the plan over |v| = |z| = 1 of |(<D_v b_j, z>)_j|; 0 where the plan does not move.
+
+        Theory 8.6.
+        """
         if not self._plan_moves:
             return Constant.exactly(0.0)
         objective = Geometry(self.model).slope_of_inputs(self._on_the_plan, self.plan.fixed)
         return self._tensor_on_plan("input_slope", objective, beta.above / self._distance(least))
 
     def input_gain(self) -> Constant:
-        """beta_O = sup smax(Theta B): the root of the largest eigenvalue of (B B', W)."""
+        """beta_O = sup smax(Theta B): the root of the largest eigenvalue of (B B', W), theory 8.6."""
         return self._root(self._over_tube("input_gain", Pencil(self.model.BBt, self.model.W)))
 
     def drift_metric(self, least: Constant) -> Constant:
-        """phi_M = sup |Theta (f + B u*)|."""
+        """phi_M = sup |Theta (f + B u*)|, theory 8.6."""
         objective = Geometry(self.model).size_of_field(self._drift)
         return self._tensor("drift_metric", objective, float(self.model.rate) * self._distance(least))
 
     def curvature(self, least: Constant) -> Constant:
-        """K_R = sup |sectional curvature|: what matters is K_R dbar^2/8 against 1."""
+        """K_R = sup |sectional curvature|: what matters is K_R dbar^2/8 against 1, theory 8.6."""
         bound = self._tensor("curvature", Geometry(self.model).curvature(), 1 / self._distance(least) ** 2)
         # of more than three states not every bivector is a plane
         return bound if len(self.model.states) <= 3 else replace(bound, below=0.0)

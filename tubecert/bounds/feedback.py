@@ -36,7 +36,7 @@ _WIDE = 4.0  # hi/lo of a range over which the tangent is worse than the values 
 
 
 def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
-    """du as a supremum over x and mu in (0, largest]; for constant B, C2 must hold at the model's rate."""
+    """du as a supremum over x and mu in (0, largest]; for constant B, C2 must hold at the model's rate, theory 2.1."""
     loss = partial(_loss, largest=largest)
     exact = WeightedPencil(
         [model.F],
@@ -60,7 +60,7 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
 
 
 def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:
-    """Weights of F, B B' and W, (N, 2) each: the ends of the tangent, or (1, 1/hi, lo) for a wide range."""
+    """Weights of F, B B' and W, (N, 2) each: the ends of the tangent, or (1, 1/hi, lo) for a wide range, theory 2.1."""
     tangent = _narrow(lo, hi)
     ends = np.concatenate([lo, hi], axis=1)
     middle = np.where(tangent, 0.5 * (lo + hi), 1.0)
@@ -70,7 +70,7 @@ def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:
 
 
 def down_to_zero(lo: Array, hi: Array, *, inputs: int, states: int) -> tuple[Array, Array, Array]:
-    """Weights of F, B B' = diag(I, 0) and W, by entries, for all mu in (0, hi].
+    """Weights of F, B B' = diag(I, 0) and W, by entries, for all mu in (0, hi], theory 2.1a.
 
     By the congruence diag(sqrt(mu/hi), sqrt(hi/mu)) and F_22 <= 0 (C2), F <= tau (B B'/mu + mu W) if
         [mu/hi F_11, F_12; F_21, F_22] <= tau [I/hi, mu W_12; mu W_21, hi W_22],
@@ -121,7 +121,7 @@ class ClosedFormGain:
         return self._function.made_of, self._inputs.made_of
 
     def bound(self, lo: Array, hi: Array) -> Array:
-        """An upper bound over each box, (N,); inf where the box is too wide."""
+        """An upper bound over each box, (N,); inf where the box is too wide, theory 2.2."""
         F, W = (midrad(value) for value in self._function.at(lo, hi))
         t = whitening(W[0])
         T: Ball = (t, np.zeros_like(t))

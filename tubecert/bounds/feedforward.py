@@ -14,7 +14,7 @@ from tubecert.trajectory.hermite import slopes_of_inputs
 
 
 def rate_of(knots: Knots) -> Constant:
-    """The largest slope of u* through knots; where it is held and not the same throughout, it jumps."""
+    """The largest slope of u* through knots; where it is held and not the same throughout, it jumps, Lus of (H.6a)."""
     steps = list(pairwise(knots.u))
     if all(a == b for a, b in steps):
         return Constant.exactly(0.0)
@@ -32,7 +32,7 @@ def rate_of(knots: Knots) -> Constant:
 
 
 def _steepest(knots: Knots) -> Constant:
-    """The largest slope of a u* that is quadratic on each piece: at an end of one, for it is linear there."""
+    """The largest slope of a u* that is quadratic on each piece: at an end of one, for it is linear there, (H.6a)."""
     lengths = [end - begin for begin, end in zip(knots.t[::2], knots.t[2::2], strict=False)]
     squares = [
         sum(((c + 2 * bend * tau) ** 2 for c, bend in zip(*of_piece, strict=True)), Fraction(0))

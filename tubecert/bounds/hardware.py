@@ -106,13 +106,13 @@ class HardwareSuprema(Suprema):
     # -- feedback ----------------------------------------------------------------------------------------------
 
     def feedback_slope(self) -> Constant:
-        """D_F = sup |F~|: the largest |eigenvalue| of the pencil (F, W)."""
+        """D_F = sup |F~|: the largest |eigenvalue| of the pencil (F, W), theory 8.2."""
         return self._constant(
             self._over_tube("feedback_slope", SumOfPencils([self.model.F], self.model.W), self._fine)
         )
 
     def feedback_curvature(self) -> Constant:
-        """D_Fx >= sup over |v| = 1 of |eigenvalue| of (T_v, W), T_v = F_v - W_v M F - F M W_v.
+        """D_Fx >= sup over |v| = 1 of |eigenvalue| of (T_v, W), T_v = F_v - W_v M F - F M W_v, theory 8.2.
 
         By the norm of v -> T_v as a matrix from vectors to pairs of them and v.
         """
@@ -136,7 +136,7 @@ class HardwareSuprema(Suprema):
         return self._constant(self._over_tube("feedback_drift", SumOfPencils([slope], self.model.W)))
 
     def plan_tilt(self, beta: Constant) -> Constant:
-        """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|; `beta` is that of the tube."""
+        """D_cx >= sup on the plan over |v| = 1 of |(B_v' - B'M W_v) L^-1|; `beta` is that of the tube, theory 8.2."""
         if self.flat or not self._plan_moves:
             return Constant.exactly(0.0)
         objective = Geometry(self.model).tilt_by_coordinates(self.fields, self._on_the_plan, self.plan.fixed)
@@ -168,7 +168,10 @@ class HardwareSuprema(Suprema):
     # -- plan --------------------------------------------------------------------------------------------------
 
     def plan_speed(self, defect: Constant) -> Constant:
-        """Ystar = sup |x*'|; of plans that are not known, sup |f + B u*| on them and what their defect adds."""
+        """Ystar = sup |x*'|; of plans that are not known, sup |f + B u*| on them and what their defect adds.
+
+        Theory 8.2.
+        """
         if self.plan.allowance is None:
             slope = self.fields.vector(self.plan.slope)
             return self._on_plan("plan_speed", SumOfNorms([slope], self.plan.fixed))
@@ -178,7 +181,7 @@ class HardwareSuprema(Suprema):
         return Constant(below=0.0, above=float(total.hi))
 
     def input_rate(self) -> Constant:
-        """Lus: the Lipschitz constant of u*, infinite where u* may jump."""
+        """Lus: the Lipschitz constant of u*, infinite where u* may jump, (H.6a)."""
         if self.plan.knots is not None:
             return rate_of(self.plan.knots)
         if self.plan.allowance is not None:
@@ -190,7 +193,7 @@ class HardwareSuprema(Suprema):
     # -- drift -------------------------------------------------------------------------------------------------
 
     def drift_difference(self) -> Constant:
-        """phi_rel = sup |(f + B u*)(x* + z) - (f + B u*)(x*)|, |z| <= rho.
+        """phi_rel = sup |(f + B u*)(x* + z) - (f + B u*)(x*)|, |z| <= rho, theory 8.2.
 
         At most rho times the Lipschitz constant of f + B u*; where x* is written in t, the difference itself is
         bounded, too.
@@ -208,13 +211,13 @@ class HardwareSuprema(Suprema):
         return self._constant(self._over_tube(name, objective, self._few(name)))
 
     def _by_mean_value(self, drift: Matrix) -> Constant:
-        """A bound of |drift(x* + z) - drift(x*)|: rho sup |drift_x|."""
+        """A bound of |drift(x* + z) - drift(x*)|: rho sup |drift_x|, theory 8.2."""
         by_state = self.fields.of_vector(self.fields.by_state(_jacobian(drift, self.model.states)))
         slope = self.norms("drift_difference", [by_state])
         return Constant(below=0.0, above=float((Interval(slope.below, slope.above) * self._reach).hi))
 
     def drift_difference_metric(self, largest: Constant, slope: Constant | None) -> Constant | None:
-        """phi_relM = sup |Theta (f(x* + z) - f(x*))|, for constant M and B; `slope` is D_A."""
+        """phi_relM = sup |Theta (f(x* + z) - f(x*))|, for constant M and B; `slope` is D_A, theory 8.2."""
         if self._white is None or slope is None:
             return None
         # |Theta z| <= sqrt(A) rho
@@ -226,14 +229,14 @@ class HardwareSuprema(Suprema):
         return _smaller(self._white.length(self._in_few("drift_difference_metric", difference)), by_mean)
 
     def drift_slope_metric(self) -> Constant | None:
-        """D_A = sup |Theta f_x Theta^-1|, for constant M and B."""
+        """D_A = sup |Theta f_x Theta^-1|, for constant M and B, theory 8.2."""
         if self._white is None or not self.flat:
             return None
         slope = self._white.map(self.model.f_x)
         return self._white.norm(self.norms("drift_slope_metric", [slope]))
 
     def drift_explained(self, known: BoundConstants) -> Constant:
-        """D_pf = sup |B^+ f_x| where B is constant, else DBp Dfx: they are taken at two points."""
+        """D_pf = sup |B^+ f_x| where B is constant, else DBp Dfx: they are taken at two points, theory 8.2."""
         if self.model.constant_input:
             return self.norms("drift_explained", [multiply(self.fields.B_pinv, self.fields.f_x)])
         pinv, f_x = (Interval(c.below, c.above) for c in (known.B_pinv, known.f_x))
@@ -274,7 +277,7 @@ class HardwareSuprema(Suprema):
         return _largest([self.norms("noise_size", [self.fields.of_vector(n)]) for n in corners(noise)])
 
     def noise_metric(self, noise: Sequence[Fraction] | None) -> Constant:
-        """n_M = sup |Theta n| over one unit of noise: of a box, at its corners."""
+        """n_M = sup |Theta n| over one unit of noise: of a box, at its corners, theory 8.2."""
         if noise is None:
             return self.greatest_stretch()
         return _largest(
@@ -285,7 +288,7 @@ class HardwareSuprema(Suprema):
         )
 
     def noise_explained(self, noise: Sequence[Fraction] | None) -> Constant:
-        """n_B = sup |B^+ n| over one unit of noise: of a box, at its corners."""
+        """n_B = sup |B^+ n| over one unit of noise: of a box, at its corners, theory 8.2."""
         pinv = multiply(self.fields.B_pinv, self.fields.of_vector(identity(len(self.model.states))))
         if noise is None:
             return self.norms("noise_explained", [pinv])

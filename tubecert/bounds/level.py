@@ -46,7 +46,10 @@ class Proposed:
 def least_level(
     suprema: Suprema, safe_set: Box, offset: Interval, width: Fraction, proposed: Proposed
 ) -> Radius:
-    """The least rho with rho >= sqrt(A/a)|S (x0* - x0)| + width, a and A of the tube itself, as `least_radius`."""
+    """The least rho with rho >= sqrt(A/a)|S (x0* - x0)| + width, a and A of the tube itself, as `least_radius`.
+
+    Theory 2.11 in z.
+    """
     least = Fraction(float(offset.hi)) + width if math.isfinite(offset.hi) else width
     now = proposed if proposed.rho >= least else proposed.scaled(least / proposed.rho)
     found = _nowhere(now.rho)
@@ -67,7 +70,7 @@ def least_level(
 def greatest_level(
     suprema: Suprema, safe_set: Box, asked: Sequence[Fraction | None], proposed: Proposed
 ) -> Radius:
-    """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for.
+    """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for, theory 1a.5.
 
     `asked` of every state, then of every output of the model.
     """
@@ -89,7 +92,7 @@ def greatest_level(
 
 
 def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:
-    """The half-widths that go with a radius: raised, or lowered where they are loose, until they are proven."""
+    """The half-widths that go with a radius: raised, or lowered where they are loose, until they are proven, (1.7)."""
     rho, sides = proposed.rho, tuple(map(_printed, proposed.sides))
     best: Radius | None = None
     for k in range(_ROUNDS):
@@ -115,7 +118,10 @@ def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:
 
 
 def _of_outputs(suprema: Suprema, found: Radius, asked: Sequence[Fraction | None]) -> tuple[Fraction, ...]:
-    """The half-widths of the outputs of a tube that is proven, as they will be printed; only if one is asked for."""
+    """The half-widths of the outputs of a tube that is proven, as they will be printed; only if one is asked for.
+
+    (1.8).
+    """
     if found.lower is None or not any(asked):
         return (Fraction(0),) * len(asked)
     reach = sqrt(Interval.exact(found.lower.below)) * Interval.of(found.rho)
@@ -124,14 +130,14 @@ def _of_outputs(suprema: Suprema, found: Radius, asked: Sequence[Fraction | None
 
 
 def _half_widths(tube: Suprema, a: Constant, rho: Fraction) -> tuple[Fraction, ...] | None:
-    """Dbar sup sqrt(W_ii) for every state, None if one is not finite."""
+    """Dbar sup sqrt(W_ii) for every state, None if one is not finite, (1.7)."""
     reach = sqrt(Interval.exact(a.below)) * Interval.of(rho)
     ends = [float((Interval.exact(width.above) * reach).hi) for width in tube.half_widths()]
     return tuple(map(Fraction, ends)) if all(map(math.isfinite, ends)) else None
 
 
 def _overshoot(a: Constant, A: Constant, offset: Interval, width: Fraction) -> Fraction | None:
-    """sqrt(A/a) offset + width, None if it is beyond all floats."""
+    """sqrt(A/a) offset + width, None if it is beyond all floats, theory 2.11."""
     if not offset.hi > 0:
         return width
     with np.errstate(all="ignore"):

@@ -33,7 +33,7 @@ _BOXES = 4_000  # for each
 
 
 def linear_bound(suprema: Searches, v: Matrix) -> float | None:
-    """A bound of |v|, v (p, 1), over the tube of a plan that stays at a point; None where there is none."""
+    """A bound of |v|, v (p, 1), over the tube of a plan that stays at a point; None where there is none, (1.9)."""
     model, plan = suprema.model, suprema.plan
     entries = [row[0] for row in v]
     if not plan.is_constant or plan.allowance is not None or len(free_symbols(entries)) < LEAST:
@@ -54,6 +54,7 @@ def linear_bound(suprema: Searches, v: Matrix) -> float | None:
 def _bound(
     suprema: Searches, v0: list[Fraction], H: list[list[Fraction]], rest: list[Expression]
 ) -> float | None:
+    """(1.9): g and K S^-1 over a and b with a^2 + b^2 <= 1, decided in exact arithmetic, and the remainders."""
     reach = Interval.exact(suprema.rho)
     mid, rad = midrad(enclosed(tuple(map(tuple, H))) * reach)
     size = float(spectral_norm_midrad(mid, rad).hi)
@@ -78,7 +79,7 @@ def _remainder(suprema: Searches, e: Expression, effort: Effort) -> float:
 
 
 def _in_z(suprema: Searches, K: list[list[Fraction]]) -> list[list[Fraction]]:
-    """K S^-1, exactly."""
+    """K S^-1, exactly, as (1.9) has it."""
     if suprema.coordinates is None:
         return K
     columns = list(zip(*suprema.coordinates.inverse, strict=True))

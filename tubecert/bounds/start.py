@@ -59,7 +59,7 @@ class KnownStart(InitialState):
     x0: tuple[Fraction, ...]
 
     def offset(self, suprema: Suprema) -> Interval:
-        """|x*(0) - x(0)|."""
+        """|x*(0) - x(0)|, as in theory 2.11."""
         delta = self._delta(suprema.plan.start)
         if all(d is ZERO for d in delta):
             return Interval.exact(0.0)
@@ -67,12 +67,12 @@ class KnownStart(InitialState):
         found = supremum(SumOfNorms([across]), BoxDomain({}), suprema.effort)
         if np.isfinite(found.above):
             return Interval(found.below, found.above)
-        # squares overflow: the sum of magnitudes is larger than the norm
+        # squares overflow: the sum of magnitudes is larger than the norm; 1e-13 > 900 u (Higham 2002, eq. 3.5)
         parts = Tape([row[0] for row in across], ()).run([], ())
         return Interval(0.0, np.nextafter(parts.magnitude.sum() * (1 + 1e-13), np.inf))
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
-        """The length of the straight segment from x*(0) to x0.
+        """The length of the straight segment from x*(0) to x0, (2.6).
 
         The segment is cut into pieces; on each, delta' M delta lies between its least and largest value.
         """
@@ -116,14 +116,17 @@ class StartWithin(InitialState):
     radius: Fraction
 
     def offset(self, suprema: Suprema) -> Interval:
-        """The radius; times |S| in z = S x."""
+        """The radius; times |S| in z = S x, as in theory 2.11."""
         if suprema.coordinates is None:
             return Interval.of(self.radius)
         found = supremum(SumOfNorms([suprema.coordinates.S]), BoxDomain({}), suprema.effort)
         return Interval(found.below, found.above) * Interval.of(self.radius)
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
-        """sqrt(A) times the radius, A of M in x: the segment lies in the tube, or d0 is no smaller than dbar."""
+        """sqrt(A) times the radius, A of M in x: the segment lies in the tube, or d0 is no smaller than dbar.
+
+        Theory 1a.3.
+        """
         if suprema.coordinates is not None:
             stretch = suprema.greatest_stretch()
             reach = Interval(stretch.below, stretch.above) * Interval.of(self.radius)
@@ -148,12 +151,12 @@ class StartBox(InitialState):
     sides: tuple[tuple[Fraction, Fraction], ...]
 
     def offset(self, suprema: Suprema) -> Interval:
-        """|x*(0) - x(0)| at the corner where it is largest."""
+        """|x*(0) - x(0)| at the corner where it is largest, as in theory 2.11."""
         found = [KnownStart(corner).offset(suprema) for corner in self._corners()]
         return Interval(max(float(x.lo) for x in found), max(float(x.hi) for x in found))
 
     def distance(self, suprema: Suprema, metric: tuple[Constant, Constant]) -> Constant:
-        """Under a constant metric the length of the longest segment from x*(0) to a corner.
+        """Under a constant metric the length of the longest segment from x*(0) to a corner, (2.6).
 
         Else that of the segment to the centre, and from there sqrt(A) times the radius of the box.
         """
@@ -182,7 +185,10 @@ class StartBox(InitialState):
 
 
 def _speed(function: MatrixFunction, lo: Array, hi: Array) -> Interval:
-    """sqrt(delta' M delta) over pieces of the segment: |T delta|^2 over the eigenvalues of T W T', T any matrix."""
+    """sqrt(delta' M delta) over pieces of the segment: |T delta|^2 over the eigenvalues of T W T', T any matrix.
+
+    (2.6).
+    """
     w, delta, _ = function.at(lo, hi)
     mid, rad = midrad(w)
     t = whitening(mid)

@@ -49,7 +49,7 @@ class Suprema(Searches):
     # -- metric ------------------------------------------------------------------------------------------------
 
     def metric_bounds(self) -> tuple[Constant, Constant]:
-        """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1."""
+        """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1, (1.1)."""
         fine = self._fine
         unit = self._unit
         largest = self._over_tube("lower", Pencil(self.model.W, unit), fine)
@@ -66,7 +66,7 @@ class Suprema(Searches):
         return constants(self.coordinates.spread)
 
     def greatest_stretch(self) -> Constant:
-        """sup sqrt(lmax(M)) with M in x: the metric length of a vector over its length in x."""
+        """sup sqrt(lmax(M)) with M in x: the metric length of a vector over its length in x, theory 1a.3."""
         return self._root(
             self._over_tube("upper", Pencil(identity(len(self.model.states)), self.model.W), self._fine)
         )
@@ -77,7 +77,7 @@ class Suprema(Searches):
         return replace(self.effort, gap=min(self.effort.gap, _ROUGH if self.effort.gap >= _COARSE else 1e-4))
 
     def metric_slope(self) -> Constant:
-        """DMx = sup sum_i |dM/dx_i|, dM/dx_i = -M W_i M: eigenvalues of the pencils (W_i, W^2)."""
+        """DMx = sup sum_i |dM/dx_i|, dM/dx_i = -M W_i M: eigenvalues of the pencils (W_i, W^2), (2.2)."""
         W = self.fields.W
         slopes = [w for w in self.fields.W_x if any(e is not ZERO for row in w for e in row)]
         if not slopes:
@@ -87,7 +87,7 @@ class Suprema(Searches):
     # -- dynamics ----------------------------------------------------------------------------------------------
 
     def norms(self, name: str, matrices: list[Matrix]) -> Constant:
-        """sup over the tube of the sum of spectral norms."""
+        """sup over the tube of the sum of spectral norms, (2.1)-(2.3)."""
         objective = SumOfNorms(matrices)
         if objective.is_zero:
             return Constant.exactly(0.0)
@@ -139,7 +139,7 @@ class Suprema(Searches):
             return None
 
     def drift_on_plan(self) -> Constant:
-        """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho."""
+        """phi = sup |f(x* + z) + B(x* + z) u*(t)|, |z| <= rho, (2.4)."""
         drift = self.fields.drift_on_plan()
         if self.plan.is_constant:
             drift = substituted(drift, dict(zip(self.model.inputs, self.plan.u, strict=True)))
@@ -150,7 +150,7 @@ class Suprema(Searches):
         return self._on_plan("u_star", SumOfNorms([column(self.plan.u)], self.plan.fixed))
 
     def input_range(self, index: int, sharp: float) -> tuple[Constant, Constant]:
-        """(inf u*_i, sup u*_i), each to `sharp` in units of the input, if not to the gap that was asked for."""
+        """(inf u*_i, sup u*_i), each to `sharp` in units of the input, if not to the gap that was asked for, (4.13)."""
         name, u = self.model.inputs[index], self.plan.u[index]
         effort = replace(self.effort, absolute=sharp)
 
@@ -173,7 +173,7 @@ class Suprema(Searches):
         return self._constant(self._over_tube("h_x", lipschitz_constant(entries, fields or self.fields)))
 
     def uncertainty(self, fields: Fields | None = None) -> tuple[Constant, Constant, Constant]:
-        """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks.
+        """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks, (2.3).
 
         It is one in the coordinates of the tube, or in those of other `fields`.
         """
@@ -197,12 +197,12 @@ class Suprema(Searches):
     # -- feedback ----------------------------------------------------------------------------------------------
 
     def feedback_gain(self) -> Constant:
-        """du = sup over x and mu of the largest eigenvalue of (F, B B'/mu + mu W), at least 0.
+        """du = sup over x and mu of the largest eigenvalue of (F, B B'/mu + mu W), at least 0, (2.8), theory 2.1.
 
         Exact: 2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2, attained at some mu <= smax(B~).
         """
         top = self._over_tube("feedback_gain", Pencil(self.model.BBt, self.model.W))
-        largest = float(np.nextafter(np.sqrt(top.above), np.inf))
+        largest = float(np.nextafter(np.sqrt(top.above), np.inf))  # a root is rounded to nearest (IEEE 754)
         found = self._over_tube("feedback_gain", exact_gain(self.model, largest), extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
@@ -212,7 +212,7 @@ class Suprema(Searches):
         return Constant(below=max(0.0, found.below), above=max(0.0, above), at=self._witness(found))
 
     def feedback_gain_closed_form(self, effort: Effort | None = None) -> float:
-        """A bound of du in closed form: looser, but it needs no search over mu."""
+        """A bound of du in closed form: looser, but it needs no search over mu, theory 2.2."""
         return self._over_tube("feedback_gain", ClosedFormGain(self.model), effort).above
 
     def contraction_excess(self) -> Constant:
@@ -233,7 +233,7 @@ class Suprema(Searches):
     # -- on the plan -------------------------------------------------------------------------------------------
 
     def metric_input_gain(self) -> Constant:
-        """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan."""
+        """beta = sup_t smax(Theta(x*) B(x*)), the root of the largest eigenvalue of (B B', W) on the plan, (2.5)."""
         on = self.plan.on
         objective = Pencil(
             on(self.model, self.model.BBt), on(self.model, self.model.W), fixed=self.plan.fixed
@@ -241,7 +241,7 @@ class Suprema(Searches):
         return self._root(self._search_plan("metric_input_gain", objective))
 
     def plan_defect(self) -> tuple[Constant, Constant]:
-        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*."""
+        """(delta_p, delta): sup |p| and sup |Theta(x*) p| with p = x*' - f(x*) - B(x*) u*, (2.7)."""
         if self.plan.allowance is not None:
             return self._limited_defect(self.plan.allowance)
         effort = self.effort_for("plan_defect")
@@ -252,7 +252,7 @@ class Suprema(Searches):
         return self._constant(defect.in_state()), self._constant(defect.in_metric())
 
     def _limited_defect(self, limit: Fraction) -> tuple[Constant, Constant]:
-        """The limit, and the limit times the root of sup lmax(M) on the plan: any p that is allowed may be met.
+        """The limit, and the limit times the root of sup lmax(M) on the plan: any p that is allowed may be met, (4.10).
 
         The limit is of |p| in x, and M the metric in x; in z = S x the first is |S| times that.
         """
@@ -272,12 +272,12 @@ class Suprema(Searches):
         )
 
     def half_widths(self) -> tuple[Constant, ...]:
-        """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance."""
+        """sup sqrt(W_ii) for every state: |x_i - x_i*| <= that times the distance, theory 4.3."""
         W = self.model.W
         return tuple(self._width(name, W[i][i]) for i, name in enumerate(self.model.states))
 
     def output_widths(self) -> tuple[Constant, ...]:
-        """sup sqrt(c'W c) for every output c'x: |c'(x - x*)| <= that times the distance."""
+        """sup sqrt(c'W c) for every output c'x: |c'(x - x*)| <= that times the distance, (1.8)."""
         rows = ((output.name, constants([output.row])) for output in self.model.outputs)
         return tuple(
             self._width(name, multiply(multiply(c, self.model.W), transpose(c))[0][0]) for name, c in rows
@@ -294,7 +294,7 @@ class Suprema(Searches):
         return dict(states) | {output.name: width for output, width in outputs}
 
     def shape_in(self, first: int, second: int) -> Shape:
-        """Bounds over the tube of the block of W that belongs to two states."""
+        """Bounds over the tube of the block of W that belongs to two states, theory 4c."""
 
         def most(entry: Expression) -> float:
             if entry.is_constant:

@@ -42,15 +42,15 @@ class Whitened:
         return multiply(self.vector(a), transpose(self.coordinates.S))
 
     def of_form(self, found: Constant) -> Constant:
-        """|Theta A Theta'| from |T A T'|."""
+        """|Theta A Theta'| from |T A T'|, theory 8.2."""
         return _scaled(found, 1 / Interval(self.least, self.most))
 
     def length(self, found: Constant) -> Constant:
-        """|Theta a| from |T a|: M = T'(T W T')^-1 T."""
+        """|Theta a| from |T a|: M = T'(T W T')^-1 T, theory 8.2."""
         return _scaled(found, 1 / sqrt(Interval(self.least, self.most)))
 
     def norm(self, found: Constant) -> Constant:
-        """|Theta A Theta^-1| from |T A T^-1|."""
+        """|Theta A Theta^-1| from |T A T^-1|, theory 8.2."""
         root = sqrt(Interval(self.least, self.most))
         return _scaled(found, root / root)
 

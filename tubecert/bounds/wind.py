@@ -207,7 +207,10 @@ def uncertainty_constants(
 
 
 def joined(suprema: Suprema) -> tuple[Entries, Matrix]:
-    """H = v + G w/|w|: its entries v without wind, of what is given as expressions, and G (empty without wind)."""
+    """H = v + G w/|w|: its entries v without wind, of what is given as expressions, and G (empty without wind).
+
+    (7.1).
+    """
     beside, own = beside_of(suprema), suprema.model.h
     known = beside.known or (ZERO,) * len(suprema.model.inputs)
     total = known if own is None else tuple(a + b for a, b in zip(own, known, strict=True))

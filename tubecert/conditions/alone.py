@@ -28,13 +28,13 @@ class NoGains:
 
 @quiet
 def ultimate(n: Numbers[T]) -> T:
-    """A1 = (beta Dh + delta)/lambda: what d tends to at most."""
+    """A1 = (beta Dh + delta)/lambda: what d tends to at most, (4.0)."""
     return (n.beta * n.Dh + pushed(n)) / n.lam
 
 
 @quiet
 def supremum(n: Numbers[T]) -> T:
-    """sup D over the horizon: D is monotone, from d0 to A1."""
+    """sup D over the horizon: D is monotone, from d0 to A1, (4.0)."""
     if n.horizon is None:
         return maximum(n.d0, ultimate(n))
     # D(T), with both ends positive: no difference is taken
@@ -44,7 +44,10 @@ def supremum(n: Numbers[T]) -> T:
 
 @quiet
 def largest_uncertainty(n: Numbers[T]) -> T:
-    """The Dh for which sup D reaches dbar, if d0 does not: (lambda dbar - delta)/beta, more on a finite horizon."""
+    """The Dh for which sup D reaches dbar, if d0 does not: (lambda dbar - delta)/beta, more on a finite horizon.
+
+    Theory 4a.
+    """
     if n.horizon is None:
         return (n.lam * reach(n) - pushed(n)) / n.beta
     left, mean = exp(-n.lam * n.horizon), decay_mean(n.lam * n.horizon)
@@ -52,31 +55,35 @@ def largest_uncertainty(n: Numbers[T]) -> T:
 
 
 def _margin(n: Numbers[Interval]) -> Interval:
+    """1 - sup D/dbar of theorem 0."""
     return (1 - supremum(n) / reach(n)).sanitised()
 
 
 def margin_alone(problem: TubeProblem, recipes: Sequence[NoGains]) -> Interval:
-    """The margin of dbar, shape `(len(recipes),)`: the same for each."""
+    """The margin of dbar, shape `(len(recipes),)`: the same for each, theorem 0."""
     low, high = _margin(problem.proven()).lo, _margin(problem.enclosed()).hi
     one = np.ones(len(recipes))
     return Interval(low * one, np.maximum(low, high) * one)
 
 
 def distance(problem: TubeProblem) -> Interval:
-    """sup D: proven from above; from below what no constants within their enclosures go under."""
+    """sup D: proven from above; from below what no constants within their enclosures go under, (4.0)."""
     high = supremum(problem.proven()).hi
     return Interval(np.minimum(supremum(problem.enclosed()).lo, high), high)
 
 
 def uncertainty_limit(problem: TubeProblem) -> float | None:
-    """The feedback alone holds for every |h| below this, in units of the input; None if for none, or for any."""
+    """The feedback alone holds for every |h| below this, in units of the input; None if for none, or for any.
+
+    Theory 4a.
+    """
     n = problem.proven()
     limit = float(largest_uncertainty(n).lo)
     return limit if np.isfinite(limit) and limit > 0 and bool(n.d0.hi < reach(n).lo) else None
 
 
 def ultimate_radius(problem: TubeProblem, recipe: NoGains) -> float:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven."""
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven: D -> A1 of (4.0)."""
     del recipe
     n = problem.proven()
     return float((ultimate(n) / sqrt(n.a)).hi)

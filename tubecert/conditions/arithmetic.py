@@ -125,7 +125,10 @@ def confined(x: T, lowest: T, highest: T) -> T:
 
 @quiet
 def log1p_ratio(x: T) -> T:
-    """log(1 + x)/x with value 1 at 0, decreasing on x > -1; unknown (interval) or NaN (float) at x <= -1."""
+    """log(1 + x)/x with value 1 at 0, decreasing on x > -1; unknown (interval) or NaN (float) at x <= -1.
+
+    The r of (2.16).
+    """
     if isinstance(x, Interval):
         return Interval(_ratio_at(x.hi).lo, _ratio_at(x.lo).hi).sanitised()
     small = np.abs(x) < 1e-5
@@ -154,7 +157,7 @@ def _near_one(x: Array, quotient: Interval) -> Interval:
 
 @quiet
 def decay_mean(y: T) -> T:
-    """(1 - e^(-y))/y, the mean of e^(-s) over [0, y]: decreasing, 1 at 0."""
+    """(1 - e^(-y))/y, the mean of e^(-s) over [0, y]: decreasing, 1 at 0, as (4.0), (4.6) and (4.9) have it."""
     if isinstance(y, Interval):
         return Interval(_decay_mean_at(y.hi).lo, _decay_mean_at(y.lo).hi).sanitised()
     near = np.abs(y) < 1e-5
@@ -175,6 +178,7 @@ def least_solution(constant: T, slope: T) -> T:
 
     `constant >= 0`, `slope >= 0`. The set of such Y is a ray, which is why minima and maxima of several such
     bounds are solved by the minimum and maximum of their solutions.
+    As theory 4.6 asks for.
     """
     rest = 1 - slope
     if isinstance(rest, Interval):

@@ -1,6 +1,6 @@
 """Derived constants of certificate A: everything in (26a)-(26c) that does not depend on omega or Gamma.
 
-Two variants with one result: the corrected formulas (theory section 2) and the paper's own (as printed). The
+Two variants with one result: the corrected formulas (theory section 3) and the paper's own (as printed). The
 docs/theory page says which lines differ and why.
 """
 
@@ -38,15 +38,17 @@ def rate_terms(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
 
 
 def known_drift(problem: TubeProblem, n: Numbers[T]) -> T:
-    """The bound of |f + B u*| over the tube that the problem asks for."""
+    """The bound of |f + B u*| over the tube that the problem asks for, phi of (2.4)."""
     return n.phi if problem.drift == Drift.PLAN else n.Df + n.DB * n.Dus
 
 
 @quiet
 def _corrected(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+    """(3.1)-(3.5), line by line."""
     hs = n.Dh + n.R
-    kmax = sqrt(n.a) * n.rho * n.du
-    speed = known_drift(problem, n) + n.DB * (hs + kmax)
+    kmax = sqrt(n.a) * n.rho * n.du  # (3.1)
+    speed = known_drift(problem, n) + n.DB * (hs + kmax)  # (3.1)
+    # (3.5)
     geodesic_rate = sqrt(n.A / n.a) * (n.Dfx + (hs + n.Dus + kmax) * n.Dbx + n.Dhx * n.DB) + (
         sqrt(n.A) * n.du * n.DB
     )
@@ -54,14 +56,15 @@ def _corrected(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
     return RateTerms(
         **terms,
         hs=hs,
-        E0=n.d0**2,
-        zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),
-        third=n.Dhx * (4 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,
+        E0=n.d0**2,  # (3.6)
+        zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),  # (3.4)
+        third=n.Dhx * (4 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,  # (3.4)
     )
 
 
 @quiet
 def _printed(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+    """The same as the paper prints it, bounds:dx to bounds:dgamma_s; errata E4-E6 say what is wrong with it."""
     du = n.excess / (2 * n.smin)  # no bound of the feedback, and may be negative
     speed = known_drift(problem, n) + n.DB * (2 * n.Dh + n.rho * du)
     geodesic_rate = sqrt(n.A / n.a) * (
@@ -78,17 +81,18 @@ def _printed(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
 
 
 def _common(n: Numbers[T], speed: T, geodesic_rate: T) -> dict[str, T]:
-    """What both variants share."""
-    psi_x = 2 * n.DBx + n.DB * n.DMx / n.a
+    """What both variants share, (3.1), (3.3) and (3.5)."""
+    psi_x = 2 * n.DBx + n.DB * n.DMx / n.a  # (3.5)
+    # (3.5)
     psi_rate = n.A * (n.DB * geodesic_rate + n.DB * n.DMx * speed / sqrt(n.A * n.a) + n.DBx * speed)
     return {
         "speed": speed,
-        "s1": n.Dht + n.Dhx * speed,
+        "s1": n.Dht + n.Dhx * speed,  # (3.1)
         "psi_x": psi_x,
         "geodesic_rate": geodesic_rate,
         "psi_rate": psi_rate,
-        "weight1": 2 * n.rho * n.DB * (n.A / n.a),
-        "weight2": n.A * psi_x,
+        "weight1": 2 * n.rho * n.DB * (n.A / n.a),  # (3.3)
+        "weight2": n.A * psi_x,  # (3.3)
     }
 
 
@@ -103,7 +107,7 @@ class Zetas(Generic[T]):
 
 @quiet
 def zetas(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T) -> Zetas[T]:
-    """(zeta_1) to (zeta_3) with the kernel that the problem asks for."""
+    """(zeta_1) to (zeta_3) with the kernel that the problem asks for, (3.3), (3.4)."""
     kernel = paper_kernel if problem.active_kernel is Kernel.PAPER else tight_kernel
     k = kernel(2 * n.lam, omega, n.Dh, terms.s1)
     return Zetas(zeta1=terms.weight1 * k, zeta2=terms.weight2 * k, zeta3=terms.third / omega)
@@ -111,12 +115,12 @@ def zetas(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T) ->
 
 @quiet
 def prediction_error(hs: T, s1: T, q: T) -> T:
-    """Dxt = sqrt(2 (1+r_H) Dh s1/q + ((1+r_H) Dh)^2): |xhat - x| <= Dxt/sqrt(Gamma), for P = I."""
+    """Dxt = sqrt(2 (1+r_H) Dh s1/q + ((1+r_H) Dh)^2): |xhat - x| <= Dxt/sqrt(Gamma), for P = I, (2.11)."""
     return sqrt(2 * hs * s1 / q + hs**2)
 
 
 @quiet
 def filter_error(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, p: Predictor[T]) -> T:
-    """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt."""
+    """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt, (2.13)."""
     gain = n.DBpx * terms.speed + (problem.filter_factor * omega + p.norm) * n.DBp
     return gain * prediction_error(terms.hs, terms.s1, p.q)

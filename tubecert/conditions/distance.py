@@ -63,19 +63,19 @@ class DistanceState(Generic[T]):
 
 @quiet
 def drift_bound(n: Numbers[T]) -> T:
-    """What |xdot| is at most without the uncertainty: phi + DB du dbar."""
+    """What |xdot| is at most without the uncertainty: phi + DB du dbar, two terms of (4.3)."""
     return drifting(n) + n.DB * (n.du * reach(n))
 
 
 @quiet
 def speed_needed(n: Numbers[T], S: T, e: T) -> T:
-    """What Y has to exceed: phi + DB[du dbar + min((1+r_H) Dh, max(H0, S) + e)]."""
+    """What Y has to exceed: phi + DB[du dbar + min((1+r_H) Dh, max(H0, S) + e)], (4.3)."""
     return drift_bound(n) + n.DB * minimum(n.Dh + n.R, maximum(n.H0, S) + e)
 
 
 @quiet
 def least_speed(n: Numbers[T], omega: T, e: T) -> T:
-    """The least Y for S = (Dht + Dhx Y)/omega and a given e, in closed form."""
+    """The least Y for S = (Dht + Dhx Y)/omega and a given e, in closed form: (4.1) and (4.3) solved for Y."""
     drift = drift_bound(n)
     crude = drift + n.DB * (n.Dh + n.R)
     settled = least_solution(drift + n.DB * (e + n.Dht / omega), n.DB * n.Dhx / omega)
@@ -84,13 +84,13 @@ def least_speed(n: Numbers[T], omega: T, e: T) -> T:
 
 @quiet
 def uncertainty(n: Numbers[T], Y: T, omega: T) -> T:
-    """What the filter leaves of h: S = (Dht + Dhx Y)/omega."""
+    """What the filter leaves of h: S = (Dht + Dhx Y)/omega, (4.1)."""
     return (n.Dht + n.Dhx * Y) / omega
 
 
 @quiet
 def filter_error(n: Numbers[T], Y: T, omega: T, p: Predictor[T]) -> T:
-    """Deta of certificate B: (DBpx Y + DBp (omega + |A_m + omega I|)) Dxt."""
+    """Deta of certificate B: (DBpx Y + DBp (omega + |A_m + omega I|)) Dxt, (2.12)."""
     gain = n.DBpx * Y + n.DBp * (omega + p.shifted)
     return gain * prediction_error(n.Dh + n.R, n.Dht + n.Dhx * Y, p.q)
 
@@ -105,7 +105,7 @@ def error_needed(n: Numbers[T], Y: T, omega: T, p: Predictor[T], Gamma: T) -> T:
 
 
 def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
-    """D(t) of theorem B."""
+    """D(t) of theorem B, (2.15)."""
     return DistanceBound(
         d0=n.d0, beta=n.beta, H0=n.H0, S=S, e=e, delta=pushed(n), lam=n.lam, omega=omega, horizon=n.horizon
     )
@@ -138,16 +138,17 @@ def _is_valid(
     n: Numbers[Interval], omega: Interval, Gamma: Interval, p: Predictor[Interval], s: DistanceState[Interval]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """The side conditions of theorem B on Y, e and S, proven."""
-    speed = speed_needed(n, s.S, s.e).hi < s.Y.lo
+    speed = speed_needed(n, s.S, s.e).hi < s.Y.lo  # (4.3)
     if is_felt(n):
-        predicted = error_needed(n, s.Y, omega, p, Gamma).hi <= s.e.lo
+        predicted = error_needed(n, s.Y, omega, p, Gamma).hi <= s.e.lo  # (7.9)
     else:
-        predicted = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo
-    filtered = uncertainty(n, s.Y, omega).hi <= s.S.lo
+        predicted = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo  # (4.2)
+    filtered = uncertainty(n, s.Y, omega).hi <= s.S.lo  # (4.1)
     return speed & predicted & filtered
 
 
 def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -> Interval:
+    """1 - sup D/dbar, (4.4)."""
     return (1 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
 
 
@@ -155,7 +156,10 @@ def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -
 
 
 def course_of(problem: TubeProblem, recipe: DistanceRecipe) -> tuple[InWindow[Interval], ...]:
-    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts."""
+    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts.
+
+    (4.14)-(4.16).
+    """
     if recipe.settling is None or not cover(problem, recipe):
         raise ValueError("the windows of a recipe are those of its problem")
     omega = Interval.of(recipe.bandwidth)
@@ -192,7 +196,7 @@ def _margin_in_windows(problem: TubeProblem, recipe: DistanceRecipe) -> Interval
 
 
 def _describes_windows(problem: TubeProblem, recipe: DistanceRecipe) -> bool:
-    """Whether there is a level in every part, and each is longer than what it waits."""
+    """Whether there is a level in every part, and each is longer than what it waits, as theorem BW asks for."""
     wait = recipe.settling
     if wait is None or not cover(problem, recipe):
         return False
@@ -205,6 +209,7 @@ def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
 
     Y is replaced by a lower bound of the least fixed point, approached from below; sup D rises with e and S,
     they with Y. The bound holds for all constants within their enclosures. In windows nothing is refuted.
+    Theory 4.2.
     """
     if problem.parts:
         return float(np.inf)
@@ -224,7 +229,10 @@ def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
 
 
 def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
-    """A lower bound of every Y >= needed(Y), for a nondecreasing `needed`: iterates from 0, rounded down."""
+    """A lower bound of every Y >= needed(Y), for a nondecreasing `needed`: iterates from 0, rounded down.
+
+    Theory 4.2.
+    """
     Y = Interval.exact(0.0)
     for _ in range(_RISES):
         raised: Array = np.maximum(Y.lo, needed(Y).sanitised().lo)
@@ -235,7 +243,7 @@ def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
 
 
 def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | None:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; windows have an end."""
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; windows have an end, theory 4.3."""
     if recipe.windows:
         return None
     n = problem.proven(recipe.projection_radius)
@@ -244,7 +252,7 @@ def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | Non
 
 
 def input_shares(problem: TubeProblem, recipe: DistanceRecipe) -> InputShares | None:
-    """|k| <= du sup D, |u_a| <= R_H."""
+    """|k| <= du sup D, |u_a| <= R_H, (4.13)."""
     if recipe.windows:
         return widest_shares(problem, suprema_in_windows(problem, recipe), recipe.projection_radius)
     n = problem.proven(recipe.projection_radius)

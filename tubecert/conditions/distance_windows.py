@@ -51,6 +51,7 @@ def along(
 
 
 def _first(n: Numbers[T], length: T, Y: T, loop: Loop[T]) -> InWindow[T]:
+    """Window 1 of (4.16): one stretch."""
     V = _settled(n, Y, loop)
     stretch = _stretch(n, length, Y, loop, sqrt(V))
     course = through(n, loop.omega, [stretch], Gone(distance=n.d0, memory=n.H0))
@@ -59,6 +60,7 @@ def _first(n: Numbers[T], length: T, Y: T, loop: Loop[T]) -> InWindow[T]:
 
 
 def _following(n: Numbers[T], length: T, Y: T, loop: Loop[T], before: InWindow[T]) -> InWindow[T]:
+    """A later window of (4.16): two stretches, with v of (4.15)."""
     V = _settled(n, Y, loop)
     excess = maximum(number(0, V), before.left - V)
     q = loop.predictor.q / 2 if is_felt(n) else loop.predictor.q
@@ -77,7 +79,7 @@ def _following(n: Numbers[T], length: T, Y: T, loop: Loop[T], before: InWindow[T
 
 
 def _added(S: T, stretches: Sequence[Stretch[T]]) -> T:
-    """What the estimator's error adds to S at most."""
+    """What the estimator's error adds to S at most, (4.16)."""
     error = number(0, S)
     for each in stretches:
         error = maximum(error, each.S - S + each.e)
@@ -85,7 +87,7 @@ def _added(S: T, stretches: Sequence[Stretch[T]]) -> T:
 
 
 def _rate(n: Numbers[T], Y: T) -> T:
-    """s = Dht + Dhx Y."""
+    """s = Dht + Dhx Y, (4.15)."""
     return n.Dht + n.Dhx * Y
 
 

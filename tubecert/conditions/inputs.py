@@ -26,7 +26,7 @@ class InputShares:
 
 
 def shares(n: Numbers[Interval], distance: Interval, radius: Fraction | None) -> InputShares | None:
-    """du D for d(x*, x) <= `distance`, and the radius of the projection; None if du has no bound.
+    """du D for d(x*, x) <= `distance`, and the radius of the projection; None if du has no bound (4.13).
 
     The radius is None for a loop that does not adapt.
     """
@@ -61,7 +61,7 @@ class LimitedInput:
     any_plan: bool
 
     def bound(self, own: InputShares | None) -> InputBound | None:
-        """What the input does in the loop, if the shares are known and u* is bounded."""
+        """What the input does in the loop, if the shares are known and u* is bounded, (4.13)."""
         low, high = self.least.below, self.greatest.above
         if own is None or not (isfinite(low) and isfinite(high)):
             return None

@@ -38,19 +38,19 @@ class Kernel(StrEnum):
 
 @quiet
 def paper_kernel(c: T, w: T, s0: T, s1: T) -> T:
-    """K(c) = s0/|c - w| + s1/(c w), the kernel of (zeta_1) and (zeta_2) as printed; unbounded at w = c."""
+    """K(c) = s0/|c - w| + s1/(c w), the kernel of (zeta_1) and (zeta_2) as printed; unbounded at w = c, (2.18)."""
     return s0 / absolute(c - w) + s1 / (c * w)
 
 
 @quiet
 def kappa(c: T, w: T) -> T:
-    """sup_t |e^(-wt) - e^(-ct)|/|c - w| = (1/c) (c/w)^(w/(w-c)), and 1/(e c) at w = c."""
+    """sup_t |e^(-wt) - e^(-ct)|/|c - w| = (1/c) (c/w)^(w/(w-c)), and 1/(e c) at w = c, (2.17)."""
     return exp(-(w / c) * log1p_ratio((w - c) / c)) / c
 
 
 @quiet
 def tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
-    """J(c, w, s0, s1): the exact sup over t and admissible h of the filtered uncertainty seen at rate c.
+    """J(c, w, s0, s1): the exact sup over t and admissible h of the filtered uncertainty seen at rate c, (2.19).
 
     |h| <= s0 at the start and |dh/dt| <= s1 afterwards. Nondecreasing in s0 and s1, decreasing in w.
     """
@@ -62,6 +62,7 @@ def tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
 
 
 def _tight_kernel(c: T, w: T, s0: T, s1: T) -> T:
+    """(2.19) with s0 and s1 at an end of their enclosures."""
     slow = s1 / (c * w)
     q = c * s0 - s1
     peak = slow + q * exp(-(c * s0 / q) * log1p_ratio((w - c) * s0 / q)) / (c * w)
@@ -92,17 +93,17 @@ class DistanceBound(Generic[T]):
     horizon: T | None = None
 
     def ultimate(self) -> T:
-        """A1, the limit of D(t)."""
+        """A1, the limit of D(t), (2.15)."""
         return (self.beta * (self.S + self.e) + self.delta) / self.lam
 
     @quiet
     def at(self, t: T) -> T:
-        """D(t); nondecreasing in d0, beta, H0, S, e and delta."""
+        """D(t); nondecreasing in d0, beta, H0, S, e and delta, (2.15)."""
         return _at(self, t)
 
     @quiet
     def supremum(self) -> T:
-        """The largest D(t) over the horizon; nondecreasing in d0, beta, H0, S, e and delta."""
+        """The largest D(t) over the horizon; nondecreasing in d0, beta, H0, S, e and delta, (2.16)."""
         if isinstance(self.d0, Interval):
             below, above = _supremum(_end(self, "lo")), _supremum(_end(self, "hi"))
             return Interval(below.lo, above.hi).sanitised()
@@ -116,18 +117,19 @@ def _end(D: DistanceBound[Any], side: str) -> DistanceBound[Interval]:
 
 
 def _at(D: DistanceBound[T], t: T) -> T:
-    """D(t), with K(t) = e^(-m t) t (1 - e^(-y))/y, m = min(lam, omega), y = |omega - lam| t."""
+    """D(t), with K(t) = e^(-m t) t (1 - e^(-y))/y, m = min(lam, omega), y = |omega - lam| t, (2.15)."""
     slower = minimum(D.lam, D.omega)
     K = exp(-slower * t) * t * decay_mean(absolute(D.omega - D.lam) * t)
     return _monotone(D, t) + D.beta * (D.H0 - D.S) * K
 
 
 def _monotone(D: DistanceBound[T], t: T) -> T:
-    """D(t) without C1 K(t): it goes from d0 towards A1."""
+    """D(t) without C1 K(t): it goes from d0 towards A1, (2.15)."""
     return D.d0 * exp(-D.lam * t) - D.ultimate() * expm1(-D.lam * t)
 
 
 def _supremum(D: DistanceBound[T]) -> T:
+    """(2.16), with every size at an end of its enclosure."""
     A1 = D.ultimate()
     C1 = D.beta * (D.H0 - D.S)
     D1 = D.omega - D.lam

@@ -70,7 +70,7 @@ class Machine:
             raise ValueError("the estimate is clipped to a box that contains 0")
 
     def clip_radius(self, h: Constant) -> Fraction:
-        """R: the least decimal that bounds |v| over the set that the estimate is clipped to."""
+        """R: the least decimal that bounds |v| over the set that the estimate is clipped to (theory 8.1)."""
         square = self._square(h)
         if square is None:
             return Fraction(1)  # serves nothing
@@ -78,12 +78,12 @@ class Machine:
         return near if near**2 >= square else next_up(near, RADIUS_DIGITS)
 
     def clips_within(self, h: Constant, R: Fraction) -> bool:
-        """Whether |v| <= R over the set that the estimate is clipped to, decided exactly."""
+        """Whether |v| <= R over the set that the estimate is clipped to, decided exactly, as theory 8.1 asks for."""
         square = self._square(h)
         return square is not None and R > 0 and square <= R**2
 
     def _square(self, h: Constant) -> Fraction | None:
-        """R^2 at least: of the corner of the box that is farthest, or Dh^2; None if there is no bound."""
+        """R^2 at least: of the corner of the box that is farthest, or Dh^2; None if there is no bound, theory 8.1."""
         if self.clip:
             return sum((max(low**2, high**2) for low, high in self.clip), Fraction(0))
         return Fraction(h.above) ** 2 if np.isfinite(h.above) else None
@@ -98,7 +98,7 @@ class Machine:
 
     @property
     def drift(self) -> Fraction | None:
-        """The bound of |n_k - n_(k-1)|/Ts in units of noise, 1/s, where one is given."""
+        """The bound of |n_k - n_(k-1)|/Ts in units of noise, 1/s, where one is given: v of (H.7)."""
         rate, unit = self.asked.noise_rate, self.unit
         if rate is None:
             return None

@@ -15,7 +15,7 @@ from tubecert.enclosure.interval import Interval
 
 
 def reach(n: Numbers[T]) -> T:
-    """The distance that cannot be reached inside the tube: dbar = sqrt(a) rho."""
+    """The distance that cannot be reached inside the tube: dbar = sqrt(a) rho, section 0 of the theory."""
     return sqrt(n.a) * n.rho
 
 
@@ -45,7 +45,10 @@ def _pushes(problem: TubeProblem, allowed: tuple[Interval, Interval]) -> Shortfa
 
 
 def _residual(n: Numbers[Interval]) -> Interval:
-    """What a plan defect and a wind alone lead to: delta/lambda, or what of it the horizon allows."""
+    """What a plan defect and a wind alone lead to: delta/lambda, or what of it the horizon allows.
+
+    (2.15) without the other terms.
+    """
     still = DistanceBound(
         d0=0 * n.d0,
         beta=n.beta,
@@ -63,7 +66,7 @@ def _residual(n: Numbers[Interval]) -> Interval:
 def _obstacle(
     claim: str, allowed: tuple[Interval, Interval], needed: tuple[Interval, Interval]
 ) -> Shortfall | None:
-    """The reason, unless allowed > needed is proven; both on the safe side first, then enclosed."""
+    """The reason, unless allowed > needed is proven; both on the safe side first, then enclosed, theory 4.2."""
     low, high = (1 - x / y for x, y in zip(needed, allowed, strict=True))
     if low.lo > 0:
         return None

@@ -30,7 +30,7 @@ def _enclosed_matrix(A: Matrix) -> Interval:
 
 
 def damping(A_m: Matrix) -> Interval:
-    """lmin(Q) for Q = -(A_m + A_m')."""
+    """lmin(Q) for Q = -(A_m + A_m'), q of (2.11)."""
     g = scalar_gain(A_m)
     if g is not None:
         return Interval.of(2 * g)
@@ -52,13 +52,13 @@ class Predictor(Generic[T]):
 
     @staticmethod
     def of_gain(g: T, omega: T) -> Predictor[T]:
-        """A_m = -g I."""
+        """A_m = -g I, as in theory 2.7: omega + |g - omega| in (2.12)."""
         return Predictor(norm=g, shifted=absolute(omega - g), q=2 * g, scalar=True)
 
 
 @quiet
 def predictor_of_matrix(A_m: Matrix, omega: Interval) -> Predictor[Interval]:
-    """The same for any matrix, with verified norms; `omega` may be an array."""
+    """The same for any matrix, with verified norms; `omega` may be an array, (2.11)-(2.13)."""
     from tubecert.enclosure.linalg import spectral_norm
 
     A = _enclosed_matrix(A_m)

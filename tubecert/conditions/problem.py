@@ -199,7 +199,7 @@ class TubeProblem:
 
     @property
     def projection_radius(self) -> Fraction:
-        """R_H: a decimal >= sqrt(1 + nu) Dh, the least that the projection of A and B needs."""
+        """R_H: a decimal >= sqrt(1 + nu) Dh, the least that the projection of A and B needs, (2.10)."""
         least = np.sqrt(float(1 + (self.smooth or 0))) * self.constants.h.above
         if not np.isfinite(least):
             return Fraction(1)  # serves nothing
@@ -219,7 +219,7 @@ class TubeProblem:
         return self.constants.B_x.above == 0
 
     def radius_serves(self, R_H: Fraction, *, clips: bool = False) -> bool:
-        """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly."""
+        """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly, (2.10)."""
         if not np.isfinite(self.constants.h.above):
             return False
         layer = Fraction(0) if clips or self.smooth is None else self.smooth
@@ -235,7 +235,10 @@ class TubeProblem:
         return Numbers(**values)
 
     def proven(self, R_H: Fraction | None = None) -> Numbers[Interval]:
-        """The safe side: the theorems hold with these numbers, because each bounds its constant."""
+        """The safe side: the theorems hold with these numbers, because each bounds its constant.
+
+        As theory 2.11 asks of the radii.
+        """
         safe = self._numbers(lambda name, c: Interval.exact(c.below if name in _INFIMA else c.above), R_H)
         rho_r = np.minimum(safe.rho_r.lo, (safe.rho - safe.rho_a).lo)  # the proof needs rho_r + rho_a <= rho
         return replace(safe, rho_r=Interval.exact(rho_r), offset=Interval.exact(safe.offset.hi))
@@ -263,7 +266,7 @@ class TubeProblem:
         )
 
     def _with_wind(self, n: Numbers[Interval], side: Side) -> Numbers[Interval]:
-        """Beside the constants of the tube, what the wind does (theory 7)."""
+        """Beside the constants of the tube, what the wind does, (7.2), (7.7)."""
         if self.wind is None or self.wind.bound is None:
             return n
         own, size = self.wind.constants, Interval.of(self.wind.bound)
@@ -280,7 +283,7 @@ class TubeProblem:
         )
 
     def _with_residual(self, n: Numbers[Interval], side: Side) -> Numbers[Interval]:
-        """What unknown parameters do beside the inputs is a part of delta and of phi (theory 7)."""
+        """What unknown parameters do beside the inputs is a part of delta and of phi, (7.3), (7.4)."""
         if self.residual is None:
             return n
         push, size = side("push", self.residual.push), side("size", self.residual.size)

@@ -77,7 +77,7 @@ def _known(x: T) -> T:
 
 
 def theta(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, g: T | None) -> T:
-    """Dtheta = DB A Deta/lambda."""
+    """Dtheta = DB A Deta/lambda, (3.2)."""
     Deta = filter_error(problem, n, terms, omega, predictor(problem.A_m, omega, g))
     return n.DB * n.A * Deta / n.lam
 

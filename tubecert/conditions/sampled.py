@@ -64,7 +64,7 @@ class Ages(Generic[T]):
 
 @quiet
 def ages(Ts: T, omega: T, g: T) -> Ages[T]:
-    """Mean age m = 1/g - Ts/(e^(g Ts) - 1) in [0, Ts/2], and the filter's share w."""
+    """Mean age m = 1/g - Ts/(e^(g Ts) - 1) in [0, Ts/2], and the filter's share w, (4.6)."""
     y = g * Ts
     line = number(Fraction(1, 2), y) - y / 12
     mean = 1 / y - 1 / expm1(y)
@@ -89,31 +89,32 @@ class SampledState(Generic[T]):
 
 @quiet
 def sampled_state(n: Numbers[T], Ts: T, age: Ages[T], Y: T) -> SampledState[T]:
-    """H1 = min(Dh, H0 + s1 Ts), S_T = s1 w + m (s1 + b Y), d1 = the distance after the first sample."""
+    """H1 = min(Dh, H0 + s1 Ts), S_T = s1 w + m (s1 + b Y), d1 = the distance after the first sample, (4.8), (4.9)."""
     s1 = n.Dht + n.Dhx * Y
     b = _gain_drift(n)
-    H1 = minimum(n.Dh, n.H0 + s1 * Ts)
-    S_T = s1 * age.w + age.m * (s1 + b * Y)
+    H1 = minimum(n.Dh, n.H0 + s1 * Ts)  # (4.8)
+    S_T = s1 * age.w + age.m * (s1 + b * Y)  # (4.8)
     if is_felt(n):
-        S_T = S_T + taken(n) + turning(n) * age.m * Y
+        S_T = S_T + taken(n) + turning(n) * age.m * Y  # (7.6)
+    # (4.9)
     d1 = n.d0 * exp(-n.lam * Ts) + (n.beta * H1 + pushed(n)) * Ts * decay_mean(n.lam * Ts)
     return SampledState(H1=H1, S_T=S_T, d1=d1)
 
 
 def _gain_drift(n: Numbers[T]) -> T:
-    """How fast B^+ B drifts: b = min(DBp DBx, DBpx DB) Dh, per unit of |xdot|; 0 for a constant B."""
+    """How fast B^+ B drifts: b = min(DBp DBx, DBpx DB) Dh, per unit of |xdot|; 0 for a constant B, (4.7)."""
     return minimum(n.DBp * n.DBx, n.DBpx * n.DB) * n.Dh
 
 
 @quiet
 def speed_needed(n: Numbers[T], s: SampledState[T]) -> T:
-    """What Y has to exceed."""
+    """What Y has to exceed: phi + DB [du dbar + min(Dh + R_H, max(H1, S_T))] of theorem C."""
     return drift_bound(n) + n.DB * minimum(n.Dh + n.R, maximum(s.H1, s.S_T))
 
 
 @quiet
 def least_speed(n: Numbers[T], Ts: T, age: Ages[T]) -> T:
-    """The least Y, in closed form: every term of the minimum and maximum is affine in Y."""
+    """The least Y, in closed form: every term of the minimum and maximum is affine in Y (theorem C solved for Y)."""
     drift, b = drift_bound(n), _gain_drift(n)
     crude = drift + n.DB * (n.Dh + n.R)
     first = minimum(
@@ -129,7 +130,7 @@ def least_speed(n: Numbers[T], Ts: T, age: Ages[T]) -> T:
 
 @quiet
 def sampled_supremum(n: Numbers[T], Ts: T, omega: T, age: Ages[T], Y: T) -> T:
-    """max(d0, d1, sup D): what dbar has to exceed."""
+    """max(d0, d1, sup D): what dbar has to exceed, theorem C."""
     s = sampled_state(n, Ts, age, Y)
     return maximum(maximum(n.d0, s.d1), _bound(n, omega, s).supremum())
 
@@ -169,6 +170,7 @@ def margin_sampled_along(problem: TubeProblem, recipes: Sequence[SampledRecipe])
 def _margin(
     n: Numbers[Interval], Ts: Interval, omega: Interval, age: Ages[Interval], Y: Interval
 ) -> Interval:
+    """1 - max(d0, d1, sup D)/dbar of theorem C."""
     return (1 - sampled_supremum(n, Ts, omega, age, Y) / reach(n)).sanitised()
 
 
@@ -176,7 +178,10 @@ def _margin(
 
 
 def course_of(problem: TubeProblem, recipe: SampledRecipe) -> tuple[InWindow[Interval], ...]:
-    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts."""
+    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts.
+
+    (4.14), (4.17).
+    """
     if not cover(problem, recipe):
         raise ValueError("the windows of a recipe are those of its problem")
     Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
@@ -196,6 +201,7 @@ def suprema_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> tuple[flo
 
 @quiet
 def _margin_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
+    """The least margin of (4.18), if every window is longer than 2 Ts: theorem CW."""
     nothing = Interval(np.asarray(-np.inf), np.asarray(np.inf))
     if not problem.radius_serves(recipe.projection_radius, clips=True) or not cover(problem, recipe):
         return nothing
@@ -208,7 +214,7 @@ def _margin_in_windows(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
 
 @quiet
 def sampled_ceiling(problem: TubeProblem, recipe: SampledRecipe) -> float:
-    """An upper bound of the margin that any Y can prove at the recipe's gains; <= 0 refutes these gains.
+    """An upper bound of the margin that any Y can prove at the recipe's gains; <= 0 refutes these gains, theory 4.2.
 
     In windows nothing is refuted.
     """
@@ -222,7 +228,7 @@ def sampled_ceiling(problem: TubeProblem, recipe: SampledRecipe) -> float:
 
 
 def ultimate_radius(problem: TubeProblem, recipe: SampledRecipe) -> float | None:
-    """|x - x*| is at most this in the long run, proven; windows have an end."""
+    """|x - x*| is at most this in the long run, proven; windows have an end (A1 of (2.15))."""
     if recipe.windows:
         return None
     n = problem.proven(recipe.projection_radius)

@@ -63,6 +63,7 @@ def along(
 
 
 def _sensed(n: Numbers[T], Y: T) -> Sensed[T]:
+    """What (4.17) takes the larger of, in one window."""
     nothing = number(0, Y)
     other = beside(n)
     return Sensed(
@@ -79,7 +80,7 @@ def _sensed(n: Numbers[T], Y: T) -> Sensed[T]:
 
 
 def _first(n: Numbers[T], length: T, Y: T, loop: Loop[T]) -> InWindow[T]:
-    """The first sample, in which nothing is known of h; then the filter starts at rest."""
+    """The first sample, in which nothing is known of h; then the filter starts at rest, (4.9), (4.17)."""
     own = _sensed(n, Y)
     H1 = minimum(n.Dh, n.H0 + own.rate * loop.Ts)
     d1 = n.d0 * exp(-n.lam * loop.Ts) + (n.beta * H1 + pushed(n)) * loop.Ts * decay_mean(n.lam * loop.Ts)
@@ -90,6 +91,7 @@ def _first(n: Numbers[T], length: T, Y: T, loop: Loop[T]) -> InWindow[T]:
 
 
 def _following(n: Numbers[T], length: T, Y: T, loop: Loop[T], before: InWindow[T]) -> InWindow[T]:
+    """A later window of (4.17): two stretches."""
     own = _sensed(n, Y)
     both = own.with_before(before.sensed)
     look = 2 * loop.Ts

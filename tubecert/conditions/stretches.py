@@ -85,7 +85,7 @@ def through(n: Numbers[T], omega: T, stretches: Sequence[Stretch[T]], start: Gon
 
 
 def _towards(start: T, end: T, age: T) -> T:
-    """S + (mu - S) e^(-age)."""
+    """S + (mu - S) e^(-age), (4.14)."""
     return start * exp(-age) - end * expm1(-age)
 
 
@@ -111,7 +111,7 @@ class InParts(Protocol):
 
 
 def over(problem: TubeProblem, part: Part) -> TubeProblem:
-    """The problem with the constants of a part, as if its tube were all."""
+    """The problem with the constants of a part, as if its tube were all, theory 4f."""
     half = part.radius / 2
     wind = problem.wind
     return replace(

@@ -28,7 +28,7 @@ def _sum(first: T | None, second: T | None) -> T | None:
 
 
 def beside(n: Numbers[T]) -> T | None:
-    """|E w + r|: what moves the state and is no input; None without wind and unknown parameters."""
+    """|E w + r|: what moves the state and is no input; None without wind and unknown parameters, zeta of theory 7.5."""
     return _sum(n.wind_speed, n.rest_speed)
 
 

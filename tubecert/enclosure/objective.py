@@ -98,7 +98,7 @@ class SumOfNorms:
         return estimate_of(value * (1 + 1e-14), caused, e, lo, hi)
 
     def lower(self, lo: Array, hi: Array) -> Array:
-        """Norms at points, rounded down."""
+        """Norms at points, rounded down: additions only, below 90 u <= 1e-14 (Higham 2002, eq. 3.5)."""
         total = sum((spectral_norm(g).lo for g in self._function.at(lo, hi)), start=np.zeros(len(lo)))
         return np.asarray(total * (1 - 1e-14))
 

@@ -248,7 +248,7 @@ class SumOfPencils:
                 quotient = quadratic_form(v, mid, rad) / quadratic_form(v, *values[0])
                 best = np.fmax(best, np.where(np.isnan(quotient.lo), 0.0, quotient.mignitude))
             total = total + best
-        return total * (1 - 1e-14)
+        return total * (1 - 1e-14)  # as in `upper`: below 90 u
 
 
 def scalar(e: Expression, fixed: frozenset[str] = frozenset()) -> Pencil:

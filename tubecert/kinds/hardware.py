@@ -142,7 +142,7 @@ class HardwareSection(Section[HardwareRecipe]):
         )
 
     def _half_widths(self, dhat: Fraction) -> Mapping[str, float]:
-        """|x_i - x_i*| < dhat sup sqrt(W_ii)."""
+        """|x_i - x_i*| < dhat sup sqrt(W_ii), theorem H."""
         level = Interval.of(dhat)
         return {
             name: printable_above(float((Interval.exact(width) * level).hi))

@@ -139,7 +139,10 @@ class RatesSection(Section[RateRecipe]):
 
     @property
     def below_twice_rate(self) -> bool:
-        """Whether the bandwidth lies in the window below 2 lambda."""
+        """Whether the bandwidth lies in the window below 2 lambda.
+
+        Section 3 of the theory, "Windows below 2 lambda".
+        """
         return self.pair is not None and self.pair.recipe.bandwidth < 2 * self.problem.rate
 
     def claim(self) -> GainsSuffice:

@@ -127,7 +127,10 @@ def _window(
 def _ranges(
     problem: TubeProblem, part: Part, supremum: float, radius: Fraction
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """u_i in [inf u*_i - du D - R, sup u*_i + du D + R]; nothing where du has no bound."""
+    """u_i in [inf u*_i - du D - R, sup u*_i + du D + R]; nothing where du has no bound.
+
+    (4.13) in a window, theorems BW and CW.
+    """
     added = shares_in(problem, part, supremum, radius)
     if added is None:
         return

@@ -36,7 +36,7 @@ def agrees(obstacles: Sequence[Obstacle], found: Sequence[Cleared]) -> Iterator[
 
 
 def shaped(place: Place, obstacle: Obstacle, shape: Shape) -> Outcome:
-    """The block of W in the plane of the obstacle is bounded over the tube as stated."""
+    """The block of W in the plane of the obstacle is bounded over the tube as stated, theory 4c."""
     i, j = (place.system.states.index(name) for name in obstacle.states)
     W, (low, high) = place.system.W, shape.beside
     above = (
@@ -49,7 +49,7 @@ def shaped(place: Place, obstacle: Obstacle, shape: Shape) -> Outcome:
 
 
 def keeps_away(place: Place, obstacle: Obstacle, own: Cleared, lower: Fraction) -> Outcome:
-    """The clearance is at least what is stated, at all times."""
+    """The clearance is at least what is stated, at all times, (4.12)."""
     least = own.clearance.below
     if least is None or least <= 0:
         return stated(False, "no clearance is stated")
@@ -139,14 +139,14 @@ def _turned() -> Iterator[Point]:
 
 
 def _square(shape: Shape, c: Point) -> Fraction:
-    """sup c'Wc at most."""
+    """sup c'Wc at most: s(c)^2/dbar^2 of theory 4c."""
     product = 2 * c[0] * c[1]
     beside = max(product * value for value in shape.beside)
     return c[0] ** 2 * shape.diagonal[0] + c[1] ** 2 * shape.diagonal[1] + beside
 
 
 def _tops(obstacle: Obstacle) -> Iterator[list[Fraction]]:
-    """The largest c'o over every convex part."""
+    """The largest c'o over every convex part, (4.12)."""
     if obstacle.center is not None and obstacle.radius is not None:
         center, radius = obstacle.center, obstacle.radius
         yield [c * center[0] + s * center[1] + radius for c, s in _turned()]

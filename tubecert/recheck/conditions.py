@@ -86,33 +86,33 @@ class Setting:
 
     @property
     def still(self) -> bool:
-        """Whether nothing moves the state beside the inputs."""
+        """Whether nothing moves the state beside the inputs, zeta = 0 in theory 7.5."""
         return bool(self.rest <= 0) and (self.wind is None or bool(self.wind.size * self.wind_bound <= 0))
 
     @property
     def pushed(self) -> Ball:
-        """delta, and beta_w |w| with it: what lengthens the distance beside h."""
+        """delta, and beta_w |w| with it: what lengthens the distance beside h, (7.3)."""
         defect = self.n.plan_defect_metric
         return defect if self.wind is None else defect + self.wind.push * self.wind_bound
 
     @property
     def drifting(self) -> Ball:
-        """phi, and |E| |w| with it."""
+        """phi, and |E| |w| with it, (7.4)."""
         return self.n.drift_on_plan + self.blown
 
     @property
     def blown(self) -> Ball:
-        """|E| |w|."""
+        """|E| |w|, theory 7."""
         return arb(0) if self.wind is None else self.wind.size * self.wind_bound
 
     @property
     def beside(self) -> Ball:
-        """All that moves the state and is no input."""
+        """All that moves the state and is no input, zeta of theory 7.5."""
         return self.blown + self.rest
 
     @property
     def taken(self) -> Ball:
-        """|B^+ E| |w|: what an estimate takes for a part of h."""
+        """|B^+ E| |w|: what an estimate takes for a part of h, (7.6), (7.9)."""
         return arb(0) if self.wind is None else self.wind.explained * self.wind_bound
 
     @property
@@ -122,7 +122,7 @@ class Setting:
 
     @property
     def reach(self) -> Ball:
-        """dbar = sqrt(a) rho."""
+        """dbar = sqrt(a) rho, section 0 of the theory."""
         return root(self.n.lower) * exact(self.rho)
 
     @property
@@ -131,7 +131,7 @@ class Setting:
         return None if self.system.horizon is None else exact(self.system.horizon)
 
     def radius_serves(self, R_H: Fraction, *, clipped: bool = False) -> bool:
-        """R_H >= sqrt(1 + nu) Dh; R_H >= Dh where the estimate is clipped."""
+        """R_H >= sqrt(1 + nu) Dh; R_H >= Dh where the estimate is clipped, (2.10)."""
         layer = Fraction(0) if clipped or self.system.smooth is None else self.system.smooth
         return R_H > 0 and bool(exact(R_H * R_H) >= exact(1 + layer) * self.n.h * self.n.h)
 
@@ -154,17 +154,17 @@ def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
     a, A, DB = n.lower, n.upper, n.B
     p = predictor(s, gains)
     kmax = setting.reach * n.feedback_gain
-    Dxdot = n.drift_on_plan + DB * (n.h + R + kmax)
-    s1 = n.h_t + n.h_x * Dxdot
-    Dxt = prediction_error(n, R, s1, p.q)
-    Deta = (n.B_pinv_x * Dxdot + n.B_pinv * (2 * omega + p.norm)) * Dxt
-    Dtheta = DB * A * Deta / lam
-    DPsix = 2 * n.B_x + DB * n.M_x / a
-    Dgs = (
+    Dxdot = n.drift_on_plan + DB * (n.h + R + kmax)  # (3.1)
+    s1 = n.h_t + n.h_x * Dxdot  # (3.1)
+    Dxt = prediction_error(n, R, s1, p.q)  # (2.11)
+    Deta = (n.B_pinv_x * Dxdot + n.B_pinv * (2 * omega + p.norm)) * Dxt  # (2.13)
+    Dtheta = DB * A * Deta / lam  # (3.2)
+    DPsix = 2 * n.B_x + DB * n.M_x / a  # (3.5)
+    Dgs = (  # (3.5)
         root(A / a) * (n.f_x + (n.h + R + n.u_star + kmax) * n.b_x + n.h_x * DB)
         + root(A) * n.feedback_gain * DB
     )
-    DPsidot = A * (DB * Dgs + DB * n.M_x * Dxdot / root(A * a) + n.B_x * Dxdot)
+    DPsidot = A * (DB * Dgs + DB * n.M_x * Dxdot / root(A * a) + n.B_x * Dxdot)  # (3.5)
     kernel = paper_kernel if s.kernel == "paper" else tight_kernel
     k = kernel(2 * lam, omega, n.h, s1)
     return {
@@ -176,9 +176,9 @@ def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
         "Psi_x": DPsix,
         "geodesic_rate": Dgs,
         "Psi_rate": DPsidot,
-        "zeta_1": 2 * rho * DB * (A / a) * k,
-        "zeta_2": A * DPsix * k,
-        "zeta_3": n.h_x * (4 * lam * A * DB + DPsidot) / (lam * omega),
+        "zeta_1": 2 * rho * DB * (A / a) * k,  # (3.3)
+        "zeta_2": A * DPsix * k,  # (3.3)
+        "zeta_3": n.h_x * (4 * lam * A * DB + DPsidot) / (lam * omega),  # (3.4)
     }
 
 
@@ -190,7 +190,7 @@ def margins_26(setting: Setting, gains: Gains) -> dict[str, Ball]:
     n = setting.n
     d, a = derived(setting, gains), n.lower
     rho_r, rho_a = exact(setting.rho - setting.rho_a), exact(setting.rho_a)
-    zeta_p = exact(setting.rho) * n.plan_defect_metric / (setting.rate * root(a))
+    zeta_p = exact(setting.rho) * n.plan_defect_metric / (setting.rate * root(a))  # (3.4)
     first = 1 - (n.initial_distance * n.initial_distance / a + d["zeta_1"] + zeta_p) / (rho_r * rho_r)
     rest = a - d["zeta_2"] - d["zeta_3"]
     third = 1 - d["theta"] / (rho_a * rest) / root(exact(gains.adaptation_rate)) if rest > 0 else arb("nan")
@@ -234,7 +234,7 @@ def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
 
 
 def speed_needed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
-    """phi + D_E |w| + DB [du dbar + min(Dh + R_H, error)]."""
+    """phi + D_E |w| + DB [du dbar + min(Dh + R_H, error)], (4.3), (7.4)."""
     n = setting.n
     return setting.drifting + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
 
@@ -246,9 +246,9 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
         return None
     Y, e, S = proof.speed, proof.prediction_error, proof.uncertainty
     if not (
-        (n.h_t + n.h_x * Y) / omega <= S
-        and _error(setting, gains, Y) <= e
-        and speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y
+        (n.h_t + n.h_x * Y) / omega <= S  # (4.1)
+        and _error(setting, gains, Y) <= e  # (4.2), (7.9)
+        and speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y  # (4.3)
     ):
         return None
     return Distance(
@@ -265,7 +265,7 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
 
 
 def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
-    """The least Y that serves, with its S and e, a little larger: a proposal."""
+    """The least Y that serves, with its S and e, a little larger: a proposal, theory 4.6."""
     n, omega = setting.n, exact(gains.bandwidth)
 
     def needed(Y: Ball) -> Ball:
@@ -282,7 +282,10 @@ def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
 
 
 def risen(needed: Callable[[Ball], Ball]) -> Ball:
-    """A number just above the least fixed point of a rising function: iterated, extrapolated, inflated; a proposal."""
+    """A number just above the least fixed point of a rising function: iterated, extrapolated, inflated; a proposal.
+
+    Theory 4.6.
+    """
     Y = arb(0)
     for _ in range(_RISES):
         first = needed(Y).mid()
@@ -300,5 +303,5 @@ def risen(needed: Callable[[Ball], Ball]) -> Ball:
 
 
 def margin(setting: Setting, supremum: Ball) -> Ball:
-    """(dbar - sup)/dbar."""
+    """(dbar - sup)/dbar, of (4.4) and its like."""
     return 1 - supremum / setting.reach

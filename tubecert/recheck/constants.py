@@ -48,7 +48,9 @@ from tubecert.recheck.terms import (
 from tubecert.recheck.unknown import joins
 from tubecert.recheck.wind import added_to, least_sum
 
-_ROUND_UP = 1 + Fraction(1, 10**15)  # what a ball loses as a float
+_ROUND_UP = 1 + Fraction(
+    1, 10**15
+)  # the end of a ball as the float next to it: off by 2^-53 of itself at most
 _FIRST = 500  # boxes before another way is tried
 _FEW = 4  # variables in which boxes are poor
 
@@ -91,7 +93,10 @@ def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
 
 
 def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
-    """d(B^+) = G^-1 dB' (I - B B^+) - B^+ dB B^+, G = B'B: enclosures of the derivative of quotients would be wide."""
+    """d(B^+) = G^-1 dB' (I - B B^+) - B^+ dB B^+, G = B'B: enclosures of the derivative of quotients would be wide.
+
+    For (2.2).
+    """
     B = fields.B
     gram = times(turned(B), B)
     d = determinant(gram)
@@ -109,6 +114,7 @@ def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
 
 
 def _left_inverse(place: Place, limit: Fraction) -> Outcome:
+    """|B^+| <= t, (2.1): B'B >= I/t^2."""
     if not limit:
         return stated(False, "it is zero")
     gram = times(turned(place.fields.B), place.fields.B)
@@ -144,10 +150,12 @@ def _excess(place: Place, limit: Fraction) -> Outcome:
 
 
 def _input_on_plan(place: Place, limit: Fraction) -> Outcome:
+    """Dus on the plan, assumption 2."""
     return place.along(lambda: NormsBelow([[[e] for e in place.curve.u]], limit, place.numbers))
 
 
 def _drift(place: Place, limit: Fraction) -> Outcome:
+    """phi, (2.4)."""
     s, curve = place.system, place.curve
     drift = place.fields.drift
     if curve.moves and len(curve.parts) == 1:
@@ -158,6 +166,7 @@ def _drift(place: Place, limit: Fraction) -> Outcome:
 
 
 def _metric_input_gain(place: Place, limit: Fraction) -> Outcome:
+    """beta <= t, (2.5): t^2 W >= B B'."""
     s = place.system
     W, BBt = place.on_plan(s.W), place.on_plan(s.BBt)
     S = plus(scaled(limit**2, W), BBt, -1)
@@ -184,7 +193,7 @@ def _plan_defect(place: Place, limit: Fraction) -> Outcome:
 
 
 def _allowed_defect(place: Place, curve: Everyone, limit: Fraction) -> Outcome:
-    """|S p| <= |S| |p|, attained by some p that is allowed; |p| where there is no S."""
+    """|S p| <= |S| |p|, attained by some p that is allowed; |p| where there is no S, (4.10)."""
     if place.coordinates is None:
         return stated(limit >= curve.limit, "it is below the defect that is allowed")
     own = exact(curve.limit) * sharp_norm([[exact(q) for q in row] for row in place.coordinates.S])
@@ -192,7 +201,7 @@ def _allowed_defect(place: Place, curve: Everyone, limit: Fraction) -> Outcome:
 
 
 def _allowed_defect_metric(place: Place, curve: Everyone, limit: Fraction) -> Outcome:
-    """|Theta p| <= limit on P for every |p| that is allowed: M <= (limit/|p|)^2 I."""
+    """|Theta p| <= limit on P for every |p| that is allowed: M <= (limit/|p|)^2 I, (4.10)."""
     if not curve.limit or not limit:
         return stated(limit >= curve.limit, "it is below the defect that is allowed")
     s = place.system
@@ -201,6 +210,7 @@ def _allowed_defect_metric(place: Place, curve: Everyone, limit: Fraction) -> Ou
 
 
 def _plan_defect_metric(place: Place, limit: Fraction) -> Outcome:
+    """|Theta p| <= t, (2.7): [W p; p' t^2] >= 0."""
     if isinstance(place.curve, Everyone):
         return _allowed_defect_metric(place, place.curve, limit)
     p = defect(place)
@@ -224,7 +234,10 @@ def _uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
 
 
 def _joined(place: Place, limit: Fraction, name: str, known: Matrix, added: list[Matrix]) -> Outcome:
-    """Of h + B^+ (f(x, theta) - f(x)), and of B^+ E w with it: with the declared bound of h, and with h as it is."""
+    """Of h + B^+ (f(x, theta) - f(x)), and of B^+ E w with it: with the declared bound of h, and with h as it is.
+
+    (7.1).
+    """
     s, outcomes = place.system, []
     if name in s.declared:
         outcomes.append(_with_known(place, limit - _declared(place, name), name, known, added))
@@ -234,7 +247,7 @@ def _joined(place: Place, limit: Fraction, name: str, known: Matrix, added: list
 
 
 def _with_known(place: Place, room: Fraction, name: str, entries: Matrix, added: list[Matrix]) -> Outcome:
-    """Of the entries, and of what a disturbance adds to them."""
+    """Of the entries, and of what a disturbance adds to them, (7.1)."""
     if room < 0:
         return stated(False, "it is below what is declared")
     if name == "h":
@@ -250,7 +263,7 @@ def _with_known(place: Place, room: Fraction, name: str, entries: Matrix, added:
 
 
 def _declared(place: Place, name: str) -> Fraction:
-    """A declared bound, in z where it is a Lipschitz constant; rounded up."""
+    """A declared bound, in z where it is a Lipschitz constant; rounded up, theory 1a."""
     own = place.system.declared[name]
     if name != "h_x" or place.coordinates is None:
         return own
@@ -259,7 +272,10 @@ def _declared(place: Place, name: str) -> Fraction:
 
 
 def _adapted(place: Place, limit: Fraction, name: str) -> Outcome:
-    """Of h + B^+ E w: together with what the second part adds; where that fails, the first has what that leaves."""
+    """Of h + B^+ E w: together with what the second part adds; where that fails, the first has what that leaves.
+
+    (7.1).
+    """
     s, added = place.system, added_to(place, name)
     if not added:
         return _own_uncertainty(place, limit, name)
@@ -340,6 +356,7 @@ def half_width(place: Place, row: Sequence[Fraction], width: Fraction, lower: Fr
     """|c'(x - x*)| <= min(|c| rho, sqrt(a) rho sup sqrt(c'W c)) <= width; without rho where it is no length in x.
 
     In coordinates of its own the tube is cut to the half-widths: the supremum is over what they leave.
+    (1.7), (1.8), theory 4.3.
     """
     if width <= 0:
         return stated(False, "it is not positive")

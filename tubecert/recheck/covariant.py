@@ -95,14 +95,14 @@ class _Geometry:
 
     @cached_property
     def symbols(self) -> list[Matrix]:
-        """G^kab: a matrix (a, b) for every k."""
+        """G^kab: a matrix (a, b) for every k, (5.2)."""
         D = self.raised(self.W)
         n = range(len(self.W))
         half = number(_HALF)
         return [[[half * (D[k][a][b] - D[a][k][b] - D[b][k][a]) for b in n] for a in n] for k in n]
 
     def derivative(self, X: Rows) -> Matrix:
-        """D (D^b X)_k, (k, b), of a column X."""
+        """D (D^b X)_k, (k, b), of a column X, theory 8.6."""
         X_x = turned([[row[0] for row in slope] for slope in self.slopes(X)])
         lowered = [row[0] for row in times(self.dM, X)]
         straight = times(X_x, self.W)
@@ -112,7 +112,7 @@ class _Geometry:
         ]
 
     def bivectors(self) -> tuple[Matrix, Matrix]:
-        """D R_ijkl and the metric of bivectors, i < j against k < l."""
+        """D R_ijkl and the metric of bivectors, i < j against k < l, theory 8.6."""
         pairs = list(combinations(range(len(self.W)), 2))
         W, R = self.W, self._curvature()
         form = [[W[i][k] * W[j][m] - W[i][m] * W[j][k] for k, m in pairs] for i, j in pairs]
@@ -177,6 +177,7 @@ def _dot(a: Sequence[Term], b: Sequence[Term]) -> Term:
 
 
 def _drift_slope(g: _Geometry, limit: Fraction) -> Outcome:
+    """D_nX of theory 8.6."""
     Z = g.derivative(g.drift)
     if all_zero(Z):
         return stated(True, "")
@@ -185,7 +186,7 @@ def _drift_slope(g: _Geometry, limit: Fraction) -> Outcome:
 
 
 def _form_slope(g: _Geometry, limit: Fraction) -> Outcome:
-    """Direction by direction of p, both signs of which are opposite directions."""
+    """Direction by direction of p, both signs of which are opposite directions: D_nF of theory 8.6."""
     F, n = g.place.system.F, range(len(g.W))
     mixed = times(g.dM, F)
     found = []
@@ -204,7 +205,7 @@ def _form_slope(g: _Geometry, limit: Fraction) -> Outcome:
 
 
 def _input_slope(g: _Geometry, limit: Fraction) -> Outcome:
-    """On the plan; a plan that rests does not turn B."""
+    """On the plan; a plan that rests does not turn B: D_nb of theory 8.6."""
     place = g.place
     if not (place.curve.moves or place.curve.ranges):
         return stated(True, "")
@@ -224,10 +225,12 @@ def _input_slope(g: _Geometry, limit: Fraction) -> Outcome:
 
 
 def _input_gain(g: _Geometry, limit: Fraction) -> Outcome:
+    """beta_O of theory 8.6."""
     return g.definite(plus(scaled(limit**2, g.W), g.place.system.BBt, -1), g.W)
 
 
 def _drift_metric(g: _Geometry, limit: Fraction) -> Outcome:
+    """phi_M of theory 8.6."""
     X = g.drift
     if all_zero(X):
         return stated(True, "")
@@ -236,6 +239,7 @@ def _drift_metric(g: _Geometry, limit: Fraction) -> Outcome:
 
 
 def _curvature(g: _Geometry, limit: Fraction) -> Outcome:
+    """K_R of theory 8.6."""
     R, form = g.bivectors()
     if all_zero(R) or not R:
         return stated(True, "")

@@ -52,6 +52,7 @@ class Evaluation:
     """(H.6)-(H.12), term by term."""
 
     def __init__(self, setting: Setting, machine: MachineNumbers, promise: Promise, at: Digital) -> None:
+        """The numbers of theory 8.3, from those of a recipe."""
         self.setting, self.n, self.m, self.at, self.promise = setting, setting.n, machine, at, promise
         self.lam = setting.rate
         self.Ts, self.tau, self.Tf = exact(at.sample_time), exact(at.delay), exact(at.feedback_time)
@@ -103,13 +104,14 @@ class Evaluation:
 
     @property
     def push(self) -> Ball:
-        """|u + h - u*|, as it acts."""
+        """|u + h - u*|, as it acts, by (H.4)."""
         return self.most * (self.kb + self.ups + self.X)
 
     def _feedforward(self) -> Ball:
         """Ups: |u0 - u*|, where u0 is u* at the sample, which is at most Ts + tau old, and how u is rounded.
 
         What a computed geodesic makes of |kappa| belongs to it as well.
+        (H.6a), (H.36), (H.42).
         """
         if not self.promise.held:
             return self.lost_input + self._beyond
@@ -119,7 +121,10 @@ class Evaluation:
         return held + self.lost_input + self._beyond
 
     def _computed(self) -> Cost | None:
-        """What geodesics cost; None where they are exact, or where what they cost has no bound (see `serves`)."""
+        """What geodesics cost; None where they are exact, or where what they cost has no bound (see `serves`).
+
+        (H.41), (H.42).
+        """
         if self.promise.arcs is None:
             return None
         n, m, far = self.n, self.m, self.level + self.n_M
@@ -180,7 +185,10 @@ class Evaluation:
         return (1 - self.th) / self.th * self.rate * Ts + e + self._mistaken()
 
     def _mistaken(self) -> Ball:
-        """What Delta makes of kappa, of u0 - u* and of what the last sample's input missed: no part of h, but seen."""
+        """What Delta makes of kappa, of u0 - u* and of what the last sample's input missed: no part of h, but seen.
+
+        (H.34).
+        """
         missed = self.S + self.N + self.rate * (self.Ts / 2 + self.tau)
         return self.g * (self.kb + self.ups + missed)
 
@@ -205,7 +213,7 @@ class Evaluation:
     # -- the feedback
 
     def bending(self) -> Ball:
-        """Chi."""
+        """Chi, (5.1)."""
         rho = exact(self.setting.rho)
         return 1 - self.m.symbols * rho - self.m.symbols_slope * rho * rho / 8
 
@@ -258,7 +266,7 @@ class Evaluation:
         return self._distance(delta_1, delta, ell, base, (ell0 * (1 + moved), loss * (1 + moved)))
 
     def _by_metric(self, m: Bent, slope: Ball) -> tuple[Ball, Ball] | None:
-        """(H.8c), (H.9c): lengths are measured by the metric, along geodesics; None where chi' may not be positive."""
+        """(H.18), (H.19): lengths are measured by the metric, along geodesics; None where chi' may not be positive."""
         n = self.n
         K = m.curvature * n.lower * exact(self.setting.rho) ** 2
         chi = 1 - K / 8
@@ -338,7 +346,7 @@ class Evaluation:
 
     @property
     def first_phase(self) -> Ball:
-        """How long the first samples act: t_a."""
+        """How long the first samples act: t_a, theory 8.4."""
         return larger(self.Ts, self.Tf) + self.tau
 
     def begun(self, d0: Ball, d1: Ball, steep: tuple[Ball, Ball]) -> tuple[Ball, Ball]:
@@ -352,9 +360,9 @@ class Evaluation:
         return larger(bound.d0, bound.ultimate()) if at_once else bound.supremum()
 
     def _gust(self) -> Ball:
-        """What wind adds to the bias of the estimate."""
+        """What wind adds to the bias of the estimate, (H.6)."""
         return self.matched + self.n.B_pinv_x * self.blown * (self.Y * self.Ts / 2 + self.nbar)
 
     def tooth(self, T: Ball) -> Ball:
-        """Mu: the weighted mean of a saw-tooth of period T, T/(1 - e^(-lambda T)) - 1/lambda."""
+        """Mu: the weighted mean of a saw-tooth of period T, T/(1 - e^(-lambda T)) - 1/lambda, theory 8.3."""
         return smaller(larger(T / -(-self.lam * T).expm1() - 1 / self.lam, T / 2), T)

@@ -13,7 +13,7 @@ from tubecert.recheck.balls import Ball, larger, smaller
 
 
 def log_ratio(x: Ball) -> Ball:
-    """log(1 + x)/x, 1 at 0; it falls with x."""
+    """log(1 + x)/x, 1 at 0; it falls with x, the r of (2.16)."""
     if x.is_zero():
         return arb(1)
     if not x.contains(0):
@@ -64,7 +64,7 @@ class Distance:
     horizon: Ball | None
 
     def ultimate(self) -> Ball:
-        """A1."""
+        """A1, (2.15)."""
         return (self.beta * (self.S + self.e) + self.delta) / self.rate
 
     def supremum(self) -> Ball:
@@ -94,7 +94,7 @@ class Distance:
         return larger(ends, peak) if peak.is_finite() else larger(ends, weak)
 
     def at(self, t: Ball) -> Ball:
-        """D(t)."""
+        """D(t), (2.15)."""
         A1, C1 = self.ultimate(), self.beta * (self.H0 - self.S)
         slow, fast = (-self.rate * t).exp(), (-self.omega * t).exp()
         D1 = self.omega - self.rate

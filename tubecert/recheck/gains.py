@@ -98,10 +98,10 @@ class Factors:
         return bool(self.g < 1)
 
     def kept(self, kept: Ball) -> Ball:
-        """The root of r^2 = kept r + (1 - kept) g: what is left of a wrong estimate after a sample."""
+        """The root of r^2 = kept r + (1 - kept) g: what is left of a wrong estimate after a sample, (H.35)."""
         return (kept + root(kept * kept + 4 * (1 - kept) * self.g)) / 2
 
 
 def factors(g: Ball | None) -> Factors | None:
-    """Of an uncertain gain; None where it is known."""
+    """Of an uncertain gain; None where it is known, (H.30), (H.33)."""
     return None if g is None else Factors(g, 1 + g, 1 / (1 - g))

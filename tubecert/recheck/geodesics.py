@@ -31,7 +31,7 @@ Tensor = dict[tuple[int, ...], Ball]
 
 
 def unique(place: Place, limit: Fraction) -> Outcome:
-    """G rho + L rho^2/8 <= limit over the tube."""
+    """G rho + L rho^2/8 <= limit over the tube, (5.1)."""
     s, rho = place.system, place.rho
     if s.flat:
         return stated(limit >= 0, "it is negative")
@@ -139,7 +139,7 @@ class SymbolsBelow:
         return best
 
     def _symbols(self, matrices: Sequence[arb_mat]) -> Tensor:
-        """Gamma^k_ij as [k, i, j]."""
+        """Gamma^k_ij as [k, i, j], (5.2)."""
         W, first = matrices[0], matrices[1:]
         M = W.inv()
         D = {i: w * M for i, w in zip(self._moving, first, strict=True)}
@@ -147,13 +147,14 @@ class SymbolsBelow:
         return self._assembled(D, self._forms(W, S))
 
     def _forms(self, W: arb_mat, S: dict[int, arb_mat]) -> Tensor:
-        """sum_l W_kl (S_l)_ij."""
+        """sum_l W_kl (S_l)_ij, a term of (5.2)."""
         return {
             (k, i, j): sum((W[k, l] * S[l][i, j] for l in S), start=arb(0))
             for k, i, j in product(range(self._n), repeat=3)
         }
 
     def _assembled(self, D: dict[int, arb_mat], forms: Tensor) -> Tensor:
+        """(5.2) from its terms."""
         nothing = arb(0)
         return {
             (k, i, j): (value - (D[i][k, j] if i in D else nothing) - (D[j][k, i] if j in D else nothing)) / 2
@@ -161,7 +162,7 @@ class SymbolsBelow:
         }
 
     def _slopes(self, matrices: Sequence[arb_mat]) -> Tensor:
-        """dGamma^k_ij/dx_m as [k, i, j, m]."""
+        """dGamma^k_ij/dx_m as [k, i, j, m], (5.2) differentiated."""
         count, moving = len(self._moving), self._moving
         W, first, second = matrices[0], matrices[1 : count + 1], matrices[count + 1 :]
         M = W.inv()

@@ -126,7 +126,10 @@ def ranges(key: str, section: Section) -> Mapping[str, Range] | None:
 
 
 def _follows(own: Limited, bound: InputBound, stated: Mapping[str, Range] | None) -> bool:
-    """Whether a bound contains the range that is stated, or leaves room for u* on the plan and all that is added."""
+    """Whether a bound contains the range that is stated, or leaves room for u* on the plan and all that is added.
+
+    (4.13).
+    """
     if stated is not None:
         found = stated.get(own.name)
         return found is not None and bound.least <= found[0] and found[1] <= bound.greatest
@@ -137,7 +140,7 @@ def _follows(own: Limited, bound: InputBound, stated: Mapping[str, Range] | None
 
 
 def on_plan(place: Place, own: Limited) -> Outcome:
-    """u* of the input stays in the range that is stated, at all times of the plan."""
+    """u* of the input stays in the range that is stated, at all times of the plan, (4.13)."""
     low, high = own.least.below, own.greatest.above
     if low is None or high is None:
         return stated(False, "no range is stated")

@@ -30,7 +30,7 @@ class Stay:
 
     @property
     def rate(self) -> Ball:
-        """Dht + Dhx Y: how fast h changes along the loop."""
+        """Dht + Dhx Y: how fast h changes along the loop, (4.15)."""
         return self.setting.n.h_t + self.setting.n.h_x * exact(self.speed)
 
 
@@ -128,6 +128,7 @@ class _Estimator:
     """What the estimator of B does in one window, (4.15), (4.16)."""
 
     def __init__(self, stay: Stay, gains: Gains) -> None:
+        """V and k of (4.15)."""
         self.stay, self.gains = stay, gains
         n, setting = stay.setting.n, stay.setting
         p, R = predictor(setting.system, gains), exact(gains.projection_radius)
@@ -140,13 +141,13 @@ class _Estimator:
         self.turning = n.B_pinv_x * exact(stay.speed) + n.B_pinv * p.shifted
 
     def after(self, held: Ball | None, t: Ball) -> Ball:
-        """V at a time of the window at most, `held` where it begins; None in the first window."""
+        """V at a time of the window at most, `held` where it begins; None in the first window, v(s) of (4.15)."""
         if held is None:
             return self.settled
         return self.settled + larger(held - self.settled, arb(0)) * (-self.forgets * t).exp()
 
     def legs(self, held: Ball | None, settling: Fraction) -> list[Leg]:
-        """One in the first window; then one in which what is held is larger, and the rest."""
+        """One in the first window; then one in which what is held is larger, and the rest, (4.16)."""
         length = exact(self.stay.length)
         if held is None:
             return [self._leg(length, self.settled)]
@@ -157,6 +158,7 @@ class _Estimator:
         ]
 
     def _leg(self, length: Ball, V: Ball) -> Leg:
+        """A stretch of (4.16)."""
         n, omega, X = self.stay.setting.n, exact(self.gains.bandwidth), root(V)
         S = self.stay.rate / omega + self.turning * X + self.stay.setting.taken
         return Leg(length, S, omega * n.B_pinv * X, arb(0))

@@ -28,7 +28,10 @@ _KEPT = 1 - Fraction(1, 10**9)
 
 
 def straight_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
-    """|G| <= limit over the tube of a plan that stays where it is; None if the linear part leaves too little."""
+    """|G| <= limit over the tube of a plan that stays where it is; None if the linear part leaves too little.
+
+    Theory 1a.7.
+    """
     states, start = place.system.states, place.curve.start
     if not names(column) <= set(states) or any(e.op != "const" for e in start):
         return None

@@ -52,7 +52,7 @@ def stated(holds: bool, why: str) -> Outcome:
 
 
 def lower_bound(s: System, a: Fraction, domain: Domain, budget: int, unit: Rows | None = None) -> Outcome:
-    """M >= a I; M >= a unit^-1 for another constant unit."""
+    """M >= a I; M >= a unit^-1 for another constant unit, (1.1)."""
     if a <= 0:
         return stated(False, "it is not positive")
     own = unit_matrix(len(s.states)) if unit is None else unit
@@ -89,7 +89,7 @@ def _not_killing(s: System, defect: Matrix, name: str) -> Outcome:
 
 
 def contraction(s: System, margin: Fraction, budget: int) -> Outcome:
-    """C2 at the rate plus `margin`: N'(F0 + 2 (rate + margin) W) N < 0 for a basis N of the null space of B'."""
+    """C2 at the rate plus `margin`: N'(F0 + 2 (rate + margin) W) N < 0 for a basis N of the null space of B', (1.2)."""
     domain = on_set(s)
     found = null_space(s, domain, budget)
     if isinstance(found, Outcome):
@@ -100,7 +100,7 @@ def contraction(s: System, margin: Fraction, budget: int) -> Outcome:
 
 
 def null_space(s: System, domain: Domain, budget: int) -> Matrix | Outcome:
-    """N (n, n - m) with B'N = 0 and full rank, from m rows of B that are proven independent everywhere."""
+    """N (n, n - m) with B'N = 0 and full rank, from m rows of B that are proven independent everywhere, theory 1.3."""
     n, m = len(s.states), len(s.inputs)
     centre = [exact((lo + hi) / 2) for lo, hi in (s.safe_set[name] for name in s.states)]
     minors = []

@@ -38,7 +38,7 @@ def _corners(sizes: Numbers) -> Iterator[Matrix]:
 
 
 def noise_size(place: Place, limit: Fraction, noise: Numbers | None) -> Outcome:
-    """|S n|."""
+    """|S n|, n_E of theory 8.2."""
     S = None if place.coordinates is None else [[exact(q) for q in row] for row in place.coordinates.S]
     if noise is None:
         most = arb(1) if S is None else sharp_norm(S)
@@ -58,7 +58,7 @@ def _number(e: Term) -> Fraction:
 
 
 def noise_metric(place: Place, limit: Fraction, noise: Numbers | None) -> Outcome:
-    """|Theta n|: M <= limit^2, or at every corner."""
+    """|Theta n|: M <= limit^2, or at every corner, n_M of theory 8.2."""
     if noise is None:
         return upper_bound(place.system, limit**2, place.tube(), place.budget)
     if not any(noise):
@@ -72,7 +72,7 @@ def noise_metric(place: Place, limit: Fraction, noise: Numbers | None) -> Outcom
 
 
 def noise_explained(place: Place, limit: Fraction, noise: Numbers | None) -> Outcome:
-    """|(S B)^+ S n|: B'S' S S' S B <= limit^2 (B'S'S B)^2, or at every corner."""
+    """|(S B)^+ S n|: B'S' S S' S B <= limit^2 (B'S'S B)^2, or at every corner, n_B of theory 8.2."""
     fields = place.fields
     B = fields.B
     if noise is None:

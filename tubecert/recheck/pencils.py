@@ -143,7 +143,7 @@ class GainBelow:
         self._size = float(limit) * sum(abs(float(e.mid())) for e in entries)
 
     def over(self, box: Box) -> Found:
-        """With the tangent at the geometric middle of mu."""
+        """With the tangent at the geometric middle of mu, theory 2.1."""
         if self._place is None:
             return self._test.over(box)
         lo, hi = box[self._place]

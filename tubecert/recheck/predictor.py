@@ -40,7 +40,7 @@ class Predictor:
 
 
 def predictor(s: System, gains: Gains) -> Predictor:
-    """The predictor of the loop; not numbers if the gains name another one than the specification."""
+    """The predictor of the loop; not numbers if the gains name another one than the specification, (2.11)-(2.13)."""
     omega, given, g = exact(gains.bandwidth), s.A_m, gains.predictor_gain
     if g is not None:
         same = given is None or all(
@@ -59,7 +59,7 @@ def predictor(s: System, gains: Gains) -> Predictor:
 
 @lru_cache(maxsize=256)
 def _matrix_predictor(given: tuple[tuple[Fraction, ...], ...], omega: Fraction) -> Predictor:
-    """The predictor of a general A_m."""
+    """The predictor of a general A_m, (2.11)-(2.13)."""
     n = len(given)
     with ctx.workprec(_BITS):
         A = [[exact(e) for e in row] for row in given]

@@ -39,7 +39,10 @@ def _difference(place: Place, column: Matrix) -> Matrix:
 
 
 def drift_difference(place: Place, limit: Fraction) -> Outcome:
-    """Rho times the slope of f + B u* by z, or the difference itself where the plan is one curve."""
+    """Rho times the slope of f + B u* by z, or the difference itself where the plan is one curve.
+
+    Phi_rel of theory 8.2.
+    """
     s, curve = place.system, place.curve
     column = s.drift
     if not curve.moves and not curve.ranges:
@@ -101,7 +104,7 @@ def drift_difference_metric(place: Place, limit: Fraction, known: Known) -> Outc
 
 
 def drift_slope_metric(place: Place, limit: Fraction) -> Outcome:
-    """D_A."""
+    """D_A of theory 8.2."""
     if not is_flat(place):
         return stated(False, "the metric or B is not constant")
     return _slope_in_metric(place, limit**2)

@@ -44,7 +44,7 @@ _ALONG = "r#"  # no state can have this name
 
 
 def offset(place: Place) -> Ball:
-    """|S (x0 - x*(0))|, an upper bound."""
+    """|S (x0 - x*(0))|, an upper bound, as in theory 2.11."""
     s, coordinates = place.system, place.coordinates
     if s.within is not None:
         stretch = (
@@ -75,7 +75,7 @@ def _delta(x0: Numbers, curve: Curve) -> list[Term]:
 
 
 def radius(place: Place, width: Fraction, lower: Fraction, upper: Fraction) -> Outcome:
-    """rho >= sqrt(A/a)|S (x0 - x*(0))| + eps + rho_a for the true a and A over the tube.
+    """rho >= sqrt(A/a)|S (x0 - x*(0))| + eps + rho_a for the true a and A over the tube, theory 2.11.
 
     `width` is eps + rho_a. What is printed are bounds, rounded outward. Where rho is too small for them it may still
     serve for the true values: then bounds that are as much sharper as needed are proven here.
@@ -133,7 +133,7 @@ def _bounds(place: Place, lower: Fraction, upper: Fraction) -> tuple[Outcome, Ou
 
 
 def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
-    """The segment from x*(0) to x0 is at most `limit` long; with a constant metric, that to every corner."""
+    """The segment from x*(0) to x0 is at most `limit` long; with a constant metric, that to every corner, (2.6)."""
     s = place.system
     if s.within is not None:
         known = place.coordinates is None and limit**2 >= upper * s.within**2
@@ -151,7 +151,10 @@ def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
 
 
 def _from_centre(place: Place, limit: Fraction, upper: Fraction, box: dict[str, Range]) -> Outcome:
-    """d0 <= the segment to the centre of the box + sqrt(A) r, r its radius: a corner is no further from the centre."""
+    """d0 <= the segment to the centre of the box + sqrt(A) r, r its radius: a corner is no further from the centre.
+
+    Theory 1a.3.
+    """
     s = place.system
     sides = [box[name] for name in s.states]
     delta = _delta(tuple((low + high) / 2 for low, high in sides), place.curve)
@@ -201,7 +204,7 @@ class _Speed:
         self._delta = arb_mat([[d] for d in Program(delta, ()).run(())])
 
     def over_pieces(self, count: int) -> tuple[Ball, Ball]:
-        """The length of the segment from below and above."""
+        """The length of the segment from below and above, (2.6)."""
         low, high, width = arb(0), arb(0), arb(1) / count
         for k in range(count):
             ends = arb(k) / count, arb(k + 1) / count

@@ -36,7 +36,7 @@ class Unknown:
 
     @cached_property
     def reached(self) -> Matrix:
-        """B^+ of it, (m, 1): what an input can make."""
+        """B^+ of it, (m, 1): what an input can make, (7.1)."""
         B = self.fields.B
         gram = times(turned(B), B)
         d = determinant(gram)

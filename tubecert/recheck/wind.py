@@ -40,7 +40,7 @@ class Blown:
 
     @cached_property
     def explained(self) -> Matrix:
-        """B^+ E, (m, k)."""
+        """B^+ E, (m, k), (7.1)."""
         B = self.fields.B
         gram = times(turned(B), B)
         d = determinant(gram)
@@ -75,7 +75,10 @@ def bounded(place: Place, name: str, limit: Fraction, matched: Fraction | None) 
 
 
 def push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
-    """|g'M E| <= limit for a unit geodesic g: smax(Theta E), or `matched` (beta eps_w) with that of (I - B B^+) E."""
+    """|g'M E| <= limit for a unit geodesic g: smax(Theta E), or `matched` (beta eps_w) with that of (I - B B^+) E.
+
+    (7.2).
+    """
     own = blown(place)
     found = metric_norm(place, own.E, limit)
     if found.holds or matched is None or own.wind.rate is not None:
@@ -85,7 +88,7 @@ def push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
 
 
 def metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
-    """limit^2 W >= E E'."""
+    """|Theta E| <= limit: limit^2 W >= E E', (7.2)."""
     if all_zero(E):
         return stated(limit >= 0, "it is negative")
     if limit <= 0:

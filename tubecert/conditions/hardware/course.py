@@ -31,7 +31,7 @@ class Ages(Generic[T]):
 
 
 def ages_of_feedback(loop: Loop[T]) -> Ages[T]:
-    """[tau, tau + Tf]; [0, Tf] with prediction."""
+    """[tau, tau + Tf]; [0, Tf] with prediction, theory 8.4 and 8.5."""
     if loop.np is None:
         oldest = loop.Tf + loop.tau
         return Ages(youngest=loop.tau, oldest=oldest, first=oldest)
@@ -115,7 +115,10 @@ def resumed(p: Plant[T], loop: Loop[T], e: Estimate[T], cost: Loss[T], at: T) ->
 
 
 def base_of(p: Plant[T], loop: Loop[T], e: Estimate[T]) -> T:
-    """What pushes whatever the feedback knows: the plan's defect, u* that is held, the wind, and rounding."""
+    """What pushes whatever the feedback knows: the plan's defect, u* that is held, the wind, and rounding.
+
+    The base of theory 8.3, with (H.36).
+    """
     base = p.n.delta + acting(p, p.n.beta) * e.ups + p.beta_w * loop.wbar
     # Lam <= r_a + ell(age) (d + move), and d >= f0 where it counts, (H.36)
     return base if loop.lost is None else base + loop.lost.feedback / loop.f0

@@ -93,7 +93,10 @@ class Estimate(Generic[T]):
 
 @quiet
 def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimate[T]:
-    """The estimate at Y, S, N (and np) of a recipe; `past` is that of the window before, if there is one."""
+    """The estimate at Y, S, N (and np) of a recipe; `past` is that of the window before, if there is one.
+
+    (H.6)-(H.11).
+    """
     n = p.n
     n_fb, e_fb = noise_in_feedback(p, loop)
     s1 = n.Dht + n.Dhx * loop.Y
@@ -133,13 +136,13 @@ def estimate(p: Plant[T], loop: Loop[T], past: Past[T] | None = None) -> Estimat
 
 
 def input_error(p: Plant[T], loop: Loop[T], geodesics: Inexact[T] | None) -> T:
-    """ups, with what computed geodesics make of the input."""
+    """ups, with what computed geodesics make of the input, (H.42)."""
     ups = feedforward_error(p, loop)
     return ups if geodesics is None else ups + geodesics.input
 
 
 def noise_in_feedback(p: Plant[T], loop: Loop[T]) -> tuple[T, T]:
-    """n_M and nbar; with prediction n_P = sqrt(A) np and np."""
+    """n_M and nbar; with prediction n_P = sqrt(A) np and np, theory 8.3 and 8.5."""
     n_M = loop.nu * p.m.n_M
     if loop.np is None:
         return n_M, loop.nu * p.m.n_E
@@ -157,12 +160,12 @@ def feedforward_error(p: Plant[T], loop: Loop[T]) -> T:
 
 
 def lag_of_filter(loop: Loop[T]) -> T:
-    """((1 - th)/th) Ts = Ts/(e^(omega Ts) - 1)."""
+    """((1 - th)/th) Ts = Ts/(e^(omega Ts) - 1), (H.6)."""
     return number(0, loop.Ts) if loop.omega is None else loop.Ts / expm1(loop.omega * loop.Ts)
 
 
 def gain_of_filter(loop: Loop[T]) -> T:
-    """th/Ts = (1 - e^(-omega Ts))/Ts, at most omega."""
+    """th/Ts = (1 - e^(-omega Ts))/Ts, at most omega, (H.7)."""
     return 1 / loop.Ts if loop.omega is None else loop.omega * decay_mean(loop.omega * loop.Ts)
 
 
@@ -190,7 +193,7 @@ def wind_in_estimate(p: Plant[T], loop: Loop[T]) -> T:
 
 
 def noise_felt(p: Plant[T], loop: Loop[T]) -> Sensed[T]:
-    """The two parts of N with the constants of one window."""
+    """The two parts of N with the constants of one window, (H.7)."""
     nbar = loop.nu * p.m.n_E
     return Sensed(explained=p.m.n_B, turned=p.n.DBpx * (loop.Y + 2 * nbar / loop.Ts) * nbar)
 

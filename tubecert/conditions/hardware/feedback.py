@@ -32,7 +32,7 @@ class Loss(Generic[T]):
     chi: T
 
     def at(self, age: T) -> T:
-        """ell(age)."""
+        """ell(age), (H.9)."""
         return self.ell0 + self.ell1 * age
 
 

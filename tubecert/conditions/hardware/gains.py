@@ -13,22 +13,22 @@ from tubecert.conditions.verdict import UNKNOWN, Shortfall
 
 
 def acting(p: Plant[T], x: T) -> T:
-    """|(I + Delta) v| of an input v that is at most x."""
+    """|(I + Delta) v| of an input v that is at most x, by (H.30)."""
     return x if p.gain is None else (1 + p.gain) * x
 
 
 def raised(p: Plant[T], x: T) -> T:
-    """x/(1 - D_b): what the feedback is multiplied by."""
+    """x/(1 - D_b): what the feedback is multiplied by, (H.33)."""
     return x if p.gain is None else x / (1 - p.gain)
 
 
 def steepness(p: Plant[T]) -> T:
-    """How much of |(I + Delta) kappa| there is per distance: du, or du (1 + D_b)/(1 - D_b)."""
+    """How much of |(I + Delta) kappa| there is per distance: du, or du (1 + D_b)/(1 - D_b), (H.33)."""
     return acting(p, raised(p, p.n.du))
 
 
 def applied(p: Plant[T], ups: T, kb: T) -> T:
-    """What B is multiplied by in x': |u + h|, or |u* + (I + Delta)(u - u* + h)|."""
+    """What B is multiplied by in x': |u + h|, or |u* + (I + Delta)(u - u* + h)|, by (H.32)."""
     n = p.n
     if p.gain is None:
         return n.Dus + ups + kb + n.R + n.Dh
@@ -43,12 +43,15 @@ def mistaken(p: Plant[T], loop: Loop[T], s1: T, kb: T, ups: T) -> T:
 
 
 def unpredicted(p: Plant[T], X: T, kb: T, ups: T) -> T:
-    """What a prediction does not know of the inputs: |h - q^|, or |(I + Delta)(h - q^) + Delta (kappa + u0 - u*)|."""
+    """What a prediction does not know of the inputs: |h - q^|, or |(I + Delta)(h - q^) + Delta (kappa + u0 - u*)|.
+
+    (H.35).
+    """
     return X if p.gain is None else acting(p, X) + p.gain * (kb + ups)
 
 
 def settled(p: Plant[T], bias: T, ripple: T) -> T:
-    """The least S, by what is needed at S = N = 0 and by the N that is needed."""
+    """The least S, by what is needed at S = N = 0 and by the N that is needed: (H.34) solved for S."""
     return bias if p.gain is None else raised(p, bias + p.gain * ripple)
 
 

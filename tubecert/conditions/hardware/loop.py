@@ -128,7 +128,7 @@ class Plant(Generic[T]):
 
 
 def in_step(first: Fraction, second: Fraction) -> bool:
-    """Whether the longer of two sample times is a multiple of the shorter one."""
+    """Whether the longer of two sample times is a multiple of the shorter one, theory 8.4."""
     return (max(first, second) / min(first, second)).denominator == 1
 
 

@@ -112,11 +112,11 @@ def _side_conditions(x: Evaluated[Interval]) -> bool:
     computed = e.geodesics is None or bool(e.geodesics.within.sanitised().lo > 0)
     return (
         computed
-        and bool(x.loss.chi.sanitised().lo > 0)
-        and bool(e.bias.sanitised().hi <= loop.S.lo)
-        and bool(e.ripple.sanitised().hi <= loop.N.lo)
-        and bool(e.speed.sanitised().hi < loop.Y.lo)
-        and predicted
+        and bool(x.loss.chi.sanitised().lo > 0)  # (5.1)
+        and bool(e.bias.sanitised().hi <= loop.S.lo)  # (H.6)
+        and bool(e.ripple.sanitised().hi <= loop.N.lo)  # (H.7)
+        and bool(e.speed.sanitised().hi < loop.Y.lo)  # (H.11)
+        and predicted  # (H.17)
     )
 
 
@@ -179,7 +179,7 @@ def stands_in_the_way(problem: TubeProblem) -> tuple[Shortfall, ...]:
 
 
 def ultimate_radius(problem: TubeProblem, recipe: HardwareRecipe) -> float:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; that of the last window."""
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; that of the last window (A1 of (H.12))."""
     x = last(problem, recipe)
     return float((x.course.bound.ultimate() / sqrt(x.plant.n.a)).hi)
 

@@ -70,6 +70,7 @@ def told_in_windows(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[Told,
 
 
 def _told(x: Evaluated[Interval], supremum: Interval, level: Fraction) -> Told:
+    """What follows from d < dhat: theorem H and (H.16)."""
     dhat = Interval.of(level)
     return Told(
         supremum=float(supremum.hi),
@@ -91,6 +92,7 @@ def _widest(recipe: HardwareRecipe, found: Sequence[Told]) -> Told:
 
 
 def _budget(x: Evaluated[Interval], dhat: Interval) -> Budget:
+    """The terms of A1 in (H.12), by what causes them."""
     n, e, loop, run = x.plant.n, x.estimate, x.loop, x.course
     whole = n.lam * dhat
     beta, biased, bent = acting(x.plant, n.beta), loop.S - e.gust, e.geodesics

@@ -47,7 +47,7 @@ class Span(Generic[T]):
 
 @quiet
 def first(p: Plant[T], loop: Loop[T], span: Span[T]) -> InWindow[T]:
-    """The first window, in which the loop starts as in theorem H."""
+    """The first window, in which the loop starts as in theorem H, (H.24)."""
     e = estimate(p, loop)
     cost = loss(p, loop, e)
     run = course(p, loop, e, cost)
@@ -59,7 +59,7 @@ def first(p: Plant[T], loop: Loop[T], span: Span[T]) -> InWindow[T]:
 
 @quiet
 def following(p: Plant[T], loop: Loop[T], span: Span[T], before: InWindow[T]) -> InWindow[T]:
-    """A window after another one."""
+    """A window after another one, (H.24)."""
     x = entered(p, loop, before)
     run = resumed(x.plant, loop, x.estimate, x.loss, maximum(arrival(x, before), loop.f0))
     return closed(replace(x, course=run), span)
@@ -88,7 +88,10 @@ def closed(x: Evaluated[T], span: Span[T]) -> InWindow[T]:
 
 @quiet
 def arrival(x: Evaluated[T], before: InWindow[T]) -> T:
-    """D where a window begins: a saw-tooth that grows steeper is ahead of its mean by so much at most."""
+    """D where a window begins: a saw-tooth that grows steeper is ahead of its mean by so much at most.
+
+    The jump of (H.24).
+    """
     n, loop, last = x.plant.n, x.loop, before.at
     nought = number(0, loop.Ts)
     lag = n.beta * x.estimate.s1 - last.plant.n.beta * last.estimate.s1
@@ -101,12 +104,15 @@ def arrival(x: Evaluated[T], before: InWindow[T]) -> T:
 
 
 def _swing(rate: T, period: T) -> T:
-    """(mu/lambda)(1 - e^(-lambda T)) >= max Pi - min Pi of the periodic solution of Pi' = -lambda Pi + saw."""
+    """(mu/lambda)(1 - e^(-lambda T)) >= max Pi - min Pi of the periodic solution of Pi' = -lambda Pi + saw.
+
+    This is w of (H.24).
+    """
     return mean_wait(rate, period) * period * decay_mean(rate * period)
 
 
 def _left(p: Plant[T], loop: Loop[T], span: Span[T]) -> T:
-    """z of the next window: S + (z - S)_+ e^(-omega (L - pad)); nothing is remembered without a filter."""
+    """z of the next window: S + (z - S)_+ e^(-omega (L - pad)); nothing is remembered without a filter, (H.22)."""
     nought = number(0, loop.S)
     if loop.omega is None:
         return nought
@@ -126,7 +132,7 @@ def _at(run: Course[T], t: T) -> T:
 
 
 def _without_filter(run: Course[T], t: T) -> T:
-    """A1 + (d0 - A1) e^(-lambda t)."""
+    """A1 + (d0 - A1) e^(-lambda t), (2.15) with K = 0."""
     D = run.bound
     return D.d0 * exp(-D.lam * t) - D.ultimate() * expm1(-D.lam * t)
 
@@ -179,12 +185,12 @@ def over(problem: TubeProblem, window: Window) -> TubeProblem:
 
 
 def pad(recipe: HardwareRecipe) -> Fraction:
-    """What a window looks back at: two samples of the slower clock, and the delay."""
+    """What a window looks back at: two samples of the slower clock, and the delay, (H.20)."""
     return 2 * max(recipe.sample_time, recipe.feedback_time) + recipe.delay
 
 
 def cover(problem: TubeProblem, recipe: HardwareRecipe) -> bool:
-    """Whether windows follow one another over the horizon, none shorter than the pad, each with its constants.
+    """Whether windows follow one another over the horizon, none shorter than the pad, each with its constants, (H.20).
 
     Each is within the tube; its constants reach back by the pad at least, and not beyond the window before.
     """
@@ -237,7 +243,7 @@ def within(recipe: HardwareRecipe) -> tuple[HardwareRecipe, ...]:
 
 
 def course_of(problem: TubeProblem, recipe: HardwareRecipe) -> tuple[InWindow[Interval], ...]:
-    """Every formula in every window, with outward rounding."""
+    """Every formula in every window, with outward rounding, (H.21)-(H.24)."""
     windows, most = windows_in(problem), Interval.of(pad(recipe))
     return along(
         [plant(over(problem, w), recipe.clip_radius) for w in windows],

@@ -111,6 +111,7 @@ def supremum(setting: Setting, h: Ball) -> Ball:
 
 
 def _at_the_end(setting: Setting, h: Ball) -> Ball:
+    """(4.0) at the horizon, or A1."""
     d0, A1 = setting.n.initial_distance, settled(setting, h)
     if setting.horizon is None:
         return A1
@@ -152,7 +153,7 @@ def _told(section: AloneSection, setting: Setting) -> Outcome:
 
 
 def _serves(limit: Fraction, setting: Setting) -> Outcome:
-    """Whatever |h| is below the limit, sup D < dbar: D rises with h, and d0 < dbar by itself."""
+    """Whatever |h| is below the limit, sup D < dbar: D rises with h, and d0 < dbar by itself, theory 4a."""
     started = stated(bool(setting.n.initial_distance < setting.reach), "d0 is not below dbar")
     reached = at_most(supremum(setting, exact(limit)) / setting.reach, Fraction(1), "sup D/dbar at that |h|")
     return all_of((started, reached))

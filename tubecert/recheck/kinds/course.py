@@ -66,7 +66,7 @@ class Course(Windows):
 
 
 def pad_of(asked: Hardware) -> Fraction:
-    """Two samples of the slower clock, and the delay; `ValueError` where one of them is searched for."""
+    """Two samples of the slower clock, and the delay; `ValueError` where one of them is searched for, (H.20)."""
     Ts = asked.sample_time
     delay = Ts if asked.one_sample else asked.delay
     if Ts is None or delay is None:
@@ -131,7 +131,7 @@ def _hold(course: Course, recipe: Digital, margins: Callable[..., Outcome]) -> O
 
 
 def _reach(course: Course, j: int, recipe: Digital, i: int) -> tuple[Fraction, Fraction] | None:
-    """Ups + kb, and what h is clipped to, by what acts in the window's pad."""
+    """Ups + kb, and what h is clipped to, by what acts in the window's pad: (H.16) in a window."""
     found = course.passed(recipe)
     if found is None or i >= len(course.clip):
         return None

@@ -202,7 +202,7 @@ def _told(section: HardwareSection) -> Outcome:
 
 
 def _clipped(section: HardwareSection, recipe: Digital, ground: Ground) -> Outcome:
-    """R bounds the set that the estimate is clipped to, and h lies in that set."""
+    """R bounds the set that the estimate is clipped to, and h lies in that set, R_set of theory 8.1."""
     Dh, place = ground.constants["h"].above, ground.place
     if not section.clip:
         return stated(Dh is not None and Dh <= recipe.clip_radius, "the radius of the clip is less than |h|")
@@ -261,6 +261,7 @@ def _states(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterat
 
 
 def _within(row: Sequence[Fraction], width: Fraction, level: Fraction, ground: Ground) -> Outcome:
+    """A half-width at the level, theory 1a.5a."""
     if width <= 0:
         return stated(False, "it is not positive")
     place, a = ground.place, ground.constants["lower"].below
@@ -288,6 +289,7 @@ def _inputs(section: HardwareSection, recipe: Digital, ground: Ground) -> Iterat
 
 
 def _in_range(i: int, own: Range, clip: Range, recipe: Digital, ground: Ground) -> Outcome:
+    """u* of an input leaves room for all that is added to it, (H.16)."""
     found, place = _loop(recipe, ground), ground.place
     if found is None:
         return stated(False, "the level is not proven")

@@ -144,7 +144,7 @@ class Parts(Windows):
             yield margin_at_least(1 - own.top / setting.reach, margin, "the distance")
 
     def _reach(self, j: int) -> tuple[Fraction, Fraction] | None:
-        """Du sup D + R_H, on either side."""
+        """Du sup D + R_H, on either side: (4.13) in a window."""
         found = self.reached()
         if found is None:
             return None
