@@ -14,11 +14,12 @@ from machines import alive_machine
 from problems import ALIVE, alive, three_state
 
 from tubecert import certificate
+from tubecert.conditions.hardware.loop import HardwareRecipe, Rounding, WindowProof
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.verdict import Verdict
 from tubecert.kernel import NotProvenError, Proof, Unproven, check, judge
 from tubecert.kinds.table import KINDS, kind_of
-from tubecert.letters import RATES
+from tubecert.letters import HARDWARE, RATES
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import answer
 from tubecert.pipeline.certification import judge as judge_gains
@@ -30,6 +31,7 @@ from tubecert.spec import load
 
 CONFIG = Path(__file__).parents[2] / "configs" / "three_state.yaml"
 THOUSANDTH = Fraction(1, 1000)
+ROUNDED = ("feedback", "input", "estimate", "prediction")
 
 
 def less(*names, factor=THOUSANDTH):
@@ -134,6 +136,60 @@ def test_a_search_that_lies_certifies_nothing(key, name, bounded, honest, monkey
     assert result[key]["shortfalls"]
     for role in ("least_adaptation", "split"):
         assert not result[key].get(role) or result[key]["verdict"] != "certified"
+
+
+SERVES = HardwareRecipe(  # `alive_machine()`, with room
+    sample_time=Fraction(1, 1000),
+    delay=Fraction(1, 2000),
+    feedback_time=Fraction(1, 1000),
+    bandwidth=Fraction("23.17"),
+    noise=Fraction(1, 1000),
+    wind=Fraction(0),
+    clip_radius=Fraction("0.365"),
+    level=Fraction("0.139"),
+    floor=Fraction("0.0268"),
+    speed=Fraction("3.55"),
+    bias=Fraction("0.0502"),
+    ripple=Fraction("0.049"),
+    prediction=None,
+)
+OF_A_MACHINE = {
+    "a level a thousand times too small": less("level"),
+    "a level just too small": less("level", factor=Fraction(9, 10)),
+    "a speed that is exceeded": less("speed", factor=Fraction(99, 100)),
+    "a filter that leaves nothing": less("bias"),
+    "an estimate without noise": less("ripple"),
+    "another sample time": less("sample_time", factor=Fraction(1, 2)),
+    "less noise than there is": less("noise"),
+    "a clip that cuts h off": less("clip_radius", factor=Fraction(9, 10)),
+    "no floor": other(floor=Fraction(0)),
+    "a prediction that nobody asked for": other(prediction=Fraction(1)),
+    "a computer that rounds": other(rounding=(Rounding(**dict.fromkeys(ROUNDED, Fraction(1))),)),
+    "windows of another plan": lambda recipe: replace(recipe, windows=(whole_of(recipe),)),
+}
+
+
+def whole_of(recipe):
+    """A recipe as that of one window."""
+    names = ("level", "floor", "speed", "bias", "ripple", "prediction")
+    return WindowProof(**{name: getattr(recipe, name) for name in names})
+
+
+@pytest.mark.parametrize("name", OF_A_MACHINE)
+def test_a_search_for_a_machine_that_lies_certifies_nothing(name):
+    kind, problem = kind_of(HARDWARE.key), alive_machine()
+    sections = [
+        kind.section(problem, Proposal(decisive=told, role="machine"))
+        for told in (SERVES, OF_A_MACHINE[name](SERVES))
+    ]
+    honest, lying = (section.data() for section in sections)
+    assert honest.verdict is Verdict.CERTIFIED
+    assert honest.level is not None
+    assert lying.verdict is not Verdict.CERTIFIED
+    assert sections[1].proof is None
+    assert lying.budget is None
+    assert not lying.inputs
+    assert not lying.half_widths
 
 
 @pytest.mark.parametrize("key", LIES)
