@@ -14,7 +14,7 @@ from tubecert.conditions.sampled import SampledRecipe
 from tubecert.export.assembly import assembled
 from tubecert.export.blocks import Machine
 from tubecert.export.continuous.assembly import Loop, together
-from tubecert.export.controller import Continuous, Controller
+from tubecert.export.controller import Boxes, Continuous, Controller
 from tubecert.model import build
 from tubecert.spec import Knots, Picard, load_text
 from tubecert.trajectory import Plan
@@ -63,6 +63,18 @@ tube: {epsilon: 0.1, rho_a: 0.1}
 BENT = (CONFIGS / "state_dependent_input.yaml").read_text("utf-8") + (
     "hardware: {rate: 500, delay: 0.0005, geodesic: {nodes: 3, sweeps: 2}}\n"
 )
+# any plan that keeps to boxes
+ANY = """
+tubecert: 1
+name: family
+system: {states: [p, v], inputs: [u], f: [v, "p - v/2 + sin(v)/9"], B: [[0], [1]]}
+safe_set: {p: [-3, 3], v: [-3, 3]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: any, x: {p: [-1, 0.9], v: [-0.5, 0.4]}, u: {u: [-2, 1.9]}, defect: 0.01}
+initial_state: {within: 0.02}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.6, rho_a: 0.1}
+"""
 KNOTS = Knots(
     t=tuple(map(Fraction, ("0", "0.013", "0.02", "0.3", "0.31"))),
     x=tuple(
@@ -111,6 +123,7 @@ def machine(text: str, plan: Plan | None = None, **values: Any) -> Machine:
         "held": False,
         "horizon": trajectory.horizon,
         "ranges": ((-4.0, 4.0),) * len(spec.inputs),
+        "boxes": None if trajectory.bundle is None else Boxes(x=trajectory.bundle.x, u=trajectory.bundle.u),
     }
     return Machine(**(given | values))
 
@@ -198,6 +211,19 @@ def looped(name: str) -> Loop:
     return loop(PATH, piecewise_plan(build(load_text(PATH)), KNOTS), horizon=Fraction("0.31"))  # knots
 
 
+@cache
+def of_family(name: str) -> Machine:
+    """One of `FAMILIES`: u* is played, or held, and there the feedback has a clock of its own and a horizon."""
+    if name == "played":
+        return machine(ANY)
+    return machine(ANY, held=True, horizon=Fraction(3), recipe=recipe(feedback_time=Fraction(3, 500)))
+
+
+def _of_family(name: str) -> Controller:
+    return assembled(of_family(name))
+
+
+FAMILIES = {name: partial(_of_family, name) for name in ("played", "held")}
 CONTINUOUS = {name: partial(_together, name) for name in ("orbit", "turning", "path")}
 
 

@@ -23,7 +23,7 @@ from tubecert.recheck.code.examination import model_of, moves_of
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.continuous import Adapted
-from tubecert.recheck.controller import Machine
+from tubecert.recheck.controller import Machine, OfFamily
 from tubecert.recheck.curve import Knots, hermite
 from tubecert.recheck.document import read
 from tubecert.recheck.sampling import SampledGains
@@ -53,6 +53,14 @@ def in_recheck(name: str) -> Machine:
     case = _case(TEXTS[kind], given, knotted=kind == "path")
     section = SimpleNamespace(predict=controller.predicts, clip=given.clip)
     return Machine(case, section, given.recipe, held=given.held)
+
+
+def family_in_recheck(name: str) -> OfFamily:
+    """The machine of a hand-made controller of a family, as recheck reads it."""
+    given = controllers.of_family(name)
+    case = _case(controllers.ANY, given, knotted=False)
+    section = SimpleNamespace(predict=False, clip=given.clip)
+    return OfFamily(case, section, given.recipe, held=given.held)
 
 
 def adapted_in_recheck(name: str) -> Adapted:

@@ -24,7 +24,7 @@ from tubecert.export.continuous import compiled as all_the_time
 from tubecert.export.continuous import vectors as in_time
 from tubecert.export.controller import Continuous, Controller, refused
 from tubecert.export.folder import Exported
-from tubecert.export.vectors import vectors
+from tubecert.export.vectors import handed_of, vectors
 from tubecert.recheck import continuous, controller
 from tubecert.recheck.code import continuous as of_time
 from tubecert.recheck.code import examination as of_samples
@@ -86,7 +86,7 @@ class OfSamples(Asked):
     def __init__(self, found: Exported) -> None:
         assert isinstance(found.controller, Controller)
         own = vectors(found.controller, single=found.precision == "single")
-        super().__init__(found, own.y, own.u, own.tolerance)
+        super().__init__(found, own.given, own.u, own.tolerance)
         self.rounds = found.controller.lost is not None
 
     def expected(self, text: str, name: str) -> list[Column]:
@@ -100,10 +100,16 @@ class OfSamples(Asked):
         return of_samples.examine(text, name, code, self.rows, answered)
 
     def _run(self, code: Code | None, texts: Sequence[str], sizes: dict[str, int]) -> Array:
-        y = self._given
+        own, answers = self._found.controller, []
+        assert isinstance(own, Controller)
+        n = len(own.states)
         with on_samples.compiled(self._found, read=texts, tables=tuple(sizes)) as built:
             _compare(code, built, texts, sizes)
-            return np.concatenate([built.start(y[:1]), *(built.step(row[None]) for row in y)])
+            for k, row in enumerate(self._given):
+                built.handed = None if own.boxes is None else handed_of(own, row[n:])
+                answers += [built.start(row[None, :n])] if k == 0 else []
+                answers.append(built.step(row[None, :n]))
+        return np.concatenate(answers)
 
 
 class OfTime(Asked):

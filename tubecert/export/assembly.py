@@ -19,7 +19,7 @@ from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.export import blocks, geodesics
 from tubecert.export.blocks import INTEGRATION, Machine, forgotten
 from tubecert.export.continuous.assembly import of_samples
-from tubecert.export.controller import Continuous, Controller, refused
+from tubecert.export.controller import Boxes, Continuous, Controller, refused
 from tubecert.export.question import gain_of, horizon_of, identifier, pieces_of, question
 from tubecert.expression import free_symbols, topological
 from tubecert.kinds import HARDWARE, SAMPLED
@@ -60,6 +60,7 @@ def _of_machine(certificate: Certificate, data: HardwareData, name: str) -> Cont
     if spec.hardware is None:
         raise incomplete(name, "its specification has no section hardware")
     tube = certificate.result.tube
+    bundle = spec.trajectory.bundle
     machine = Machine(
         name=spec.name,
         hash=certificate.hash,
@@ -75,11 +76,8 @@ def _of_machine(certificate: Certificate, data: HardwareData, name: str) -> Cont
         feedback_gain=gain_of(certificate, name),
         geodesic=spec.hardware.geodesic,
         noise_size=_noise_size(certificate),
+        boxes=None if bundle is None else Boxes(x=bundle.x, u=bundle.u),
     )
-    if certificate.result.claim.plans is not None or spec.trajectory.bundle is not None:
-        raise refused(
-            "a certificate of a family of plans is not exported", "certify the plan that the machine follows"
-        )
     return assembled(machine)
 
 
@@ -89,9 +87,16 @@ def assembled(machine: Machine) -> Controller:
     _require(model, recipe, machine.geodesic)
     bent = geodesics.varies(model)
     pieces = pieces_of(plan, recipe.sample_time) if isinstance(plan, PiecewisePlan) else None
-    still, m = pieces is None and not free_symbols(plan.u), len(model.inputs)
+    boxes = machine.boxes
+    _require_plan(machine)
+    still, m = pieces is None and boxes is None and not free_symbols(plan.u), len(model.inputs)
     played, covered = not still and not machine.held, bool(recipe.rounding)
-    if played and pieces is None and any(node.op == "table" for node in topological(plan.u)):
+    if (
+        played
+        and pieces is None
+        and boxes is None
+        and any(node.op == "table" for node in topological(plan.u))
+    ):
         raise refused(
             "a table stands in u*, of which Gauss's rule does not know the mean over a sample",
             "certify with hardware: {feedforward: held}, or write the plan into a CSV file",
@@ -118,7 +123,8 @@ def assembled(machine: Machine) -> Controller:
         predicts=recipe.prediction is not None,
         held=machine.held,
         still=still,
-        plan=blocks.plan(plan) if pieces is None else None,
+        plan=blocks.plan(plan) if pieces is None and boxes is None else None,
+        boxes=boxes,
         pieces=pieces,
         drift=blocks.drift(model),
         flow=blocks.flow(model),
@@ -126,8 +132,8 @@ def assembled(machine: Machine) -> Controller:
         if bent
         else blocks.law(model, machine.feedback_gain if covered else None),
         applied=blocks.applied(m, recipe, played=played),
-        gauss=blocks.gauss(m) if played and pieces is None else None,
-        bend=blocks.bend(plan) if played and pieces is None and covered else None,
+        gauss=blocks.gauss(m) if played and pieces is None and boxes is None else None,
+        bend=blocks.bend(plan) if played and pieces is None and boxes is None and covered else None,
         predictor=None if recipe.prediction is None else blocks.predictor(model, recipe.delay / INTEGRATION),
         estimator=blocks.estimator(machine),
         steep=blocks.steep(model) if covered and recipe.prediction is not None else None,
@@ -135,6 +141,22 @@ def assembled(machine: Machine) -> Controller:
         moves=_moves(machine),
         every=int(recipe.feedback_time / recipe.sample_time),
     )
+
+
+def _require_plan(machine: Machine) -> None:
+    """Raises TC710 for what is not known of a plan that is handed in."""
+    if machine.boxes is None:
+        return
+    if machine.recipe.prediction is not None:
+        raise refused(
+            "a prediction needs u* all along the delay, of which step is handed no more than its values at samples",
+            "leave hardware.predict out, or certify the plan that the machine follows",
+        )
+    if machine.recipe.rounding:
+        raise refused(
+            "no bound of rounding is known for a plan that is handed in",
+            "certify without hardware.arithmetic",
+        )
 
 
 def _moves(machine: Machine) -> tuple[Fraction, ...]:

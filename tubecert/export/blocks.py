@@ -13,6 +13,7 @@ from typing import Final
 
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.coordinates import Coordinates, Fields, inverse
+from tubecert.export.controller import Boxes
 from tubecert.export.program import GREATEST, LEAST, RATIO, SHRINK, Place, Program, Writer
 from tubecert.expression import derivatives, topological
 from tubecert.expression.matrix import Matrix, multiply
@@ -33,7 +34,8 @@ class Machine:
     """What a controller is made of.
 
     `clip` by input, empty for the ball of the recipe; `coordinates` S, by rows; `horizon` of the claim, None for ever;
-    `feedback_gain` du; `geodesic`: how geodesics are computed; `noise_size` n_E, where rounding is asked for.
+    `feedback_gain` du; `geodesic`: how geodesics are computed; `noise_size` n_E, where rounding is asked for;
+    `boxes` of a family of plans.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Machine:
     feedback_gain: Fraction = Fraction(0)
     geodesic: Picard | None = None
     noise_size: Fraction | None = None
+    boxes: Boxes | None = None
 
 
 def _states(writer: Writer, model: ControlAffineModel, name: str) -> tuple[list[Place], dict[str, Place]]:

@@ -14,7 +14,7 @@ from tubecert.export.listing import lines
 from tubecert.export.program import Port, Program
 from tubecert.export.sweeps import in_c
 from tubecert.export.vectors import Vectors
-from tubecert.export.words import TIMING, heading, promise
+from tubecert.export.words import heading, promise, timing
 
 _UNSAFE: Final = (
     "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__", "_M_FP_FAST",
@@ -38,7 +38,7 @@ def self_test(c: Controller, language: C, vectors: Vectors) -> str:
 
 def _header(c: Controller, language: C) -> Iterator[str]:
     name, big = c.name, c.name.upper()
-    yield from comment((heading(c), "", f"Certificate: {c.hash}", "", *promise(c), "", *TIMING))
+    yield from comment((heading(c), "", f"Certificate: {c.hash}", "", *promise(c), "", *timing(c)))
     yield f"#ifndef {big}_H"
     yield f"#define {big}_H"
     yield ""
@@ -54,12 +54,15 @@ def _header(c: Controller, language: C) -> Iterator[str]:
     yield f"#define {big}_REACH {language.number(c.reach)} /* and d(x*, y), y being measured or predicted */"
     if c.every > 1:
         yield f"#define {big}_EVERY {c.every} /* samples from one feedback to the next */"
-    yield f"#define {big}_ADDS_PLAN {int(c.adds_plan)} /* 1: u* is in what step gives; 0: add feedforward(t) */"
+    outside = "add feedforward(t)" if c.boxes is None else "add u*(t) at every t"
+    yield f"#define {big}_ADDS_PLAN {int(c.adds_plan)} /* 1: u* is in what step gives; 0: {outside} */"
     yield ""
     yield "/* What step returns: 0, or a sum of these. */"
     yield f"#define {big}_OVER 1 /* the horizon is over: the proof says nothing any more */"
     yield f"#define {big}_OUTSIDE 2 /* what was measured is not in the tube: an assumption does not hold */"
     yield f"#define {big}_NO_FEEDBACK 4 /* no input could contract here: an assumption does not hold */"
+    if c.boxes is not None:
+        yield f"#define {big}_STRAYS 8 /* the plan is not in the boxes of the family: an assumption does not hold */"
     yield ""
     yield f"typedef {language.real} {name}_real;"
     yield ""
@@ -77,14 +80,19 @@ def _header(c: Controller, language: C) -> Iterator[str]:
     yield f"extern const char {name}_certificate[]; /* its hash */"
     yield ""
     yield "/* Forgets everything; u acts at once, for what is measured at t = 0. */"
-    yield f"int {name}_start({_state(c)}, {_in(c, 'y', 'STATES')}, {_out(c, 'u', 'INPUTS')});"
+    plan = [_in(c, "xs", "STATES"), _in(c, "us", "INPUTS")] if c.boxes is not None else []
+    start = ", ".join([_state(c), _in(c, "y", "STATES"), *plan, _out(c, "u", "INPUTS")])
+    yield f"int {name}_start({start});"
     yield ""
     yield "/* At every sample: u acts from a delay after it on. */"
-    yield f"int {name}_step({_state(c)}, {_in(c, 'y', 'STATES')}, {_out(c, 'u', 'INPUTS')});"
+    plan += [_in(c, "mean_us", "INPUTS")] if plan and not c.held else []
+    step = ", ".join([_state(c), _in(c, "y", "STATES"), *plan, _out(c, "u", "INPUTS")])
+    yield f"int {name}_step({step});"
     yield ""
-    yield "/* u*(t), t in s since the start. */"
-    yield f"void {name}_feedforward({name}_real t, {_out(c, 'u', 'INPUTS')});"
-    yield ""
+    if c.boxes is None:
+        yield "/* u*(t), t in s since the start. */"
+        yield f"void {name}_feedforward({name}_real t, {_out(c, 'u', 'INPUTS')});"
+        yield ""
     yield "#endif"
 
 
@@ -209,7 +217,10 @@ def _entries_of(port: Port) -> list[str]:
 
 
 def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
-    name, count = c.name, len(vectors.y)
+    name, count, n, m = c.name, len(vectors.y), len(c.states), len(c.inputs)
+    places = [] if c.boxes is None else [n, 2 * n] if c.held else [n, 2 * n, 2 * n + m]
+    handed = ["MEASURED[{k}]", *(f"MEASURED[{{k}}] + {place}" for place in places)]
+    start, step = ", ".join(handed[:3]), ", ".join(handed)
     yield from comment((f"{c.system}: the self-test of its controller.", f"Certificate: {c.hash}"))
     yield f'#include "{name}.h"'
     yield ""
@@ -217,8 +228,8 @@ def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
     yield ""
     yield f"#define SAMPLES {count}"
     yield f"#define TOLERANCE {language.number(Fraction(vectors.tolerance))}"
-    yield f"static const {name}_real MEASURED[SAMPLES][{len(c.states)}] = {{"
-    for row in vectors.y:
+    yield f"static const {name}_real MEASURED[SAMPLES][{len(vectors.given[0])}] = {{"
+    for row in vectors.given:
         yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
     yield "};"
     yield "/* of start, and of every step, as the producer of this file computed them */"
@@ -235,9 +246,9 @@ def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
     yield "    int k, i;"
     yield "    for (k = 0; k <= SAMPLES; k++) {"
     yield "        if (k == 0) {"
-    yield f"            (void){name}_start(&state, MEASURED[0], u);"
+    yield f"            (void){name}_start(&state, {start.format(k=0)}, u);"
     yield "        } else {"
-    yield f"            (void){name}_step(&state, MEASURED[k - 1], u);"
+    yield f"            (void){name}_step(&state, {step.format(k='k - 1')}, u);"
     yield "        }"
     yield f"        for (i = 0; i < {len(c.inputs)}; i++) {{"
     yield f"            const {name}_real error = u[i] - EXPECTED[k][i];"

@@ -8,12 +8,15 @@ from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
 from tubecert.export.c_language import C, last_not_after
-from tubecert.export.controller import Controller, Steering
+from tubecert.export.controller import Boxes, Controller, Steering
 
 
 def plan_in_c(c: Steering, language: C) -> Iterator[str]:
-    """x*(t) and u*(t); where the plan has knots, also the search of the piece."""
+    """x*(t) and u*(t); where the plan has knots, also the search of the piece; of a family, whether it is one of it."""
     yield ""
+    if c.boxes is not None:
+        yield from _belongs_in_c(c.boxes, language)
+        return
     if c.pieces is not None:
         yield "/* The piece that a time lies in. */"
         yield "static int piece(real t)"
@@ -45,9 +48,30 @@ def plan_in_c(c: Steering, language: C) -> Iterator[str]:
     yield "}"
 
 
+def _belongs_in_c(boxes: Boxes, language: C) -> Iterator[str]:
+    """The boxes of a family, and whether x* and u* lie in them."""
+    yield "/* The boxes that x* and u* of every plan keep to. */"
+    for name, ends in (("X", boxes.x), ("U", boxes.u)):
+        for words, k in (("LEAST", 0), ("MOST", 1)):
+            numbers = ", ".join(language.number(each[k]) for each in ends)
+            yield f"static const real {words}_{name}[] = {{{numbers}}};"
+    yield ""
+    yield "/* 1 where x* or u* is not in its box. */"
+    yield "static int strays(const real x[N], const real u[M])"
+    yield "{"
+    yield "    int found = 0, i;"
+    for name, size in (("x", "N"), ("u", "M")):
+        big = name.upper()
+        yield f"    for (i = 0; i < {size}; i++) {{"
+        yield f"        found = {name}[i] >= LEAST_{big}[i] && {name}[i] <= MOST_{big}[i] ? found : 1;"
+        yield "    }"
+    yield "    return found;"
+    yield "}"
+
+
 def mean_in_c(c: Controller, language: C) -> Iterator[str]:
     """The mean of u* over a sample, where u* is played by itself."""
-    if c.adds_plan:
+    if c.adds_plan or c.boxes is not None:
         return
     half = language.number(Fraction(1, 2))
     yield ""
@@ -87,12 +111,20 @@ def feedback_in_c(c: Steering, language: C, words: str = _FED) -> Iterator[str]:
     big, zero = c.name.upper(), language.number(Fraction(0))
     yield ""
     yield f"/* {words} */"
-    yield "static int feedback(const real y[N], real t, real u[M])"
-    yield "{"
     ends = "" if c.swept is None else ", first[N], last[N]"
-    yield f"    real f[N], xs[N], us[M], vs[N], kappa[M], told[3]{ends};"
-    yield "    int status = 0, i;"
-    yield "    on_plan(t, xs, us);"
+    if c.boxes is None:
+        yield "static int feedback(const real y[N], real t, real u[M])"
+        yield "{"
+        yield f"    real f[N], xs[N], us[M], vs[N], kappa[M], told[3]{ends};"
+        yield "    int status = 0, i;"
+        yield "    on_plan(t, xs, us);"
+    else:
+        yield "static int feedback(const real y[N], const real xs[N], const real us[M], real t, real u[M])"
+        yield "{"
+        yield f"    real f[N], vs[N], kappa[M], told[3]{ends};"
+        yield "    int status = 0, i;"
+        if c.horizon is None:
+            yield "    (void)t;"
     yield "    drift(y, f);"
     yield "    flow(xs, us, vs);"
     if c.swept is not None:
@@ -151,7 +183,7 @@ def _fed_in_c(c: Controller) -> Iterator[str]:
         yield f"    {pad}predicted(y, t, c->feedback, x);"
         yield f"    {pad}status = feedback(x, t + {big}_DELAY, c->feedback);"
     else:
-        yield f"    {pad}status = feedback(y, t, c->feedback);"
+        yield f"    {pad}status = feedback(y, {handed(c)}t, c->feedback);"
     if c.every > 1:
         yield "    } else {"
         yield f"        status = {'0' if c.horizon is None else f't > {big}_HORIZON ? {big}_OVER : 0'};"
@@ -162,19 +194,31 @@ def _fed_in_c(c: Controller) -> Iterator[str]:
         yield "    }"
 
 
+def handed(c: Steering) -> str:
+    """What stands for the plan where it is handed in."""
+    return "" if c.boxes is None else "xs, us, "
+
+
 def entries_in_c(c: Controller, language: C) -> Iterator[str]:
     """`NAME_feedforward`, `NAME_start` and `NAME_step`."""
     name, big, zero = c.name, c.name.upper(), language.number(Fraction(0))
+    if c.boxes is None:
+        yield ""
+        yield f"void {name}_feedforward(real t, real u[M])"
+        yield "{"
+        yield "    real x[N];"
+        yield "    on_plan(t, x, u);"
+        yield "}"
+    plan = "" if c.boxes is None else "const real xs[N], const real us[M], "
+    played = "const real mean_us[M], " if c.boxes is not None and not c.held else ""
     yield ""
-    yield f"void {name}_feedforward(real t, real u[M])"
+    yield f"int {name}_start({name}_state *c, const real y[N], {plan}real u[M])"
     yield "{"
-    yield "    real x[N];"
-    yield "    on_plan(t, x, u);"
-    yield "}"
-    yield ""
-    yield f"int {name}_start({name}_state *c, const real y[N], real u[M])"
-    yield "{"
-    yield f"    const int status = feedback(y, {zero}, u);"
+    status = f"feedback(y, {handed(c)}{zero}, u)"
+    if c.boxes is None:
+        yield f"    const int status = {status};"
+    else:
+        yield f"    const int status = (strays(xs, us) > 0 ? {big}_STRAYS : 0) + {status};"
     yield "    int i;"
     yield "    c->sample = 0;"
     if c.every > 1:
@@ -192,13 +236,15 @@ def entries_in_c(c: Controller, language: C) -> Iterator[str]:
     yield "    return status;"
     yield "}"
     yield ""
-    yield f"int {name}_step({name}_state *c, const real y[N], real u[M])"
+    yield f"int {name}_step({name}_state *c, const real y[N], {plan}{played}real u[M])"
     yield "{"
     yield f"    const real t = (real)c->sample * {big}_SAMPLE_TIME;"
     yield f"    real f[N], q[M], mean[M], estimate[M]{', x[N]' if c.predicts else ''};"
-    if not c.adds_plan:
+    if not c.adds_plan and c.boxes is None:
         yield "    real played[M];"
     yield "    int status, i;"
+    if c.boxes is not None:
+        yield "    int astray = strays(xs, us);"
     yield "    drift(y, f);"
     yield "    for (i = 0; i < M; i++) {"
     yield "        q[i] = c->q[i];"
@@ -207,12 +253,17 @@ def entries_in_c(c: Controller, language: C) -> Iterator[str]:
     yield "    if (c->sample > 0) {"
     if c.adds_plan:
         yield "        applied(c->held, c->before, mean);"
+    elif c.boxes is not None:
+        yield "        astray = strays(xs, mean_us) > 0 ? 1 : astray;"
+        yield "        applied(c->held, c->before, mean_us, mean);"
     else:
         yield f"        mean_of_plan((real)(c->sample - 1) * {big}_SAMPLE_TIME, t, played);"
         yield "        applied(c->held, c->before, played, mean);"
     yield "        estimator(y, f, c->y, c->f, c->q, mean, q, estimate);"
     yield "    }"
     yield from _fed_in_c(c)
+    if c.boxes is not None:
+        yield f"    status += astray > 0 ? {big}_STRAYS : 0;"
     yield "    for (i = 0; i < M; i++) {"
     yield "        c->before[i] = c->held[i];"
     yield "        c->held[i] = c->feedback[i] - estimate[i];"

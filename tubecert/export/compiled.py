@@ -19,6 +19,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.export.controller import Controller, Steering, refused
 from tubecert.export.folder import Exported
+from tubecert.export.reference import Handed
 from tubecert.printable import visible
 
 COMPILERS: Final = ("cc", "gcc", "clang")
@@ -62,7 +63,10 @@ class Read:
 
 
 class Compiled(Read):
-    """N controllers side by side, as `Reference`, but of the compiled code; `seconds` of every step."""
+    """N controllers side by side, as `Reference`, but of the compiled code; `seconds` of every step.
+
+    `handed`: the plan at a sample, where it is handed in.
+    """
 
     def __init__(self, library: ctypes.CDLL, controller: Controller, *, single: bool, lanes: int) -> None:
         super().__init__(library, controller, single=single)
@@ -74,19 +78,23 @@ class Compiled(Read):
         fields += [(name, self._real * m) for name in ("q", "feedback", "held", "before")]
         kind = type("State", (ctypes.Structure,), {"_fields_": fields})
         self._states = [kind() for _ in range(lanes)]
-        self._start = self._function(library, f"{controller.name}_start")
-        self._step = self._function(library, f"{controller.name}_step")
+        family = controller.boxes is not None
+        self._start = self._function(library, f"{controller.name}_start", 2 if family else 0)
+        self._step = self._function(
+            library, f"{controller.name}_step", (2 if controller.held else 3) if family else 0
+        )
+        self.handed: Handed | None = None
         self.seconds: list[float] = []
         self.status = np.zeros(lanes, dtype=np.intp)
 
     def start(self, y: Array) -> Array:
         """The inputs (N, m) that act from 0 on, for what is measured at 0, (N, n)."""
-        return self._run(self._start, y)
+        return self._run(self._start, y, () if self.handed is None else self.handed[:2])
 
     def step(self, y: Array) -> Array:
         """The inputs (N, m) that act a delay from now on."""
         begin = time.perf_counter()
-        found = self._run(self._step, y)
+        found = self._run(self._step, y, () if self.handed is None else self.handed)
         self.seconds.append((time.perf_counter() - begin) / len(y))
         return found
 
@@ -101,19 +109,22 @@ class Compiled(Read):
         """What is measured, (N, n), as numbers of its type."""
         return np.asarray(y, dtype=self._type).astype(np.float64)
 
-    def _function(self, library: ctypes.CDLL, name: str) -> Callable[..., int]:
+    def _function(self, library: ctypes.CDLL, name: str, handed: int) -> Callable[..., int]:
         function = getattr(library, name)
-        function.argtypes = (ctypes.c_void_p, ctypes.POINTER(self._real), ctypes.POINTER(self._real))
+        function.argtypes = (ctypes.c_void_p, *(ctypes.POINTER(self._real),) * (2 + handed))
         function.restype = ctypes.c_int
         return function  # type: ignore[no-any-return]
 
-    def _run(self, function: Callable[..., int], y: Array) -> Array:
+    def _run(self, function: Callable[..., int], y: Array, handed: Sequence[Array]) -> Array:
         given = np.ascontiguousarray(y, dtype=self._type)
+        plan = [np.ascontiguousarray(each[0], dtype=self._type) for each in handed]
+        plan = plan[: len(function.argtypes) - 3]  # type: ignore[attr-defined]
         found = np.zeros(self._shape, dtype=self._type)
         pointer = ctypes.POINTER(self._real)
         for lane, (row, out) in enumerate(zip(given, found, strict=True)):
             state = ctypes.byref(self._states[lane])
-            self.status[lane] = function(state, row.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+            vectors = (each.ctypes.data_as(pointer) for each in (row, *plan, out))
+            self.status[lane] = function(state, *vectors)
         return found.astype(float)
 
 

@@ -39,13 +39,22 @@ class Pieces:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Boxes:
+    """What x* (n) and u* (m) of a family of plans keep to."""
+
+    x: tuple[tuple[Fraction, Fraction], ...]
+    u: tuple[tuple[Fraction, Fraction], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Steering(ABC):
     """A plan and the feedback around it, which every controller has.
 
     `name` begins every name in the code; `hash` is that of the certificate. Times in s; `horizon` None
     without end; `level`: d(x*, x) stays below it, and `reach` what d(x*, .) is at most where the feedback
     looks, as it is computed; `metric` is M, empty where it is not constant: then geodesics are `swept`; `ranges`:
-    what is proven of every input. Of the plan, either the program `plan` or `pieces`.
+    what is proven of every input. Of the plan, either the program `plan`, or `pieces`, or `boxes`: then it is any of a
+    family, and handed in.
     """
 
     name: str
@@ -65,6 +74,7 @@ class Steering(ABC):
     flow: Program
     law: Program
     swept: Swept | None = None
+    boxes: Boxes | None = None
 
     @property
     @abstractmethod

@@ -7,7 +7,8 @@ integrated by Runge and Kutta's rule, a few steps for each sample. Nothing is pr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
@@ -19,13 +20,16 @@ from tubecert.export.accounted import Accounted, accounts
 from tubecert.export.compiled import Compiled
 from tubecert.export.controller import Controller, Steering
 from tubecert.export.program import Program, Writer
-from tubecert.export.reference import Around, Reference, execute
+from tubecert.export.question import pieces_of
+from tubecert.export.reference import Around, Reference, execute, handed_at
 from tubecert.expression import ZERO
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.feedback import force
 from tubecert.simulate.monte_carlo import case, disturbance_of
 from tubecert.simulate.problem import Beside, Disturbance
 from tubecert.simulate.setting import Setting
+from tubecert.trajectory import Plan
+from tubecert.trajectory.pieces import PiecewisePlan
 
 _STEPS: Final = 2  # of the integration, at least, between instants at which an input changes
 _SQUARE, _GREEDY = 1.0, 2.0  # choices of noise, see `simulate.problem.Beside`
@@ -88,7 +92,8 @@ def driven(
     """Random runs and adversaries, as `simulate` draws them; every run is a lane of `code`."""
     kind = setting.on_machine or setting.uncertainty
     cases = [case(setting, kind, given.seed, number) for number in range(given.count)]
-    plant = Plant(setting, controller, disturbance_of(setting, kind, cases))
+    around = controller if controller.boxes is None else following(controller, setting.plan)
+    plant = Plant(setting, around, disturbance_of(setting, kind, cases))
     reference = Reference(controller=controller)
     x = np.array([item.start for item in cases])
     samples = int(Fraction(setting.horizon).limit_denominator(10**9) / controller.sample_time)
@@ -102,6 +107,8 @@ def driven(
         reference.sample = k
         plant.turn(x)
         y = plant.measured(x)
+        if controller.boxes is not None:
+            reference.handed = code.handed = handed_at(around, k)
         if k == 0:
             acting = code.start(y)
             seen.compare(acting, reference.start(y))
@@ -130,6 +137,32 @@ def driven(
         worst=float(np.max(code.seconds)),
         precision=given.precision,
         lost=None if accounted is None else accounted.share,
+    )
+
+
+def following(controller: Controller, plan: Plan) -> Controller:
+    """The controller of a family of plans, along one of them."""
+    if not isinstance(plan, PiecewisePlan):
+        raise ValueError("members of a family go through knots")
+    return replace(controller, boxes=None, pieces=pieces_of(plan, controller.sample_time))
+
+
+def joined(parts: Sequence[Driven]) -> Driven:
+    """Runs along several plans as one."""
+    before, escapes = 0, list[int]()
+    for each in parts:
+        escapes += [before + lane for lane in each.escapes]
+        before += each.runs
+    return replace(
+        parts[0],
+        runs=before,
+        difference=max(each.difference for each in parts),
+        scale=max(each.scale for each in parts),
+        distance=max(each.distance for each in parts),
+        escapes=tuple(escapes),
+        told=sum(each.told for each in parts),
+        step=parts[-1].step,  # the times of all calls are in it
+        worst=parts[-1].worst,
     )
 
 

@@ -62,6 +62,11 @@ class Exported:
                 f"a program for {platform} acts at samples, and certificate C is about feedback in continuous time",
                 "give the specification a section hardware, and export certificate H",
             )
+        if self.controller.boxes is not None:
+            raise refused(
+                f"a program for {platform} would need the planner, as the plan is handed in at every sample",
+                "write it around step, which is given x* and u*",
+            )
         name, text = skeleton(self.controller, platform)
         return replace(self, files={**self.files, name: text})
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 from typing import Final
 
 from tubecert.export import tables
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.controller import Controller, Pieces, Steering
+from tubecert.export.controller import Boxes, Controller, Pieces, Steering
 from tubecert.export.listing import decimal, lines
 from tubecert.export.program import GREATEST, LEAST, RATIO, TABLE, Program
 from tubecert.export.sweeps import in_python
 from tubecert.export.vectors import Vectors
-from tubecert.export.words import TIMING, heading, promise
+from tubecert.export.words import heading, promise, timing
 
 _WIDTH: Final = 96
 
@@ -54,7 +55,7 @@ def python(controller: Controller, vectors: Vectors) -> str:
 def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield f'"""{heading(c)}'
     yield ""
-    yield from (*promise(c), "", *TIMING)
+    yield from (*promise(c), "", *timing(c))
     yield '"""'
     yield ""
     yield "import math"
@@ -74,7 +75,8 @@ def _module(c: Controller, vectors: Vectors) -> Iterator[str]:
         yield f"MEETS = {c.pieces.most}  # so many pieces of the plan can meet one sample"
     if c.every > 1:
         yield f"EVERY = {c.every}  # samples from one feedback to the next"
-    yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add feedforward(t) all the time"
+    outside = "feedforward(t)" if c.boxes is None else "u*(t)"
+    yield f"ADDS_PLAN = {c.adds_plan}  # whether u* is in what step returns; else add {outside} all the time"
     yield from functions(c)
     if c.swept is not None:
         yield from in_python(c.swept, len(c.states))
@@ -128,9 +130,12 @@ def _function(program: Program) -> Iterator[str]:
 
 
 def plan_in_python(c: Steering) -> Iterator[str]:
-    """x*(t) and u*(t); where the plan has knots, also the search of the piece."""
+    """x*(t) and u*(t); where the plan has knots, also the search of the piece; of a family, whether it is one of it."""
     yield ""
     yield ""
+    if c.boxes is not None:
+        yield from _belongs_in_python(c.boxes)
+        return
     yield "def on_plan(t):"
     yield '    """x*(t) and u*(t); beyond the horizon those at its end."""'
     if c.horizon is not None:
@@ -153,9 +158,22 @@ def plan_in_python(c: Steering) -> Iterator[str]:
     yield "    return low"
 
 
+def _belongs_in_python(boxes: Boxes) -> Iterator[str]:
+    """The boxes of a family, and whether x* and u* lie in them."""
+    yield "# The boxes that x* and u* of every plan keep to: least and most of each."
+    for name, ends in (("BOX_X", boxes.x), ("BOX_U", boxes.u)):
+        yield f"{name} = {entries([f'({decimal(low)}, {decimal(high)})' for low, high in ends])}"
+    yield ""
+    yield ""
+    yield "def strays(x, u):"
+    yield '    """Whether x* or u* is not in its box."""'
+    yield "    pairs = (*zip(x, BOX_X), *zip(u, BOX_U))"
+    yield "    return not all(low <= value <= high for value, (low, high) in pairs)"
+
+
 def _mean(c: Controller) -> Iterator[str]:
     """The mean of u* over a sample, where it is not held."""
-    if c.adds_plan:
+    if c.adds_plan or c.boxes is not None:
         return
     yield ""
     yield ""
@@ -177,19 +195,22 @@ def _mean(c: Controller) -> Iterator[str]:
 
 
 def _class(c: Controller) -> Iterator[str]:
-    m = len(c.inputs)
-    yield ""
-    yield ""
-    yield "def feedforward(t):"
-    yield '    """u*(t), (m,), t in s since the start."""'
-    yield "    return np.array(on_plan(t)[1])"
+    m, family = len(c.inputs), c.boxes is not None
+    plan, handed = (", xs, us", ", xs, us") if family else ("", "")
+    played = ", mean_us" if family and not c.held else ""
+    if not family:
+        yield ""
+        yield ""
+        yield "def feedforward(t):"
+        yield '    """u*(t), (m,), t in s since the start."""'
+        yield "    return np.array(on_plan(t)[1])"
     yield ""
     yield ""
     yield "class Controller:"
     yield '    """The controller: `start` at t = 0, then `step` at every sample, the first one at t = 0 as well.'
     yield ""
     yield "    `status` is 0, or a sum of: 1, the horizon is over; 2, what was measured is not in the tube;"
-    yield "    4, no feedback can contract there."
+    yield f"    4, no feedback can contract there{'; 8, the plan is not in its boxes' if family else ''}."
     yield '    """'
     yield ""
     yield "    def __init__(self):"
@@ -199,39 +220,53 @@ def _class(c: Controller) -> Iterator[str]:
     yield f"        self.q = (0.0,) * {m}"
     yield f"        self.feedback = self.held = self.before = (0.0,) * {m}"
     yield ""
-    yield "    def start(self, y):"
+    yield f"    def start(self, y{plan}):"
     yield '        """Forgets everything; the input (m,) that acts at once, for what is measured at t = 0, (n,)."""'
     yield "        self.__init__()"
-    yield "        self.feedback = self._law(tuple(map(float, y)), 0.0)"
+    if family:
+        yield "        xs, us = tuple(map(float, xs)), tuple(map(float, us))"
+    yield f"        self.feedback = self._law(tuple(map(float, y)), 0.0{handed})"
+    if family:
+        yield "        self.status += 8 if strays(xs, us) else 0"
     yield "        self.held = self.before = self.feedback"
     yield "        return np.array(self.held)"
     yield ""
-    yield "    def step(self, y):"
+    yield f"    def step(self, y{plan}{played}):"
     yield '        """The input (m,) that acts from DELAY s after this sample on, for what is measured now, (n,)."""'
     yield "        y = tuple(map(float, y))"
+    if family:
+        yield "        xs, us = tuple(map(float, xs)), tuple(map(float, us))"
+        yield "        astray = strays(xs, us)"
     yield "        self.status = 0"
     yield "        t = self.sample * SAMPLE_TIME"
     yield "        f = drift(y)"
     yield "        estimate = self.q"
     yield "        if self.sample > 0:"
     mean = "" if c.adds_plan else ", mean_of_plan((self.sample - 1) * SAMPLE_TIME, t)"
+    if played:
+        mean = ", mean_us"
+        yield "            mean_us = tuple(map(float, mean_us))"
+        yield "            astray = astray or strays(xs, mean_us)"
     yield f"            mean = applied(self.held, self.before{mean})"
     yield "            self.q, estimate = estimator(y, f, self.y, self.f, self.q, mean)"
-    fed = f"self.feedback = self._law({'self._predicted(y, t), t + DELAY' if c.predicts else 'y, t'})"
+    fed = f"self.feedback = self._law({'self._predicted(y, t), t + DELAY' if c.predicts else 'y, t'}{handed})"
     if c.every > 1:
         yield "        self.status = 1 if t > HORIZON else 0"
         yield "        if self.sample % EVERY == 0:"
         yield f"            {fed}"
     else:
         yield f"        {fed}"
+    if family:
+        yield "        self.status += 8 if astray else 0"
     yield "        self.before = self.held"
     yield "        self.held = tuple(p - q for p, q in zip(self.feedback, estimate))"
     yield "        self.y, self.f = y, f"
     yield "        self.sample += 1"
     yield "        return np.array(self.held)"
     yield ""
-    yield "    def _law(self, y, t):"
-    yield "        x, u = on_plan(t)"
+    yield f"    def _law(self, y, t{', x, u' if family else ''}):"
+    if not family:
+        yield "        x, u = on_plan(t)"
     ends = "" if c.swept is None else ", *geodesic(x, y)"
     yield f"        kappa, (square, excess, size) = law(y, drift(y), x, flow(x, u), u{ends})"
     yield "        self.status = 1 if t > HORIZON else 0"
@@ -261,7 +296,7 @@ def _test(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield ""
     yield "# What is measured, and what the producer of this file computed for it: the self-test."
     yield "MEASURED = ("
-    for row in vectors.y:
+    for row in vectors.given:
         yield f"    {entries([repr(value) for value in row])},"
     yield ")"
     yield "EXPECTED = ("
@@ -274,7 +309,14 @@ def _test(c: Controller, vectors: Vectors) -> Iterator[str]:
     yield "def self_test():"
     yield '    """The largest difference to what the producer computed; ValueError where it is too large."""'
     yield "    controller = Controller()"
-    yield "    found = [controller.start(MEASURED[0]), *(controller.step(y) for y in MEASURED)]"
+    if c.boxes is None:
+        yield "    found = [controller.start(MEASURED[0]), *(controller.step(y) for y in MEASURED)]"
+    else:
+        n, m = len(c.states), len(c.inputs)
+        ends = [0, n, 2 * n, 2 * n + m, *(() if c.held else (2 * n + 2 * m,))]
+        cuts = ", ".join(f"row[{a}:{b}]" for a, b in pairwise(ends))
+        yield f"    rows = [({cuts}) for row in MEASURED]"
+        yield "    found = [controller.start(*rows[0][:3]), *(controller.step(*row) for row in rows)]"
     yield "    worst = float(np.max(np.abs(np.array(found) - np.array(EXPECTED))))"
     yield "    if not worst <= TOLERANCE:"
     yield '        raise ValueError(f"the self-test fails: the largest difference is {worst}")'

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -92,16 +92,27 @@ def _chosen(name: str, a: Array, b: Array, real: type) -> Array:
     return np.where(a > b, b / a, real(1))
 
 
+class Handed(NamedTuple):
+    """Of a plan that is handed in at a sample: x* (1, n), u* (1, m), and the mean of u* over the last sample."""
+
+    x: Array
+    u: Array
+    mean: Array
+
+
 @dataclass(slots=True, kw_only=True)
 class Around:
-    """Plan, feedback and distance of a controller, for N states side by side."""
+    """Plan, feedback and distance of a controller, for N states side by side; `handed`: the plan at a sample."""
 
     controller: Steering
     real: type = np.float64
+    handed: Handed | None = None
 
     def plan(self, t: Array) -> tuple[Array, Array]:
         """x* (1, n) and u* (1, m) at a time; beyond the horizon those at its end."""
         c, real = self.controller, self.real
+        if self.handed is not None:
+            return np.asarray(self.handed.x, dtype=real), np.asarray(self.handed.u, dtype=real)
         if c.horizon is not None:
             t = min(t, real(float(c.horizon)))
         if c.plan is not None:
@@ -195,6 +206,8 @@ class Reference(Around):
             given += execute(c.gauss, *nodes, real=real)
         elif c.pieces is not None and not c.held:
             given.append(_mean_on_pieces(c.pieces, begin, self.time(), real))
+        elif self.handed is not None and not c.held:
+            given.append(np.asarray(self.handed.mean, dtype=real))
         (mean,) = execute(c.applied, *given, real=real)
         return mean
 
@@ -211,6 +224,16 @@ class Reference(Around):
             ]
             (y,) = execute(c.predictor, y, *inputs, real=real)
         return y
+
+
+def handed_at(controller: Controller, sample: int) -> Handed:
+    """What a planner hands in at a sample that follows the pieces of a controller."""
+    own, pieces = Reference(controller=controller, sample=sample), controller.pieces
+    x, u = own.plan(own.time())
+    if pieces is None or not sample:
+        return Handed(x, u, u)
+    begin = np.float64(sample - 1) * float(controller.sample_time)
+    return Handed(x, u, _mean_on_pieces(pieces, np.asarray(begin), own.time(), np.float64))
 
 
 def _place(pieces: Pieces, t: Array, real: type) -> int:

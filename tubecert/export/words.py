@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
@@ -15,6 +16,10 @@ _EXACT: Final = (
     "covered: exact arithmetic is assumed, and so are the exact mean of u* over a sample and, where the",
     "feedback predicts, the exact solution of its model. To have it covered, certify the specification with",
     "hardware: {arithmetic: double} (or single).",
+)
+_HANDED: Final = (
+    "What the proof covers: the loop of theorem H in EXACT arithmetic, for every plan of the family. The rounding",
+    "of this code, and of what is handed in, is not covered: exact arithmetic is assumed.",
 )
 _ROUNDED: Final = (
     "What the proof covers: the loop of theorem H-R, which is this code with the rounding of its arithmetic.",
@@ -30,6 +35,28 @@ TIMING: Final = (
 )
 
 
+_PLANNED: Final = (
+    "The plan is handed in: `start` and `step` are given x* and u* of the instant of their sample.{mean}",
+    "It may be any plan that keeps to the boxes of the certificate, is continuous in x*, and satisfies the",
+    "dynamics up to the defect that is stated there. A planner may replace it where the new one begins at x*",
+    "of the old one. Status 8 says that a number that was handed in is not in its box (nor is one that rounding",
+    "has carried beyond the end). It cannot say more: whether x* goes from sample to sample as the dynamics do,",
+    "what lies between samples, and whether mean_us is the mean of the u* that acted, are for the planner to",
+    "keep (tubecert check --family examines a plan).",
+)
+_MEAN: Final = (
+    "\n`step` is also given mean_us, the mean of u* since the sample before (at the first one not read)."
+)
+
+
+def timing(controller: Controller) -> tuple[str, ...]:
+    """Who has to do what, and when."""
+    if controller.boxes is None:
+        return TIMING
+    mean = "" if controller.held else _MEAN
+    return (*TIMING, "", *"\n".join(_PLANNED).format(mean=mean).split("\n"))
+
+
 _SWEPT: Final = (
     "The metric is not constant. What is lost because its geodesics are computed, of panels with a constant",
     "second derivative, is part of the proof (theorem H-G).",
@@ -38,7 +65,9 @@ _SWEPT: Final = (
 
 def promise(controller: Controller) -> tuple[str, ...]:
     """What the proof says of rounding, and of computed geodesics."""
-    rounding = _EXACT if controller.lost is None else _ROUNDED
+    rounding: tuple[str, ...] = _EXACT if controller.lost is None else _ROUNDED
+    if controller.boxes is not None:
+        rounding = _HANDED
     return rounding if controller.swept is None else (*rounding, *_SWEPT)
 
 
@@ -82,9 +111,14 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield ""
     yield "## How to call it"
     yield ""
-    yield from TIMING
+    yield from timing(c)
     yield ""
-    if not c.adds_plan:
+    if not c.adds_plan and c.boxes is not None:
+        yield "u\\* is *not* in what `step` gives: the certificate is about a feedforward that acts in continuous time."
+        yield "What acts on the plant is, at every time t, u\\*(t) and what `step` gave. If your actuator can only hold"
+        yield "its input, certify that: `hardware: {feedforward: held}`."
+        yield ""
+    elif not c.adds_plan:
         yield "u\\* is *not* in what `step` gives: the certificate is about a feedforward that acts in continuous time."
         yield "What acts on the plant is, at every time t, `feedforward(t)` and what `step` gave. If your actuator can"
         yield "only hold its input, certify that: `hardware: {feedforward: held}`."
@@ -103,9 +137,13 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield f"| horizon | {'none' if c.horizon is None else f'{float(c.horizon):.9g} s'} |"
     for name, (low, high) in zip(c.inputs, c.ranges, strict=True):
         yield f"| proven range of {name} | [{low:.9g}, {high:.9g}] |"
+    for name, (first, last) in _boxed(c):
+        yield f"| {name}\\* of every plan | [{float(first):.9g}, {float(last):.9g}] |"
     yield ""
     yield "`step` (in Python: `status`) returns 0, or a sum of 1 (the horizon is over), 2 (what was measured cannot be"
     yield "the state of this loop: an assumption does not hold) and 4 (no input could contract here: the same)."
+    if c.boxes is not None:
+        yield "8: the plan is not in its boxes."
     yield ""
     yield "## What a step costs"
     yield ""
@@ -119,6 +157,11 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     if precision is not None:
         yield ""
         yield "There is no allocation, no recursion, and no loop without a bound."
+
+
+def _boxed(c: Controller) -> Iterator[tuple[str, tuple[Fraction, Fraction]]]:
+    if c.boxes is not None:
+        yield from zip((*c.states, *c.inputs), (*c.boxes.x, *c.boxes.u), strict=True)
 
 
 OPERATIONS: Final = {

@@ -19,10 +19,13 @@ from tubecert.progress import Progress
 from tubecert.report.progress import timed
 
 if TYPE_CHECKING:
+    from tubecert.certificate.result import Result
     from tubecert.export.driven import Driven
+    from tubecert.simulate.setting import Setting
     from tubecert.spec import Spec
 
 RUNS: Final = 20
+MEMBERS: Final = 4  # plans of a family, among which the runs are shared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,9 +122,8 @@ def attacked(
     from tubecert.export.continuous import compiled as all_the_time
     from tubecert.export.continuous.driven import driven as all_the_time_driven
     from tubecert.export.controller import Continuous
-    from tubecert.export.driven import Given, driven
+    from tubecert.export.driven import Given, driven, joined
     from tubecert.simulate.certified import adopted, require_tube
-    from tubecert.simulate.setting import setting_of
 
     certificate = certification.certificate
     system = adopted(system, certificate.result)
@@ -130,13 +132,27 @@ def attacked(
     if found.language == "python":
         message = "a controller in Python is not driven: it computes what the reference computes"
         raise TubecertError([Finding(code="TC712", message=message, help="export it in C")])
-    lanes = max(1, attack.runs)
-    setting = setting_of(system, certificate.result, attack.duration)
+    settings = _settings(system, certificate.result, attack)
+    lanes = max(1, -(-attack.runs // len(settings)))
     controller, given = found.controller, Given(count=lanes, seed=attack.seed, precision=found.precision)
     if isinstance(controller, Continuous):
         with all_the_time.compiled(found, lanes) as acting:
-            done = all_the_time_driven(setting, acting, controller, given, report)
+            parts = [all_the_time_driven(own, acting, controller, given, report) for own in settings]
     else:
         with compiled(found, lanes) as code:
-            done = driven(setting, code, controller, given, report)
+            parts = [driven(own, code, controller, given, report) for own in settings]
+    done = joined(parts)
     return Drive(found=done, folder=folder)
+
+
+def _settings(system: Spec, result: Result, attack: Attack) -> list[Setting]:
+    """One; or of a family one for each of some plans, which are random and keep to its boxes."""
+    from tubecert.model import build
+    from tubecert.simulate.members import drawing_of, member
+    from tubecert.simulate.setting import horizon_of, setting_of
+
+    if system.trajectory.bundle is None:
+        return [setting_of(system, result, attack.duration)]
+    drawing = drawing_of(system, build(system), horizon_of(system, attack.duration))
+    plans = [member(drawing, attack.seed, number) for number in range(min(MEMBERS, attack.runs))]
+    return [setting_of(system, result, attack.duration, plan) for plan in plans]

@@ -48,7 +48,7 @@ def rounded(
 def _lost(bounded: Bounded, known: Known, recipe: HardwareRecipe, arithmetic: Arithmetic) -> Rounding:
     """With some room, as decimals."""
     if bounded.question.spec.trajectory.bundle is not None:
-        raise _refused(bounded, "of a family of plans no code is exported")
+        raise _refused(bounded, "of a plan that is handed in no bound of rounding is derived")
     gain = Fraction(bounded.problem.constants.feedback_gain.above)
     try:
         own = rounding_of(assembled(_machine(bounded, known, recipe, gain)), arithmetic)

@@ -8,7 +8,7 @@ mean of u* over a sample, and the prediction of theorem H-P. So this examines co
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -21,6 +21,7 @@ from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.curve import CLOCK
 from tubecert.recheck.document import read
+from tubecert.recheck.family import Everyone
 from tubecert.recheck.kinds.hardware import OfMachines
 from tubecert.recheck.kinds.hardware_section import HardwareSection
 from tubecert.recheck.recipe import Digital
@@ -54,6 +55,8 @@ def machine_of(text: str, file: str) -> Machine:
     hardware = case.result.specification.hardware
     if hardware is None or (recipe.feedback_time / recipe.sample_time).denominator > 1:
         raise ValueError(_NO_MACHINE)
+    if isinstance(case.curve, Everyone):
+        return OfFamily(case, section, recipe, held=hardware.held)
     return Machine(case, section, recipe, held=hardware.held)
 
 
@@ -190,3 +193,41 @@ class Machine(Steering):
         last = slope(moved(h, third), t + h)
         mean = [a + 2 * b + 2 * c + d for a, b, c, d in zip(first, second, third, last, strict=True)]
         return moved(h / 6, mean)
+
+
+@dataclass(frozen=True)
+class OfFamily(Machine):
+    """The machine of a family of plans: rows of what is measured go on with x*, u* and, if it is played, its mean."""
+
+    plans: tuple[tuple[Column, Column, Column], ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether u* is held."""
+        return self.held
+
+    def answers(self, measured: Sequence[Column]) -> Iterator[Column]:
+        """(H.3)-(H.5), for the plan that is handed in."""
+        parts = [self.split(row) for row in measured]
+        own = replace(self, plans=tuple((x, u, mean) for _, x, u, mean in parts))
+        yield from Machine.answers(own, [y for y, *_ in parts])
+
+    def split(self, row: Column) -> tuple[Column, Column, Column, Column]:
+        """What is measured, x*, u*, and the mean of u*, if there is any."""
+        n, m = len(self.case.system.states), len(self.case.system.inputs)
+        return row[:n], row[n : 2 * n], row[2 * n : 2 * n + m], row[2 * n + m :]
+
+    def plan(self, t: Fraction, within: Fraction | None = None) -> tuple[Column, Column]:
+        """x* and u* at a sample."""
+        x, u, _ = self.plans[self._sample(t)]
+        return x, u
+
+    def played(self, begin: Fraction, end: Fraction) -> Column:
+        """The mean of u* up to a sample."""
+        return self.plans[self._sample(end)][2]
+
+    def _sample(self, t: Fraction) -> int:
+        k = t / self.recipe.sample_time
+        if k.denominator > 1:
+            raise ValueError("a plan that is handed in is known at samples only")
+        return int(k)

@@ -22,6 +22,7 @@ from tubecert.recheck.code.tree import (
     parts,
 )
 from tubecert.recheck.controller import Machine
+from tubecert.recheck.family import Everyone
 from tubecert.recheck.steering import Steering
 from tubecert.recheck.terms import in_order, table_of
 
@@ -39,6 +40,7 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
     if code.macros.get(f"{big}_EVERY", Number("1")) != Number(str(every)):
         yield "EVERY"
     yield from of_tables(code, formulas)
+    yield from of_boxes(code, formulas)
     own, m = code.functions["estimator"], len(case.system.inputs)
     box = box_of(own, m)
     ends = [(Number(low), Number(high)) for low, high in box or ()]
@@ -71,6 +73,20 @@ def of_tables(code: Code, formulas: Steering) -> Iterator[str]:
                 is_number(code, Number(text), value) for text, value in zip(found, wanted, strict=True)
             ):
                 yield f"{kind}_{table.name}"
+
+
+def of_boxes(code: Code, formulas: Steering) -> Iterator[str]:
+    """Names of ends of the boxes of a family that are others in the code."""
+    curve = formulas.case.curve
+    if not isinstance(curve, Everyone):
+        return
+    for name, box in zip("XU", curve.boxes, strict=True):
+        for words, k in (("LEAST", 0), ("MOST", 1)):
+            found = list(entries(code.tables.get(f"{words}_{name}", ())))
+            if len(found) != len(box) or not all(
+                is_number(code, Number(text), ends[k]) for text, ends in zip(found, box, strict=True)
+            ):
+                yield f"{words}_{name}"
 
 
 def is_number(code: Code, tree: Expr | None, value: Fraction) -> bool:

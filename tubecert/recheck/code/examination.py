@@ -22,7 +22,7 @@ from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Value, Vector, numbers
 from tubecert.recheck.code.seen import KINDS, Rounded, known
 from tubecert.recheck.code.words import UnreadError
-from tubecert.recheck.controller import BITS, machine_of
+from tubecert.recheck.controller import BITS, OfFamily, machine_of
 from tubecert.recheck.controller import Machine as Formulas
 from tubecert.recheck.steering import Column, Steering
 
@@ -137,9 +137,17 @@ def _answers(code: Code, formulas: Formulas, measured: Sequence[Column]) -> Iter
     m, state = len(formulas.case.system.inputs), machine.state()
     for k, row in enumerate((measured[0], *measured)):
         u: Vector = [None] * m
-        y: Vector = [known(each) for each in row]
-        machine.call(f"{code.name}_{'step' if k else 'start'}", state, y, u)
+        given: list[Vector] = [[known(each) for each in part] for part in _handed(formulas, row)]
+        if k:
+            machine.call(f"{code.name}_step", state, *given, u)
+        else:
+            machine.call(f"{code.name}_start", state, *given[:3], u)
         yield u
+
+
+def _handed(formulas: Formulas, row: Column) -> list[Column]:
+    """The vectors that a row is handed in as."""
+    return [part for part in formulas.split(row) if part] if isinstance(formulas, OfFamily) else [row]
 
 
 _CLOSE = arb(10) ** -10  # s, of a knot
