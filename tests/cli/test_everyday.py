@@ -300,3 +300,23 @@ def test_the_workflow_that_is_documented_is_one():
         assert run("check", *options, "--help").exit_code == 0
     ci = (ROOT / ".ci" / "run").read_text("utf-8")
     assert '"$bin/tubecert" check --strict --certify' in ci
+
+
+# synth, of a file that is not complete
+
+
+def test_a_metric_at_a_rate_needs_no_uncertainty_and_no_trajectory(folder):
+    (folder / "plant.yaml").write_text(
+        "tubecert: 1\nname: cart\nsystem: {states: [p, v], inputs: [u], f: [v, -v], B: [[0], [1]]}\n"
+        "safe_set: {p: [-1, 1], v: [-2, 2]}\ninitial_state: {at: [3, 3]}\n",
+        encoding="utf-8",
+    )
+    found = run("synth", folder / "plant.yaml", "--rate", "1/2")
+    assert found.exit_code == 0, found.stderr
+    assert json.loads((folder / "plant.metric.json").read_text("utf-8"))["rate"] == 0.5
+    refused = run("synth", folder / "plant.yaml")
+    assert refused.exit_code == 2
+    assert (
+        "plant.yaml:1:11: error TC105: the specification lacks uncertainty and trajectory" in refused.stderr
+    )
+    assert run("certify", folder / "plant.yaml").exit_code == 2

@@ -51,9 +51,9 @@ def run(given: Given, output: Output) -> ExitCode:
         spare(place, {"specification": given.spec})
     if given.plot and Path(given.plot).suffix.lower() != ".svg":
         raise refused(f"cannot write {given.plot}: the comparison is drawn as SVG", "give a file FILE.svg")
-    from tubecert import spec
+    from tubecert.spec.load import load_plant
 
-    system = spec.load(given.spec, settings)
+    system = load_plant(given.spec, settings)
     spare(target, {"plan": plan_of(given.spec, system)})
     wanted = wanted_of(system, _wishes(given, numbers), flag)
     from tubecert import pipeline

@@ -19,6 +19,9 @@ Examples:
   tubecert certify plant.yaml --metric metric.json
 
 \b
+A file without uncertainty or trajectory will do where a rate is asked for: nothing is certified with it then.
+
+\b
 Exit codes: 0 a metric was proven and written; 1 no metric has the rate (the report says why); 2 invalid
 input; 4 none was found, or none certifies (the report says what was tried and what would help).
 """

@@ -15,12 +15,16 @@ from typing import Final, Literal
 
 from tubecert.expression import graph
 from tubecert.expression.graph import Expression, topological
+from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
 from tubecert.expression.parse import Parsed, parse
 from tubecert.expression.scan import ExpressionError
 
 Side = Literal["nearest", "below", "above"]
 
 DIGITS: Final = 30
+_MEASURED: Final = re.compile(
+    r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z][\w/*^ ]*?)\s*"
+)
 _NOT_FINITE = frozenset({"nan", "inf", "infinity"})
 _FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
 _NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
@@ -118,6 +122,12 @@ def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, E
     try:
         return parse(text, symbols=symbols), factor
     except ExpressionError as error:
+        measured = _MEASURED.fullmatch(text)
+        if error.kind == "symbol" and measured and re.split(r"\W", measured[2])[0] in UNITS:
+            help = instead_of(*measured.groups())
+            raise ExpressionError(
+                HAS_NONE, help=help, offset=measured.start(2), width=len(measured[2]), kind="value"
+            ) from None
         if error.kind == "symbol":
             names = f"; it may use {', '.join(sorted(symbols)[:20])}" if symbols else ""
             error.help = f"write a number such as 0.1, without a unit (only deg is one){names}"

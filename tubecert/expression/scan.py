@@ -16,6 +16,7 @@ from typing import Final, Literal
 
 from tubecert.expression.elsewhere import ELSEWHERE
 from tubecert.expression.graph import FUNCTIONS as SMOOTH
+from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
 
 MAX_LENGTH: Final = 4_000
 MAX_DEPTH: Final = 50
@@ -106,8 +107,6 @@ _FOREIGN = {
     "$": "remove it",
 }
 _EQUATION = re.compile(r"[:=!<>]?=")
-_SYMBOLS = "m mm cm km s ms us min h Hz kHz N Nm kN kg g V mV A mA W kW J Pa bar K C F rpm percent"
-_UNITS = frozenset(_SYMBOLS.split())
 _LOOKALIKES = {
     "\u2212": "-", "\u2010": "-", "\u2011": "-", "\u2012": "-", "\u2013": "-", "\u2014": "-", "\ufe63": "-",
     "\uff0d": "-", "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u2217": "*", "\u2219": "*", "\u2022": "*",
@@ -206,8 +205,8 @@ def _glued(token: _Token, tail: str) -> ExpressionError:
         )
     if tail[0] == "." or tail[0].isdigit():
         return whole.error(f"{whole.text} is not a number", "write one decimal point")
-    if tail in _UNITS:
-        return whole.error("a number has no unit", _without(token.text, tail))
+    if tail in UNITS:
+        return whole.error(HAS_NONE, instead_of(token.text, tail))
     return whole.error(f"{whole.text} lacks a multiplication sign", f"write {token.text}*{tail}")
 
 
@@ -359,18 +358,13 @@ class _Walk:
         assert self.last is not None
         left = self.last.text if self.last.text != ")" else "(...)"
         right = token.text if token.text != "(" else "(...)"
-        if self.last.kind == "number" and token.text in _UNITS:
-            return token.error("a number has no unit", _without(left, right))
+        if self.last.kind == "number" and token.text in UNITS:
+            return token.error(HAS_NONE, instead_of(left, right))
         if self.last.kind == "name" and token.text == "(":
             message = f"{left} is not a function; for a product a sign is missing"
         else:
             message = "a multiplication sign or another operator is missing"
         return token.error(message, f"write {left}*{right}")
-
-
-def _without(number: str, unit: str) -> str:
-    """What to write for a number with a unit behind it."""
-    return f"write {number}, in the units of the other numbers; if {unit} is a parameter: {number}*{unit}"
 
 
 _ANGLES = {

@@ -7,7 +7,7 @@ from tubecert.findings import Finding, Location, Severity
 from tubecert.letters import ALL, HARDWARE, name_of
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
-from tubecert.spec import Spec
+from tubecert.spec import Spec, Synthesis
 from tubecert.spec.system import NO_SEARCH
 from tubecert.stages.time import time_of
 from tubecert.verdict import Verdict
@@ -68,6 +68,16 @@ def moving_drift(spec: Spec) -> list[Finding]:
         return []
     message = "f depends on t, and metrics are not found for that"
     return [Finding(code="TC112", message=message, location=spec.location("system.f"), help=NO_SEARCH)]
+
+
+def missing_sections(spec: Spec, wanted: Synthesis) -> list[Finding]:
+    """What metrics are compared by and the specification lacks, where they are compared by what they certify."""
+    if not spec.lacks or wanted.objective not in ("adaptation", "tube"):
+        return []
+    lacking = " and ".join(spec.lacks)
+    message = f"the specification lacks {lacking}, and metrics are compared by what they certify"
+    help = f"add {lacking}; or ask for the best metric at a rate, which needs neither: --rate 1 (in 1/s)"
+    return [Finding(code="TC105", message=message, location=spec.location("tubecert"), help=help)]
 
 
 def missing_radii(spec: Spec) -> list[Finding]:

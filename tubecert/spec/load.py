@@ -97,6 +97,15 @@ def load_system(path: str, settings: Sequence[Setting] = ()) -> Spec:
     return load_source(read_source(path), settings, alone=True)
 
 
+def load_plant(path: str, settings: Sequence[Setting] = ()) -> Spec:
+    """The specification in a file that may lack `uncertainty` and `trajectory`: a metric alone can be asked for then.
+
+    Of one that lacks either, `Spec.lacks` says what, and system, safe set, metric and tube are read; the rest is as
+    `load_system` leaves it. Raises as `load` does.
+    """
+    return load_source(read_source(path), settings, partial=True)
+
+
 def load_text(text: str, file: str = "<text>") -> Spec:
     """The specification in a text; `file` is what findings call it."""
     return load_source(Source.of(file, text))
@@ -107,8 +116,10 @@ def again(spec: Spec, settings: Sequence[Setting]) -> Spec:
     return load_source(Source.of(spec.path, spec.source), settings) if settings else spec
 
 
-def load_source(source: Source, settings: Sequence[Setting] = (), *, alone: bool = False) -> Spec:
-    """The specification in a source; see `load_system` for a system `alone`."""
+def load_source(
+    source: Source, settings: Sequence[Setting] = (), *, alone: bool = False, partial: bool = False
+) -> Spec:
+    """The specification in a source; see `load_system` for a system `alone`, `load_plant` for one in part."""
     check_limits(source)
     node, findings = compose(source)
     node, misplaced = put(node, settings)
@@ -117,7 +128,7 @@ def load_source(source: Source, settings: Sequence[Setting] = (), *, alone: bool
     reader.findings.extend(findings)
     spec = None
     if not any(finding.code in (codes.YAML_SYNTAX, codes.LIMIT) for finding in findings):
-        spec = _read(root_field(reader, node), settings, alone=alone)
+        spec = _read(root_field(reader, node), settings, alone=alone, partial=partial)
     if reader.findings or spec is None:
         raise SpecError(_ordered(reader.findings))
     return spec
@@ -130,7 +141,7 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
     return capped(sorted(findings, key=position), codes.LIMIT)
 
 
-def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | None:
+def _read(root: Field, settings: Sequence[Setting], *, alone: bool, partial: bool) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
@@ -138,13 +149,15 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
         return None
     entries = (
         root.mapping(required=_SYSTEM, optional=(*_REQUIRED, *_OPTIONAL))
-        if alone
+        if alone or partial
         else root.mapping(required=_REQUIRED, optional=_OPTIONAL)
     )
     if entries is None:
         return None
-    if alone:
-        entries = {key: entries[key] for key in (*_SYSTEM, "metric", "expect") if key in entries}
+    lacks = tuple(key for key in _REQUIRED if key not in entries) if partial else ()
+    if alone or lacks:
+        beside = ("metric", "expect") if alone else ("metric", "tube")
+        entries = {key: entries[key] for key in (*_SYSTEM, *beside) if key in entries}
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
     system = (
@@ -161,7 +174,9 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool) -> Spec | No
     names = with_outputs(names, system.get("outputs"))
     spec = _read_named(root.reader, entries, system, name, names)
     return (
-        None if spec is None else replace(spec, settings=tuple((each.path, each.text) for each in settings))
+        None
+        if spec is None
+        else replace(spec, settings=tuple((each.path, each.text) for each in settings), lacks=lacks)
     )
 
 

@@ -375,6 +375,9 @@ class Spec:
     hardware: Hardware | None = None
     disturbance: Disturbance | None = None
     settings: tuple[tuple[str, str], ...] = ()  # keys set by the command line, with their texts
+    lacks: tuple[
+        str, ...
+    ] = ()  # sections that a file may lack of which a metric alone is asked (`load_plant`)
     locations: Places = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
