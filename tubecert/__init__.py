@@ -7,6 +7,8 @@ of it is imported before it is used.
 import sys
 from types import ModuleType
 
+from tubecert.release import __version__
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from tubecert.progress import Phase, Step, Unit
     from tubecert.verdict import Verdict
 
-__version__ = "0.1.0"
 __all__ = [
     "Certification",
     "Checked",

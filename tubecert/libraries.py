@@ -9,7 +9,7 @@ import platform
 from importlib import metadata
 from typing import Final
 
-from tubecert import __version__
+from tubecert.release import __version__
 
 DECIDING: Final = (
     "numpy",

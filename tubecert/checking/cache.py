@@ -15,7 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import tubecert
 from tubecert.checking.expectations import Outcome
 from tubecert.findings import Finding
 from tubecert.kept import keep, read_kept
@@ -55,7 +54,7 @@ def _key(content: Any) -> str:
 @cache
 def _program() -> list[str]:
     """A fingerprint of the program: its source, and the versions of all that results rest on."""
-    package = Path(tubecert.__file__).parent
+    package = Path(__file__).parents[1]
     source = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         source.update(path.relative_to(package).as_posix().encode() + path.read_bytes())

@@ -201,7 +201,7 @@ def _write_log(error: BaseException) -> Path | None:
     import traceback
     from pathlib import Path
 
-    from tubecert import __version__
+    from tubecert.release import __version__
 
     text = "\n".join(
         (

@@ -22,7 +22,7 @@ class Color(StrEnum):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from tubecert import __version__
+        from tubecert.release import __version__
 
         typer.echo(f"tubecert {__version__}")
         raise typer.Exit

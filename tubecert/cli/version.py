@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from tubecert import __version__
 from tubecert.cli.guard import write_stdout
 from tubecert.libraries import versions
+from tubecert.release import __version__
 
 if TYPE_CHECKING:
     from tubecert.cli.options import Output

@@ -11,7 +11,6 @@ from fractions import Fraction
 
 import numpy as np
 
-import tubecert
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.errors import SpecError
@@ -21,6 +20,7 @@ from tubecert.model import ControlAffineModel
 from tubecert.planner import cache, ilqr
 from tubecert.planner.rollout import Dynamics
 from tubecert.progress import Phase, Progress, Step, Unit
+from tubecert.release import __version__
 from tubecert.spec import Knots, Spec, Task, canonical
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import Room, misses
@@ -96,7 +96,7 @@ def _content(spec: Spec) -> dict[str, object]:
     """Everything that a plan follows from."""
     whole = canonical(spec)
     return {
-        "version": tubecert.__version__,
+        "version": __version__,
         "numpy": np.__version__,
         "system": {key: whole["system"][key] for key in ("states", "inputs", "f", "B")},
         "trajectory": whole["trajectory"],

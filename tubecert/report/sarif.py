@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from tubecert import __version__
 from tubecert.checking import Checked
 from tubecert.findings import Finding, Location, Severity
 from tubecert.printable import printable_json
+from tubecert.release import __version__
 from tubecert.report.pages import codes
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
