@@ -19,7 +19,7 @@ from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
 from tubecert.recheck.balls import exact, root
 from tubecert.recheck.code.about import About
-from tubecert.recheck.code.examination import model_of, moves_of
+from tubecert.recheck.code.examination import model_of, moves_of, read_by
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.continuous import Adapted
@@ -128,6 +128,7 @@ def bounds(c: Controller, formulas: Any, files: tuple[str, str]) -> dict[str, fl
             held=formulas.held,
             moves=moves_of(formulas, exact(1)) if c.moves else (),  # n_E of noise that is known by its length
             model=model_of(formulas),
+            tables=read_by(formulas),
         )
         found = lost_by(read_code(*files), about)
         names = ("feedback", "input", "estimate", *(("prediction",) if c.predicts else ()))
@@ -144,3 +145,12 @@ def predicting(delay: str, *, held: bool) -> tuple[Controller, Machine]:
     section = SimpleNamespace(predict=True, clip=given.clip)
     c = assembled(replace(given, recipe=replace(own, rounding=(ANY,)), feedback_gain=DU))
     return c, replace(in_recheck("orbit"), recipe=own, section=section, held=held)
+
+
+def with_a_table() -> tuple[Controller, Machine]:
+    """The controller "turning" without its prediction, about rounding, and the machine as recheck reads it."""
+    given = GIVEN["turning"]
+    own = replace(given.recipe, prediction=None)
+    c = assembled(replace(given, recipe=replace(own, rounding=(ANY,)), feedback_gain=DU))
+    section = SimpleNamespace(predict=False, clip=given.clip)
+    return c, replace(in_recheck("turning"), recipe=own, section=section)

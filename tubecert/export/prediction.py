@@ -1,6 +1,6 @@
 """What a predicted state is off by: its integration by Runge and Kutta's rule, its rounding, and its inputs. Trusted.
 
-Implements: theory 8.11 (H.44).
+Implements: theory 8.11 (H.46).
 
 That is r_p of theorem H-R where a state is predicted. In: what can go in, as intervals over the whole plan. Of the
 error of a step four derivatives vanish at length 0, so that the fifth one bounds it.

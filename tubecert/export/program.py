@@ -69,6 +69,10 @@ class Program:
         """The constants as floats, by place; 0 elsewhere."""
         return tuple(float(step.value) for step in self.steps)
 
+    def table(self, step: Step) -> Lookup:
+        """The one whose function a step calls."""
+        return next(own for own in self.tables if step.name == f"{TABLE}{own.name}")
+
     @property
     def operations(self) -> dict[str, int]:
         """How often each operation is done; every step counts once."""

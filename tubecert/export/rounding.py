@@ -2,10 +2,9 @@
 
 In: a `Controller` and the type it computes in. Out: the numbers of theorem H-R (theory 8.11), each an upper bound.
 Every operation is followed twice: what it gives in exact arithmetic lies in an interval, and what a computer gives
-differs from that by at most an error. Both are rounded outward. Nothing is assumed of how errors cancel.
-
-Assumed of the computer, and said in the files: IEEE 754, rounded to nearest, every operation in its own type or fused
-with the next; functions of math.h within 4 units in the last place (sqrt, by IEEE 754, within half a unit).
+differs from that by an error at most, both rounded outward. Nothing is assumed of how errors cancel.
+Assumed, and said in the files: IEEE 754, rounded to nearest, every operation in its own type or fused with the next;
+functions of math.h within 4 units in the last place (sqrt, by IEEE 754, within half a unit).
 """
 
 from __future__ import annotations
@@ -43,11 +42,12 @@ from tubecert.export.followed import (
     size_of,
     steepest,
 )
+from tubecert.export.lookups import followed as looked_up
 from tubecert.export.prediction import Predicted, off
-from tubecert.export.program import GREATEST, LEAST, Program, Step
+from tubecert.export.program import GREATEST, LEAST, TABLE, Program, Step
 from tubecert.spec import Arithmetic
 
-_LIBRARY: Final = 8  # units of rounding that a function of math.h may be off: 4 in the last place
+_LIBRARY: Final = 8  # units that a function of math.h may be off: 4 in the last place
 _GAUSS: Final = 2016000  # of the error of Gauss's rule with three nodes: f^(6) length^6/2016000 of the mean
 _MOST_SAMPLES: Final = 2**32 - 1
 _PIECES: Final = 64  # of the horizon, along which a plan is followed
@@ -71,12 +71,10 @@ class _Analysis:
     def __init__(self, controller: Controller, real: Float) -> None:
         if controller.swept is not None:
             raise UncoveredError("geodesics that are computed")
-        if controller.tables:
-            raise UncoveredError("the function of a table")
         if controller.pieces is not None and not controller.pieces.continuous:
             raise UncoveredError("a plan through knots whose input jumps")
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)
-        self.eta = Interval.of(real.least)
+        self.eta, self.estimate = Interval.of(real.least), Interval.of(controller.estimate)
         self.m, self.n = len(controller.inputs), len(controller.states)
         W = inverse([list(row) for row in controller.metric])
         self.widths = [sqrt(Interval.of(W[i][i])) * Interval.of(controller.reach) for i in range(self.n)]
@@ -218,20 +216,16 @@ class _Analysis:
 
     def _written(self, law: _Law, us: Sequence[Followed]) -> Interval:
         """u* and the two sums that make the input of kappa, u* and the estimate."""
-        most = law.feedback + largest_of(size_of(us)) + self._estimate
+        most = law.feedback + largest_of(size_of(us)) + self.estimate
         return largest_of(length_of(us)) + 3 * self.u * (most + most) + 4 * self.m * self.eta
-
-    @property
-    def _estimate(self) -> Interval:
-        return Interval.of(self.c.estimate)
 
     def _clipped(self) -> Interval:
         """The projection: of a box its ends are rounded, of a ball the length, the share and the product."""
-        square = self.m * self._estimate * self._estimate
+        square = self.m * self.estimate * self.estimate
         self._require_no_overflow((square,))
         # a length of which the square underflows may not be clipped
         unseen = 2 * sqrt((self.m + 2) * self.eta)
-        return (self.m + 8) * self.u * self._estimate + 4 * self.m * self.eta + unseen
+        return (self.m + 8) * self.u * self.estimate + 4 * self.m * self.eta + unseen
 
     # -- the estimate
 
@@ -242,13 +236,13 @@ class _Analysis:
         pieces = len(y[0].error)
         # what was measured a sample before may lie in the piece before
         last_y, last_f = [over_pieces(x) for x in y], [over_pieces(x) for x in f]
-        held = law.feedback + largest_of(size_of(us)) + 2 * self._estimate
+        held = law.feedback + largest_of(size_of(us)) + 2 * self.estimate
         acted = [known_by_size(held, pieces) for _ in range(self.m)]
         given = {"held": acted, "before": acted}
         if not self.c.adds_plan:
             given["played"] = self._played(us, self._written(law, us))
         mean = self._run(self.c.applied, given)["mean"]
-        q = [known_by_size(self._estimate, pieces) for _ in range(self.m)]
+        q = [known_by_size(self.estimate, pieces) for _ in range(self.m)]
         seen = {"y": y, "f": f, "last_y": last_y, "last_f": last_f}
         apart = ("y", "last_y") if self.c.moves else None
         new = self._run(self.c.estimator, {**seen, "q": q, "mean": mean}, apart)["q"]
@@ -342,17 +336,19 @@ class _Analysis:
         if step.operation == "input":
             return given[step.name][step.index]
         if step.operation == "constant":
-            off = abs(step.value - self.real.near(step.value))
-            return Followed(value=Interval.of(step.value), error=np.asarray(Interval.of(off).hi))
+            off = Interval.of(abs(step.value - self.real.near(step.value)))
+            return Followed(value=Interval.of(step.value), error=np.asarray(off.hi))
         args = [memory[place] for place in step.places]
         if step.operation == "neg":
             return Followed(value=-args[0].value, error=args[0].error)
         if step.operation == "choose":
             return self._chosen(step.name, args[0], args[1])
+        if step.name.startswith(TABLE):
+            return looked_up(program.table(step), args[0], self.real, self._rounded)
         if step.operation == "call":
             found = self._called(step.name, args[0])
-            clamped = program.steps[step.places[0]].name == GREATEST  # never below 0, whatever the rounding
             least = (args[0].value - Interval.exact(args[0].error)).lo
+            clamped = program.steps[step.places[0]].name == GREATEST  # never below 0, whatever the rounding
             sure = clamped or step.name != "sqrt" or bool(np.all(least >= 0))
             return found if sure else replace(found, error=found.error + np.inf)
         return self._rounded(*combined(step.operation, args[0], args[1]))

@@ -9,6 +9,7 @@ from fractions import Fraction
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.code.prediction import Model
 from tubecert.recheck.curve import Curve
+from tubecert.recheck.lookup import Table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +18,7 @@ class About:
 
     `metric` M and `widths` sqrt(W_ii); `reach` bounds d(x*, y); `gain` is du, `estimate` bounds |q|, `radius` |q^|;
     `share` is th; `held`: u* is held from sample to sample. `moves`: how far what is measured moves in one, by state.
-    `model` is what a prediction integrates; None without one.
+    `tables` are those that its functions read. `model` is what a prediction integrates; None without one.
     """
 
     curve: Curve
@@ -33,6 +34,7 @@ class About:
     held: bool
     moves: Sequence[Ball] = ()
     model: Model | None = None
+    tables: tuple[Table, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

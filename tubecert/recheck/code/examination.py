@@ -16,6 +16,7 @@ from flint import arb, arb_mat, ctx
 from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root, spectral_norm
 from tubecert.recheck.code.about import About
 from tubecert.recheck.code.constants import otherwise
+from tubecert.recheck.code.lookups import tables_in
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.prediction import STEPS, Model
 from tubecert.recheck.code.reader import Code
@@ -24,6 +25,7 @@ from tubecert.recheck.code.seen import KINDS, Rounded, known
 from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.controller import BITS, OfFamily, machine_of
 from tubecert.recheck.controller import Machine as Formulas
+from tubecert.recheck.lookup import Table
 from tubecert.recheck.steering import Column, Steering
 
 _SLACK = 16  # units of rounding of the largest input, for integrals that are computed by fine steps
@@ -208,6 +210,15 @@ def about(formulas: Formulas) -> About:
         held=formulas.held,
         moves=moves_of(formulas, noise.noise_size),
         model=model_of(formulas),
+        tables=read_by(formulas),
+    )
+
+
+def read_by(formulas: Formulas) -> tuple[Table, ...]:
+    """Functions given by tables, in f, B and the plan."""
+    system, curve = formulas.case.system, formulas.case.curve
+    return tables_in(
+        [*(row[0] for row in system.f), *(e for row in system.B for e in row), *curve.x, *curve.u]
     )
 
 

@@ -15,6 +15,7 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root
 from tubecert.recheck.code.about import About, Lost
+from tubecert.recheck.code.lookups import looked_up
 from tubecert.recheck.code.pieces import (
     any_of,
     jumps,
@@ -111,7 +112,11 @@ class _Analysis:
         return length([own.error for own in numbers(found)]) + exactly
 
     def _machine(self, **instead: Own) -> Machine:
-        return Machine(self.code, self.rounded, instead, self.tables)
+        return Machine(self.code, self.rounded, self._functions | instead, self.tables)
+
+    @cached_property
+    def _functions(self) -> dict[str, Own]:
+        return looked_up(self.code, self.of.tables, self.rounded)
 
     # -- the plan
 
@@ -159,7 +164,6 @@ class _Analysis:
 
     @property
     def _begun(self) -> Ball:
-        """How far a knot is off."""
         return greatest([own.error for own in numbers(self.tables["START"])])
 
     @cached_property
@@ -217,7 +221,7 @@ class _Analysis:
             rest = [[known(arb(0)) for _ in range(k)] for k in (self.n, self.n, self.m)]
             told = empty(3)
             f, vs, us = (list[Value](each) for each in rest)
-            Machine(self.code, own).call("law", y, f, xs, vs, us, empty(self.m), told)
+            Machine(self.code, own, self._functions).call("law", y, f, xs, vs, us, empty(self.m), told)
             square = numbers(told[:1])[0]
             if square.degree != 2:
                 raise UnreadError("the square of the distance is no form of degree 2")

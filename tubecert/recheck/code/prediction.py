@@ -1,6 +1,6 @@
 """What a predicted state is off by: the rule of Runge and Kutta, its rounding, and the input that it is given.
 
-Implements: theory 8.11 (H.44).
+Implements: theory 8.11 (H.46).
 
 That is r_p of theorem H-R where a state is predicted. The text is followed over all four steps, as every
 function is; how far four exact steps are from the solution is bounded from the terms of the certificate: the error of

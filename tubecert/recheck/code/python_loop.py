@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tubecert.recheck.code.lookups import form_of
 from tubecert.recheck.code.pieces import MEAN
 
 
@@ -37,11 +38,6 @@ class Pair:
     c: str
 
 
-def halvings(count: int) -> int:
-    """Enough for the search of one of so many."""
-    return max(1, (count - 1).bit_length())
-
-
 def search(name: str, begins: str, count: int) -> Pair:
     """The last of numbers that a value is not below."""
     return Pair(
@@ -55,7 +51,13 @@ def {name}(t):
 """,
         f"""
 static int {name}(real t) {{
-    {_halved(begins, count, "t")}
+    int low = 0, high = {count} - 1, k;
+    for (k = 0; k < {max(1, (count - 1).bit_length())}; k++) {{
+        const int middle = (low + high + 1) / 2;
+        if (low < high) {{
+            if (t >= {begins}[middle]) {{ low = middle; }} else {{ high = middle - 1; }}
+        }}
+    }}
     return low;
 }}
 """,
@@ -74,25 +76,8 @@ def table_{name}(x):
     s, c = x - AT_{name}[low], CUBIC_{name}[low]
     return c[0] + s * (c[1] + s * (c[2] + s * c[3]))
 """,
-        f"""
-static real table_{name}(real x) {{
-    {_halved(f"at_{name}", count, "x")}
-    const real s = x - at_{name}[low];
-    return cubic_{name}[low][0] + s * (cubic_{name}[low][1]
-        + s * (cubic_{name}[low][2] + s * cubic_{name}[low][3]));
-}}
-""",
+        form_of(name, count),
     )
-
-
-def _halved(begins: str, count: int, value: str) -> str:
-    return f"""int low = 0, high = {count} - 1, k;
-    for (k = 0; k < {halvings(count)}; k++) {{
-        const int middle = (low + high + 1) / 2;
-        if (low < high) {{
-            if ({value} >= {begins}[middle]) {{ low = middle; }} else {{ high = middle - 1; }}
-        }}
-    }}"""
 
 
 def functions(own: Loop) -> dict[str, Pair]:
