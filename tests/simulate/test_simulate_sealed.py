@@ -258,6 +258,7 @@ def test_only_the_command_and_the_library_use_what_simulates():
         if "tubecert.simulate"
         in "".join(line for line in path.read_text("utf-8").splitlines() if "import" in line)
     }
-    beside = {Path("report", "simulation.py"), Path("export", "driven.py")}
+    driven = {Path("export", "driven.py"), Path("export", "continuous", "driven.py")}
+    beside = {Path("report", "simulation.py"), *driven}
     rooms = {path.parts[0] for path in users - beside}
     assert rooms == {"simulate", "cli", "library"}
