@@ -193,6 +193,7 @@ def loop(text: str, plan: Plan | None = None, **values: Any) -> Loop:
         "horizon": own.horizon,
         "ranges": ((-4.0, 4.0),) * len(own.model.inputs),
         "feedback_gain": Fraction("6.302"),
+        "boxes": own.boxes,
     }
     return Loop(**(given | values))
 
@@ -208,6 +209,8 @@ def looped(name: str) -> Loop:
         return loop((CONFIGS / "two_state_orbit.yaml").read_text("utf-8"))
     if name == "turning":  # B(x), a table, two inputs, coordinates of the tube
         return loop(TURNING, coordinates=(("1", "0", "0"), ("0", "2", "0"), ("0", "1/3", "1")))
+    if name == "family":  # any plan
+        return loop(ANY)
     return loop(PATH, piecewise_plan(build(load_text(PATH)), KNOTS), horizon=Fraction("0.31"))  # knots
 
 
@@ -224,7 +227,7 @@ def _of_family(name: str) -> Controller:
 
 
 FAMILIES = {name: partial(_of_family, name) for name in ("played", "held")}
-CONTINUOUS = {name: partial(_together, name) for name in ("orbit", "turning", "path")}
+CONTINUOUS = {name: partial(_together, name) for name in ("orbit", "turning", "path", "family")}
 
 
 def wandering(controller: Controller, samples: int, lanes: int, seed: int) -> np.ndarray:

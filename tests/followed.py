@@ -22,8 +22,9 @@ from tubecert.recheck.code.about import About
 from tubecert.recheck.code.examination import model_of, moves_of, read_by
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
-from tubecert.recheck.continuous import Adapted
-from tubecert.recheck.controller import Machine, OfFamily
+from tubecert.recheck.continuous import Adapted, OfFamily
+from tubecert.recheck.controller import Machine
+from tubecert.recheck.controller import OfFamily as OfPlans
 from tubecert.recheck.curve import Knots, hermite
 from tubecert.recheck.document import read
 from tubecert.recheck.sampling import SampledGains
@@ -42,7 +43,10 @@ TEXTS = {
     "steep": controllers.STEEP,
     "bent": controllers.BENT,
 }
-LOOPED = {"orbit": (controllers.CONFIGS / "two_state_orbit.yaml").read_text("utf-8")}
+LOOPED = {
+    "orbit": (controllers.CONFIGS / "two_state_orbit.yaml").read_text("utf-8"),
+    "family": controllers.ANY,
+}
 
 
 def in_recheck(name: str) -> Machine:
@@ -55,12 +59,12 @@ def in_recheck(name: str) -> Machine:
     return Machine(case, section, given.recipe, held=given.held)
 
 
-def family_in_recheck(name: str) -> OfFamily:
+def family_in_recheck(name: str) -> OfPlans:
     """The machine of a hand-made controller of a family, as recheck reads it."""
     given = controllers.of_family(name)
     case = _case(controllers.ANY, given, knotted=False)
     section = SimpleNamespace(predict=False, clip=given.clip)
-    return OfFamily(case, section, given.recipe, held=given.held)
+    return OfPlans(case, section, given.recipe, held=given.held)
 
 
 def adapted_in_recheck(name: str) -> Adapted:
@@ -68,10 +72,10 @@ def adapted_in_recheck(name: str) -> Adapted:
     given = controllers.looped(name)
     own = given.recipe
     gains = SampledGains(own.sample_time, own.bandwidth, own.predictor_gain, own.projection_radius)
-    case = _case(LOOPED.get(name, TEXTS[name]), given, knotted=name == "path")
+    case = _case((TEXTS | LOOPED)[name], given, knotted=name == "path")
     case.metric = SimpleNamespace(lower=SimpleNamespace(below=Fraction(1)))
     case.tube.rho = given.reach
-    return Adapted(case, gains)
+    return (OfFamily if given.boxes else Adapted)(case, gains)
 
 
 def _case(text: str, given: Any, *, knotted: bool) -> SimpleNamespace:

@@ -28,12 +28,12 @@ from tubecert.export.continuous.assembly import together
 from tubecert.export.continuous.compiled import compiled
 from tubecert.export.continuous.driven import driven
 from tubecert.export.continuous.reference import Reference
-from tubecert.export.continuous.vectors import instants, run, vectors
+from tubecert.export.continuous.vectors import instants, parts, run, vectors
 from tubecert.export.continuous.words import operations
 from tubecert.export.controller import Continuous, Controller
 from tubecert.export.driven import Given
 from tubecert.export.folder import exported
-from tubecert.export.reference import execute
+from tubecert.export.reference import Handed, execute
 from tubecert.library.certification import certification_of
 from tubecert.recheck.code.continuous import _answers, otherwise
 from tubecert.recheck.code.examination import apart
@@ -209,6 +209,24 @@ def test_a_strict_compiler_has_nothing_to_say(controller, precision, tmp_path):
     assert "passes" in done.stdout
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("x", "u", "status"), [([0.9, -0.5], [1.9], 0), ([0.91, 0.0], [0.0], 8), ([0, 0], [2], 8)]
+)
+def test_a_plan_outside_of_its_boxes_is_told(x, u, status):
+    module = module_of(in_python(CONTINUOUS["family"]()))
+    own = module.Controller()
+    own.start(x)
+    own.law(0.001, x, x, u)
+    assert own.status == status
+    if compiler() is not None:
+        with compiled(exported(CONTINUOUS["family"]())) as code:
+            code.start(np.array([x]))
+            code.handed = Handed(np.array([x]), np.array([u]), np.array([u]))
+            code.answer(0.001, np.array([x], dtype=float), np.array([x], dtype=float))
+            assert code.status[0] == status
+
+
 @needs_cc
 @pytest.mark.slow
 def test_c_computes_what_the_reference_computes(controller):
@@ -222,9 +240,9 @@ def test_c_computes_what_the_reference_computes(controller):
 
 def test_the_vectors_meet_every_branch(controller):
     given, own = np.array(vectors(controller).given), Reference(controller=controller)
-    n, clipped, acts = len(controller.states), set(), set()
+    clipped, acts = set(), set()
     for row in given:
-        x, xhat = row[None, 1 : 1 + n], row[None, 1 + n :]
+        x, xhat, own.handed = parts(controller, row)
         _, raw, estimate = execute(controller.estimator, x, xhat)
         clipped.add(bool(np.abs(raw - estimate).max() > 1e-9))
         acts.add(bool(np.abs(own.kappa(x, np.asarray(0.0))[0]).max() > 1e-9))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from tubecert.simulate.setting import Setting
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import PiecewisePlan
 
+C = TypeVar("C", bound=Steering)
 _STEPS: Final = 2  # of the integration, at least, between instants at which an input changes
 _SQUARE, _GREEDY = 1.0, 2.0  # choices of noise, see `simulate.problem.Beside`
 _MIXED, _ADDED, _MODULUS = 1103515245, 12345, 2**31  # the draws of `simulate.machine`
@@ -140,7 +141,7 @@ def driven(
     )
 
 
-def following(controller: Controller, plan: Plan) -> Controller:
+def following(controller: C, plan: Plan) -> C:
     """The controller of a family of plans, along one of them."""
     if not isinstance(plan, PiecewisePlan):
         raise ValueError("members of a family go through knots")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from fractions import Fraction
 from typing import Final
 
 from tubecert.export.blocks import INTEGRATION, NODES
-from tubecert.export.controller import Continuous, Controller
+from tubecert.export.controller import Continuous, Controller, Steering
 from tubecert.export.program import TABLE
 from tubecert.export.sweeps import counted
 
@@ -137,8 +136,7 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     yield f"| horizon | {'none' if c.horizon is None else f'{float(c.horizon):.9g} s'} |"
     for name, (low, high) in zip(c.inputs, c.ranges, strict=True):
         yield f"| proven range of {name} | [{low:.9g}, {high:.9g}] |"
-    for name, (first, last) in _boxed(c):
-        yield f"| {name}\\* of every plan | [{float(first):.9g}, {float(last):.9g}] |"
+    yield from boxed(c)
     yield ""
     yield "`step` (in Python: `status`) returns 0, or a sum of 1 (the horizon is over), 2 (what was measured cannot be"
     yield "the state of this loop: an assumption does not hold) and 4 (no input could contract here: the same)."
@@ -159,9 +157,11 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
         yield "There is no allocation, no recursion, and no loop without a bound."
 
 
-def _boxed(c: Controller) -> Iterator[tuple[str, tuple[Fraction, Fraction]]]:
+def boxed(c: Steering) -> Iterator[str]:
+    """Rows of a table: the boxes of a family of plans."""
     if c.boxes is not None:
-        yield from zip((*c.states, *c.inputs), (*c.boxes.x, *c.boxes.u), strict=True)
+        for name, (low, high) in zip((*c.states, *c.inputs), (*c.boxes.x, *c.boxes.u), strict=True):
+            yield f"| {name}\\* of every plan | [{float(low):.9g}, {float(high):.9g}] |"
 
 
 OPERATIONS: Final = {

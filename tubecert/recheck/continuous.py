@@ -17,6 +17,7 @@ from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.controller import BITS
 from tubecert.recheck.document import read
+from tubecert.recheck.family import Everyone
 from tubecert.recheck.kinds.sampled import Sampled, SampledRecipe, SampledSection
 from tubecert.recheck.sampling import SampledGains
 from tubecert.recheck.steering import Column, Steering, into_ball
@@ -44,7 +45,7 @@ def loop_of(text: str, file: str) -> Adapted:
         raise ValueError(_NO_LOOP)
     if section.verdict != "certified" or recipe.gains != section.pair or not case.system.flat:
         raise ValueError(_NO_LOOP)
-    return Adapted(case, recipe.gains)
+    return (OfFamily if isinstance(case.curve, Everyone) else Adapted)(case, recipe.gains)
 
 
 @dataclass(frozen=True)
@@ -69,18 +70,23 @@ class Adapted(Steering):
         u_a, sigma, s = [arb(0)] * m, [arb(0)] * m, [arb(0)] * n
         for k, row in enumerate(given):
             since = row[0]
-            x, xhat = ([exact(q) for q in part] for part in (row[1 : 1 + n], row[1 + n :]))
+            x, xhat = ([exact(q) for q in part] for part in (row[1 : 1 + n], row[1 + n : 1 + 2 * n]))
             apart = [a - b for a, b in zip(xhat, x, strict=True)]
             if k and since == 0:
                 sample += 1
                 u_a = _filtered(u_a, sigma, omega * exact(Ts))
                 s, sigma = self.adapted(x, apart)
-            us, free = self.plan(sample * Ts + since)
-            kappa = self.least(us, free, x)
+            star, free = self.along(sample * Ts + since, row[1 + 2 * n :])
+            kappa = self.least(star, free, x)
             acting = _filtered(u_a, sigma, omega * exact(since))
             u = [a + b + c for a, b, c in zip(free, kappa, acting, strict=True)]
             rate = [a + b - g * c for a, b, c in zip(self.speed(x, u), s, apart, strict=True)]
             yield [*u, *rate]
+
+    def along(self, t: Fraction, handed: Sequence[Fraction]) -> tuple[Column, Column]:
+        """x* and u* at a time."""
+        del handed
+        return self.plan(t)
 
     def adapted(self, x: Column, apart: Column) -> tuple[Column, Column]:
         """s_hat and sigma_hat, from x and xhat - x at a sample."""
@@ -89,6 +95,17 @@ class Adapted(Steering):
         s = [-g / grown.expm1() * each for each in apart]
         raw = self.explained(x, [grown.exp() * each for each in s])
         return s, into_ball(raw, self.gains.projection_radius)
+
+
+@dataclass(frozen=True)
+class OfFamily(Adapted):
+    """The same of a family of plans: rows go on with x* and u*."""
+
+    def along(self, t: Fraction, handed: Sequence[Fraction]) -> tuple[Column, Column]:
+        """What is handed in."""
+        del t
+        n = len(self.case.system.states)
+        return [exact(q) for q in handed[:n]], [exact(q) for q in handed[n:]]
 
 
 def _filtered(u: Column, sigma: Column, angle: Ball) -> Column:

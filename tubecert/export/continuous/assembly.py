@@ -17,7 +17,7 @@ from tubecert.enclosure.constant import printable_above
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.export import blocks
 from tubecert.export.continuous.blocks import Parts, estimator, filter_of, observer
-from tubecert.export.controller import Continuous, refused
+from tubecert.export.controller import Boxes, Continuous, refused
 from tubecert.export.geodesics import varies
 from tubecert.export.question import gain_of, horizon_of, identifier, pieces_of, question
 from tubecert.expression import free_symbols
@@ -30,7 +30,10 @@ from tubecert.verdict import Verdict
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
-    """What a controller of a certificate C is made of; `reach` is dbar, `coordinates` S by rows, `feedback_gain` du."""
+    """What a controller of a certificate C is made of; `reach` is dbar, `coordinates` S by rows, `feedback_gain` du.
+
+    `boxes` are those of a family of plans.
+    """
 
     name: str
     hash: str
@@ -42,6 +45,7 @@ class Loop:
     horizon: Fraction | None
     ranges: tuple[tuple[float, float], ...]
     feedback_gain: Fraction
+    boxes: Boxes | None = None
 
 
 def of_samples(certificate: Certificate, name: str) -> Continuous:
@@ -57,11 +61,7 @@ def of_samples(certificate: Certificate, name: str) -> Continuous:
     if not isinstance(recipe, SampledRecipe):
         raise incomplete(name, "the recipe of certificate C is missing")
     spec, plan, model = question(certificate)
-    if result.claim.plans is not None or spec.trajectory.bundle is not None:
-        raise refused(
-            "a certificate of a family of plans is not exported", "certify the plan that the machine follows"
-        )
-    tube = result.tube
+    tube, bundle = result.tube, spec.trajectory.bundle
     ranges = {
         own.input: (own.bounds[SAMPLED.key].least, own.bounds[SAMPLED.key].greatest)
         for own in result.inputs
@@ -79,6 +79,7 @@ def of_samples(certificate: Certificate, name: str) -> Continuous:
             horizon=horizon_of(certificate),
             ranges=tuple(ranges.get(each, (-math.inf, math.inf)) for each in model.inputs),
             feedback_gain=gain_of(certificate, name),
+            boxes=None if bundle is None else Boxes(x=bundle.x, u=bundle.u),
         )
     )
 
@@ -102,7 +103,8 @@ def together(loop: Loop) -> Continuous:
         reach=loop.reach,
         metric=inverse([[e.fraction for e in row] for row in model.W]),
         ranges=loop.ranges,
-        plan=blocks.plan(plan) if pieces is None else None,
+        plan=blocks.plan(plan) if pieces is None and loop.boxes is None else None,
+        boxes=loop.boxes,
         pieces=pieces,
         drift=blocks.drift(model),
         flow=blocks.flow(model),

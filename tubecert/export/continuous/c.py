@@ -7,9 +7,9 @@ from fractions import Fraction
 
 from tubecert.export.c import preamble
 from tubecert.export.c_language import C, comment
-from tubecert.export.c_loop import feedback_in_c, plan_in_c
+from tubecert.export.c_loop import feedback_in_c, handed, plan_in_c
 from tubecert.export.continuous.vectors import Vectors
-from tubecert.export.continuous.words import CALLS, PROMISE, heading
+from tubecert.export.continuous.words import PROMISE, calls, heading
 from tubecert.export.controller import Continuous
 
 
@@ -30,7 +30,7 @@ def self_test(c: Continuous, language: C, vectors: Vectors) -> str:
 
 def _header(c: Continuous, language: C) -> Iterator[str]:
     name, big = c.name, c.name.upper()
-    yield from comment((heading(c), "", f"Certificate: {c.hash}", "", *PROMISE, "", *CALLS))
+    yield from comment((heading(c), "", f"Certificate: {c.hash}", "", *PROMISE, "", *calls(c)))
     yield f"#ifndef {big}_H"
     yield f"#define {big}_H"
     yield ""
@@ -47,6 +47,8 @@ def _header(c: Continuous, language: C) -> Iterator[str]:
     yield f"#define {big}_OVER 1 /* the horizon is over: the proof says nothing any more */"
     yield f"#define {big}_OUTSIDE 2 /* the state is not in the tube: an assumption does not hold */"
     yield f"#define {big}_NO_FEEDBACK 4 /* no input could contract here: an assumption does not hold */"
+    if c.boxes is not None:
+        yield f"#define {big}_STRAYS 8 /* the plan is not in the boxes of the family: an assumption does not hold */"
     yield ""
     yield f"typedef {language.real} {name}_real;"
     yield ""
@@ -83,11 +85,12 @@ def _entries(c: Continuous) -> Iterator[tuple[str, str, str, tuple[str, ...]]]:
         "step",
         (state, x, f"const {xhat}"),
     )
+    plan = () if c.boxes is None else (f"const {real} xs[{big}_STATES]", f"const {real} us[{big}_INPUTS]")
     yield (
         "At every instant: u, for the state x, `since` s after the last sample.",
         "int",
         "law",
-        (f"const {state}", f"{real} since", x, f"{real} u[{big}_INPUTS]"),
+        (f"const {state}", f"{real} since", x, *plan, f"{real} u[{big}_INPUTS]"),
     )
     yield (
         "At every instant: xhat', u being the input that acts.",
@@ -95,7 +98,13 @@ def _entries(c: Continuous) -> Iterator[tuple[str, str, str, tuple[str, ...]]]:
         "predictor",
         (f"const {state}", x, f"const {xhat}", f"const {real} u[{big}_INPUTS]", f"{real} rate[{big}_STATES]"),
     )
-    yield "u*(t), t in s since the start.", "void", "feedforward", (f"{real} t", f"{real} u[{big}_INPUTS]")
+    if c.boxes is None:
+        yield (
+            "u*(t), t in s since the start.",
+            "void",
+            "feedforward",
+            (f"{real} t", f"{real} u[{big}_INPUTS]"),
+        )
 
 
 def _source(c: Continuous, language: C) -> Iterator[str]:
@@ -148,10 +157,14 @@ def _acting(c: Continuous) -> Iterator[str]:
     """`NAME_law`, `NAME_predictor` and `NAME_feedforward`."""
     name = c.name
     yield ""
-    yield f"int {name}_law(const {name}_state *c, real since, const real x[N], real u[M])"
+    plan = "" if c.boxes is None else "const real xs[N], const real us[M], "
+    yield f"int {name}_law(const {name}_state *c, real since, const real x[N], {plan}real u[M])"
     yield "{"
     yield f"    const real t = (real)c->sample * {name.upper()}_SAMPLE_TIME + since;"
-    yield "    const int status = feedback(x, t, u);"
+    status = f"feedback(x, {handed(c)}t, u)"
+    if c.boxes is not None:
+        status = f"(strays(xs, us) > 0 ? {name.upper()}_STRAYS : 0) + {status}"
+    yield f"    const int status = {status};"
     yield "    real u_a[M];"
     yield "    int i;"
     yield "    filtered(&since, c->u_a, c->sigma_hat, u_a);"
@@ -168,6 +181,8 @@ def _acting(c: Continuous) -> Iterator[str]:
     yield "    flow(x, u, v);"
     yield "    observer(v, x, xhat, c->s_hat, rate);"
     yield "}"
+    if c.boxes is not None:
+        return
     yield ""
     yield f"void {name}_feedforward(real t, real u[M])"
     yield "{"
@@ -187,7 +202,7 @@ def _self_test(c: Continuous, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"#define ROWS {len(vectors.given)}"
     yield f"#define TOLERANCE {language.number(Fraction(vectors.tolerance))}"
     yield "/* the time since the last sample (0: a sample), the state, and xhat */"
-    yield f"static const {name}_real GIVEN[ROWS][{1 + 2 * n}] = {{"
+    yield f"static const {name}_real GIVEN[ROWS][{len(vectors.given[0])}] = {{"
     for row in vectors.given:
         yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
     yield "};"
@@ -209,7 +224,8 @@ def _self_test(c: Continuous, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"        }} else if (!(GIVEN[k][0] > {zero})) {{"
     yield f"            {name}_step(&state, x, x + {big}_STATES);"
     yield "        }"
-    yield f"        (void){name}_law(&state, GIVEN[k][0], x, found);"
+    plan = "" if c.boxes is None else f"x + {2 * n}, x + {3 * n}, "
+    yield f"        (void){name}_law(&state, GIVEN[k][0], x, {plan}found);"
     yield f"        {name}_predictor(&state, x, x + {big}_STATES, found, found + {big}_INPUTS);"
     yield f"        for (i = 0; i < {m + n}; i++) {{"
     yield f"            const {name}_real error = found[i] - EXPECTED[k][i];"

@@ -10,9 +10,12 @@ from contextlib import contextmanager
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.export.c_loop import handed
 from tubecert.export.compiled import Read, library_of, probe
+from tubecert.export.continuous.vectors import parts
 from tubecert.export.controller import Continuous
 from tubecert.export.folder import Exported
+from tubecert.export.reference import Handed
 
 
 class Compiled(Read):
@@ -32,9 +35,10 @@ class Compiled(Read):
             ctypes.c_int,
             ctypes.c_void_p,
             self._real,
-            *(ctypes.c_void_p,) * 5,
+            *(ctypes.c_void_p,) * 7,
         )
         self._all.restype = None
+        self._controller, self.handed = controller, None if controller.boxes is None else _unknown(controller)
         self.seconds: list[float] = []
         self.status = np.zeros(lanes, dtype=np.intc)
 
@@ -55,9 +59,9 @@ class Compiled(Read):
 
     def answers(self, given: Array) -> Array:
         """u and xhat' (K, m + n) of one run, to rows of times, states and predictions."""
-        n, found = self._sizes[1], []
+        found = []
         for k, row in enumerate(given):
-            x, xhat = row[None, 1 : 1 + n], row[None, 1 + n :]
+            x, xhat, self.handed = parts(self._controller, row)
             if k == 0:
                 self.start(x)
             elif row[0] == 0:
@@ -69,12 +73,20 @@ class Compiled(Read):
         lanes, n, m = self._sizes
         given = [np.ascontiguousarray(each, dtype=self._type) for each in (x, xhat)]
         u, rate = np.zeros((lanes, m), dtype=self._type), np.zeros((lanes, n), dtype=self._type)
+        plan = [] if self.handed is None else self.handed[:2]
+        given += [np.ascontiguousarray(each[0], dtype=self._type) for each in plan] or [u, u]
         places = [each.ctypes.data_as(ctypes.c_void_p) for each in (*given, u, rate, self.status)]
         self._all(what, lanes, ctypes.byref(self._states), since, *places)
         return u.astype(float), rate.astype(float)
 
 
 _START, _STEP, _ANSWER = 0, 1, 2
+
+
+def _unknown(controller: Continuous) -> Handed:
+    """A plan that nobody reads."""
+    x, u = np.zeros((1, len(controller.states))), np.zeros((1, len(controller.inputs)))
+    return Handed(x, u, u)
 
 
 @contextmanager
@@ -94,7 +106,7 @@ def _lanes(c: Continuous) -> Iterator[str]:
     name = c.name
     head = (
         f"void {name}_all(int what, int lanes, {name}_state *c, real since, const real *x, const real *xhat, "
-        "real *u, real *rate, int *status)"
+        "const real *xs, const real *us, real *u, real *rate, int *status)"
     )
     yield f"{head};"
     yield head
@@ -106,7 +118,10 @@ def _lanes(c: Continuous) -> Iterator[str]:
     yield f"        }} else if (what == {_STEP}) {{"
     yield f"            {name}_step(c + k, x + k * N, xhat + k * N);"
     yield "        } else {"
-    yield f"            status[k] = {name}_law(c + k, since, x + k * N, u + k * M);"
+    if c.boxes is None:
+        yield "            (void)xs;"
+        yield "            (void)us;"
+    yield f"            status[k] = {name}_law(c + k, since, x + k * N, {handed(c)}u + k * M);"
     yield f"            {name}_predictor(c + k, x + k * N, xhat + k * N, u + k * M, rate + k * N);"
     yield "        }"
     yield "    }"

@@ -15,7 +15,8 @@ from tubecert.enclosure.interval import Array
 from tubecert.export.continuous.compiled import Compiled
 from tubecert.export.continuous.reference import Reference
 from tubecert.export.controller import Continuous
-from tubecert.export.driven import Driven, Given, Plant, Seen
+from tubecert.export.driven import Driven, Given, Plant, Seen, following
+from tubecert.export.reference import Around, Handed
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.monte_carlo import case, disturbance_of
 from tubecert.simulate.setting import Setting
@@ -35,7 +36,9 @@ def driven(
     """Random runs and adversaries, as `simulate` draws them; every run is a lane of `code`."""
     kind = setting.uncertainty
     cases = [case(setting, kind, given.seed, number) for number in range(given.count)]
-    plant = Plant(setting, controller, disturbance_of(setting, kind, cases))
+    around = controller if controller.boxes is None else following(controller, setting.plan)
+    plant = Plant(setting, around, disturbance_of(setting, kind, cases))
+    planner = None if controller.boxes is None else Around(controller=around)
     reference = Reference(controller=controller)
     x = np.array([item.start for item in cases])
     seen, Ts = Seen(np.zeros(given.count)), float(controller.sample_time)
@@ -52,8 +55,10 @@ def driven(
             code.step(x, xhat)
             reference.step(x, xhat)
         for j in range(steps):
+            _hand(code, planner, k * Ts + j * Ts / steps)
+            reference.handed = code.handed
             _compare(code, reference, (j * Ts / steps, x, xhat), seen)
-            x, xhat = _moved(plant, code, (k * Ts, j * Ts / steps, Ts / steps), x, xhat)
+            x, xhat = _moved(plant, (code, planner), (k * Ts, j * Ts / steps, Ts / steps), x, xhat)
             seen.told += int((code.status > 1).sum())
             plant.look(x, k * Ts + (j + 1) * Ts / steps, seen)
     return Driven(
@@ -69,6 +74,13 @@ def driven(
         worst=float(np.max(code.seconds)),
         precision=given.precision,
     )
+
+
+def _hand(code: Compiled, planner: Around | None, t: float) -> None:
+    """Of a family: the plan at a time."""
+    if planner is not None:
+        x, u = planner.plan(np.asarray(t))
+        code.handed = Handed(x, u, u)
 
 
 def _steps(setting: Setting, controller: Continuous) -> int:
@@ -87,12 +99,18 @@ def _compare(code: Compiled, reference: Reference, at: tuple[float, Array, Array
 
 
 def _moved(
-    plant: Plant, code: Compiled, span: tuple[float, float, float], x: Array, xhat: Array
+    plant: Plant,
+    acting: tuple[Compiled, Around | None],
+    span: tuple[float, float, float],
+    x: Array,
+    xhat: Array,
 ) -> tuple[Array, Array]:
     """States and xhat after a step, which begins `since` s after the sample at `begin`."""
     begin, since, h = span
+    code, planner = acting
 
     def slope(at: float, x: Array, xhat: Array) -> tuple[Array, Array]:
+        _hand(code, planner, begin + since + at)
         u, rate = code.answer(since + at, x, xhat)
         return plant.rate(x, begin + since + at, u), rate
 

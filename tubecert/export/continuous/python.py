@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.export.continuous.vectors import Vectors
-from tubecert.export.continuous.words import CALLS, PROMISE, heading
+from tubecert.export.continuous.words import PROMISE, calls, heading
 from tubecert.export.controller import Continuous
 from tubecert.export.listing import decimal
 from tubecert.export.python import entries, functions, plan_in_python
@@ -19,7 +19,7 @@ def python(c: Continuous, vectors: Vectors) -> str:
 def _module(c: Continuous, vectors: Vectors) -> Iterator[str]:
     yield f'"""{heading(c)}'
     yield ""
-    yield from (*PROMISE, "", *CALLS)
+    yield from (*PROMISE, "", *calls(c))
     yield '"""'
     yield ""
     yield "import math"
@@ -40,19 +40,20 @@ def _module(c: Continuous, vectors: Vectors) -> Iterator[str]:
 
 
 def _class(c: Continuous) -> Iterator[str]:
-    n, m = len(c.states), len(c.inputs)
-    yield ""
-    yield ""
-    yield "def feedforward(t):"
-    yield '    """u*(t), (m,), t in s since the start."""'
-    yield "    return np.array(on_plan(t)[1])"
+    n, m, family = len(c.states), len(c.inputs), c.boxes is not None
+    if not family:
+        yield ""
+        yield ""
+        yield "def feedforward(t):"
+        yield '    """u*(t), (m,), t in s since the start."""'
+        yield "    return np.array(on_plan(t)[1])"
     yield ""
     yield ""
     yield "class Controller:"
     yield '    """The controller: `start` at t = 0, `step` at later samples, `law` and `predictor` at every instant.'
     yield ""
     yield "    `status` is 0, or a sum of: 1, the horizon is over; 2, the state is not in the tube;"
-    yield "    4, no feedback can contract there."
+    yield f"    4, no feedback can contract there{'; 8, the plan is not in its boxes' if family else ''}."
     yield '    """'
     yield ""
     yield "    def __init__(self):"
@@ -72,14 +73,16 @@ def _class(c: Continuous) -> Iterator[str]:
     yield "        self.s_hat, _, self.sigma_hat = estimator(tuple(map(float, x)), tuple(map(float, xhat)))"
     yield "        self.sample += 1"
     yield ""
-    yield "    def law(self, since, x):"
+    yield f"    def law(self, since, x{', xs, us' if family else ''}):"
     yield '        """u (m,) for the state (n,), `since` s after the last sample."""'
     yield "        x, t = tuple(map(float, x)), self.sample * SAMPLE_TIME + since"
-    yield "        xs, us = on_plan(t)"
+    yield f"        xs, us = {'tuple(map(float, xs)), tuple(map(float, us))' if family else 'on_plan(t)'}"
     yield "        kappa, (square, excess, size) = law(x, drift(x), xs, flow(xs, us), us)"
     yield "        self.status = 1 if t > HORIZON else 0"
     yield "        self.status += 0 if square < REACH * REACH else 2"
     yield "        self.status += 4 if excess > 0.0 and not size > 0.0 else 0"
+    if family:
+        yield "        self.status += 8 if strays(xs, us) else 0"
     yield "        u_a = filtered((since,), self.u_a, self.sigma_hat)"
     yield "        return np.array([(k + p) + q for k, p, q in zip(kappa, us, u_a)])"
     yield ""
@@ -106,13 +109,14 @@ def _test(c: Continuous, vectors: Vectors) -> Iterator[str]:
     yield '    """What is answered to GIVEN: rows of u and xhat\'."""'
     yield "    controller, found = Controller(), []"
     yield "    for k, row in enumerate(GIVEN):"
-    yield f"        since, x, xhat = row[0], row[1:{1 + n}], row[{1 + n}:]"
+    yield f"        since, x, xhat = row[0], row[1:{1 + n}], row[{1 + n}:{1 + 2 * n}]"
     yield "        if k == 0:"
     yield "            if tuple(controller.start(x)) != x:"
     yield '                raise ValueError("the predictor starts elsewhere")'
     yield "        elif since == 0.0:"
     yield "            controller.step(x, xhat)"
-    yield "        u = controller.law(since, x)"
+    plan = "" if c.boxes is None else f", row[{1 + 2 * n}:{1 + 3 * n}], row[{1 + 3 * n}:]"
+    yield f"        u = controller.law(since, x{plan})"
     yield "        found.append([*u, *controller.predictor(x, xhat, u)])"
     yield "    return np.array(found)"
     yield ""

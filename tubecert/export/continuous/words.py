@@ -8,7 +8,7 @@ from typing import Final
 
 from tubecert.export.controller import Continuous
 from tubecert.export.program import TABLE
-from tubecert.export.words import OPERATIONS
+from tubecert.export.words import OPERATIONS, boxed
 
 PROMISE: Final = (
     "What the proof covers: the loop of theorem C, in EXACT arithmetic and in CONTINUOUS TIME. Its adaptation",
@@ -24,6 +24,19 @@ CALLS: Final = (
     "instant, `since` being the time since the last sample, in [0, SAMPLE_TIME]; and `predictor` gives xhat',",
     "by which xhat moves. xhat is yours: nothing here integrates it.",
 )
+
+
+_PLANNED: Final = (
+    "The plan is handed in: `law` is given x* and u* of the same instant, as a planner has them. It may be any",
+    "plan that keeps to the boxes of the certificate, is continuous in x*, and satisfies the dynamics up to the",
+    "defect that is stated there. Status 8 says that a number is not in its box (nor is one that rounding has",
+    "carried beyond the end). It cannot say more: whether x* moves as the dynamics do is for the planner to keep.",
+)
+
+
+def calls(c: Continuous) -> tuple[str, ...]:
+    """Who has to call what, and when."""
+    return CALLS if c.boxes is None else (*CALLS, "", *_PLANNED)
 
 
 def heading(c: Continuous) -> str:
@@ -55,7 +68,7 @@ def _readme(c: Continuous, files: Mapping[str, str], precision: str | None) -> I
     yield ""
     yield "## How to call it"
     yield ""
-    yield from CALLS
+    yield from calls(c)
     yield ""
     yield from _called(c, precision)
     yield ""
@@ -63,6 +76,8 @@ def _readme(c: Continuous, files: Mapping[str, str], precision: str | None) -> I
     yield ""
     yield "`law` (in Python: `status`) returns 0, or a sum of 1 (the horizon is over), 2 (the state is not in the tube:"
     yield "an assumption does not hold) and 4 (no input could contract here: the same)."
+    if c.boxes is not None:
+        yield "8: the plan is not in its boxes."
     yield ""
     yield "## What a call costs"
     yield ""
@@ -87,7 +102,7 @@ def _called(c: Continuous, precision: str | None) -> Iterator[str]:
         yield "controller = Controller()"
         yield "xhat = controller.start(x)"
         yield "# in an inner loop of steps h, `since` seconds after the last sample:"
-        yield "u = controller.law(since, x)"
+        yield f"u = controller.law(since, x{'' if c.boxes is None else ', xs, us'})"
         yield "xhat = xhat + h * controller.predictor(x, xhat, u)  # or any better rule"
         yield "# at t = SAMPLE_TIME, 2 SAMPLE_TIME, ...:"
         yield "controller.step(x, xhat)"
@@ -96,7 +111,7 @@ def _called(c: Continuous, precision: str | None) -> Iterator[str]:
     yield "```c"
     yield f"{c.name}_start(&state, x, xhat);"
     yield "/* in an inner loop of steps h, `since` seconds after the last sample: */"
-    yield f"status = {c.name}_law(&state, since, x, u);"
+    yield f"status = {c.name}_law(&state, since, x, {'' if c.boxes is None else 'xs, us, '}u);"
     yield f"{c.name}_predictor(&state, x, xhat, u, rate);"
     yield "xhat[i] += h * rate[i]; /* or any better rule */"
     yield "/* at t = SAMPLE_TIME, 2 SAMPLE_TIME, ...: */"
@@ -113,6 +128,7 @@ def _numbers(c: Continuous) -> Iterator[str]:
     yield f"| bandwidth of its filter | {float(c.bandwidth):.9g} rad/s |"
     yield f"| gain of the predictor | {float(c.predictor_gain):.9g} 1/s |"
     yield f"| horizon | {'none' if c.horizon is None else f'{float(c.horizon):.9g} s'} |"
+    yield from boxed(c)
     for name, (low, high) in zip(c.inputs, c.ranges, strict=True):
         known = math.isfinite(low) and math.isfinite(high)
         yield f"| proven range of {name} | {f'[{low:.9g}, {high:.9g}]' if known else 'none: it has no limits'} |"

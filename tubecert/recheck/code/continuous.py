@@ -8,7 +8,7 @@ from fractions import Fraction
 from flint import ctx
 
 from tubecert.recheck.balls import exact
-from tubecert.recheck.code.constants import is_number, of_tables
+from tubecert.recheck.code.constants import is_number, of_boxes, of_tables
 from tubecert.recheck.code.examination import Agreement, apart, place_of
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Vector
@@ -48,14 +48,16 @@ def _answers(code: Code, formulas: Adapted, given: Sequence[Sequence[Fraction]])
     for k, row in enumerate(given):
         since = known(exact(row[0]))
         x: Vector = [known(exact(q)) for q in row[1 : 1 + n]]
-        xhat: Vector = [known(exact(q)) for q in row[1 + n :]]
+        xhat: Vector = [known(exact(q)) for q in row[1 + n : 1 + 2 * n]]
+        parts = (row[1 + 2 * n : 1 + 3 * n], row[1 + 3 * n :])
+        plan: list[Vector] = [[known(exact(q)) for q in part] for part in parts if part]
         u: Vector = [None] * m
         rate: Vector = [None] * n
         if k == 0:
             machine.call(f"{code.name}_start", state, x, [None] * n)
         elif row[0] == 0:
             machine.call(f"{code.name}_step", state, x, xhat)
-        machine.call(f"{code.name}_law", state, since, x, u)
+        machine.call(f"{code.name}_law", state, since, x, *plan, u)
         machine.call(f"{code.name}_predictor", state, x, xhat, u, rate)
         yield [*u, *rate]
 
@@ -76,6 +78,7 @@ def otherwise(code: Code, formulas: Adapted) -> Iterator[str]:
     if not (low < found < high):
         yield "REACH"
     yield from of_tables(code, formulas)
+    yield from of_boxes(code, formulas)
     if not is_number(code, Number(ball_of(code.functions["estimator"], m)), gains.projection_radius):
         yield "the radius of the clip"
     if not is_number(code, Number(law_of(code.functions["law"], m).gain), case.bound("feedback_gain")):
