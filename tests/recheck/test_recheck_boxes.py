@@ -21,6 +21,7 @@ from strategies import texts
 from tubecert.recheck import boxes, expansion, monomials, pencils, statements
 from tubecert.recheck.balls import is_positive
 from tubecert.recheck.boxes import Field
+from tubecert.recheck.cover import Boxed, prove
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.pencils import LeastGain, SlopesBelow
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
@@ -316,6 +317,18 @@ def test_shares_that_are_large_enough_must_stay_within_the_limit():
     for first, second, proven in (([0.001, 0.25], [0.258, 0.0], True), ([0.01, 0.25], [0.26, 0.0], False)):
         with patched(SlopesBelow, _proposed=lambda self, box, both=(first, second): both):
             assert test.over([(0.9, 1.0)]).proven is proven
+
+
+def test_a_slope_that_vanishes_somewhere_has_its_part_of_what_is_left(monkeypatch):
+    """|x - y/3| + |2 + y| <= 5.2: at the kink, which no halving meets, its least share is 0 and grows on both sides."""
+    first, second = ([[e, "0"], ["0", "0"]] for e in ("x - y/3", "2 + y"))
+    test = SlopesBelow([matrix(first), matrix(second)], matrix([["1", "0"], ["0", "1"]]), Fraction(52, 10))
+    domain = Boxed({name: (Fraction(-1), Fraction(1)) for name in "xy"})
+    assert prove(test, domain, 200).holds
+    monkeypatch.setattr(pencils, "_APART", 1.0)
+    monkeypatch.setattr(pencils, "_BENT", 0.0)
+    monkeypatch.setattr(pencils, "_EVEN", 0.0)
+    assert not prove(test, domain, 200).holds
 
 
 @pytest.mark.parametrize("y", [0.0, 0.7, 1.0, -3.0])

@@ -23,7 +23,7 @@ from systems import SMALL
 from tubecert import certificate, pipeline, spec
 from tubecert.bounds.suprema import Suprema
 from tubecert.errors import ExitCode
-from tubecert.recheck import boxes
+from tubecert.recheck import boxes, pencils
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.claims import of_certified
@@ -135,9 +135,10 @@ def test_what_is_not_definite_is_never_said_to_be(S):
             assert not PositiveDefinite(S, unit).broken([arb(0)] * len(test.variables)) or len(S) > 1
 
 
-def gain(limit, F="2", W="1", BBt="1"):
+def gain(limit, ends, F="2", W="1", BBt="1"):
+    """t (BBt/mu + mu W) > F for mu in a range."""
     (f,), (w,), (b,) = ([term(text)] for text in (F, W, BBt))
-    return GainBelow(
+    test = GainBelow(
         SimpleNamespace(
             states=["x"],
             inputs=["u"],
@@ -147,7 +148,10 @@ def gain(limit, F="2", W="1", BBt="1"):
             safe_set={"x": (Fraction(-1), Fraction(1))},
         ),
         Fraction(limit),
+        Fraction(ends[1]),
     )
+    test._whole = ends
+    return test
 
 
 @pytest.mark.parametrize(
@@ -155,17 +159,48 @@ def gain(limit, F="2", W="1", BBt="1"):
 )
 def test_a_gain_is_not_said_to_be_smaller(ends):
     """2 <= t (1/mu + mu) holds for t >= 1, and fails below at mu = 1."""
-    assert not gain(1 - LITTLE).over([ends]).proven
-    assert gain(1 - LITTLE).broken([arb(1)])
-    assert not gain(1).broken([arb(1)])
+    test = gain(1 - LITTLE, ends)
+    assert not test.over([]).proven
+    assert test.broken([])
+    assert not gain(1, ends).broken([])
+    assert gain(1 + Fraction(1, 100), ends).over([]).proven
 
 
 def test_a_gain_at_the_ends_of_a_range():
     """Towards mu = 0 a gain that B does not reach has no bound; elsewhere the least of 1/mu + mu is at an end."""
-    assert not gain(100, BBt="0*x").over([(0.0, 1.0)] * len(gain(100, BBt="0*x").variables)).proven
+    lost = gain(100, (0.0, 1.0), BBt="0*x")
+    assert not lost.over([(0.0, 1.0)] * len(lost.variables)).proven
     for ends, least in (((2.0, 3.0), Fraction(5, 2)), ((0.25, 0.5), Fraction(5, 2))):
-        assert not gain(2 / least - LITTLE).over([ends]).proven
-        assert gain(2 / least + Fraction(1, 2)).over([ends]).proven
+        assert not gain(2 / least - LITTLE, ends).over([]).proven
+        assert gain(2 / least + Fraction(1, 100), ends).over([]).proven
+
+
+def test_what_is_proven_of_a_box_is_not_proven_again_on_its_parts_and_on_no_other():
+    """Of F = 2 + x: at x = 1 and mu = 1 the gain has to be 3/2."""
+    test = gain(Fraction(14, 10), (0.0, 10.0), F="2 + x")
+    assert not test.over([(-1.0, 1.0)]).proven
+    assert test._left[-1][1] not in ([], [(0.0, 10.0)])
+    assert test._waiting([(0.0, 1.0)]) == test._left[-1][1]
+    assert test._waiting([(0.0, 1.5)]) == [(0.0, 10.0)]  # it is not part of what was looked at
+    assert not test._left
+    assert prove(test, Boxed({"x": (Fraction(-1), Fraction(3, 5))}), 1000).holds
+    assert prove(test, Boxed({"x": (Fraction(-1), Fraction(1))}), 1000).verdict == "contradicted"
+
+
+def test_a_gain_needs_the_rest_of_the_expansion_and_both_ends(monkeypatch):
+    """2 + x^5 is 3 at 1, of which nothing is seen at 0; 1/mu + mu is 5.2 at .2 and 2 at 1."""
+    wide, long = gain(Fraction(12, 10), (0.99, 1.01), F="2 + x**5"), gain(Fraction(9, 10), (0.2, 1.0))
+    assert not wide.over([(-1.0, 1.0)]).proven
+    assert not long.over([]).proven
+    true_test, true_holds = pencils.definite_on, GainBelow._holds
+    monkeypatch.setattr(
+        pencils, "definite_on", lambda e, T: true_test(replace(e, rest=[arb(0)] * len(e.rest)), T)
+    )
+    wide._left.clear()
+    assert wide.over([(-1.0, 1.0)]).proven
+    monkeypatch.setattr(GainBelow, "_holds", lambda self, e, ends: true_holds(self, e, (ends[0], ends[0])))
+    long._left.clear()
+    assert long.over([]).proven
 
 
 # -- constants without a bound

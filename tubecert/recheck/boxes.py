@@ -10,7 +10,7 @@ elsewhere its function has a Lipschitz gradient, so that it is expanded to secon
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement, product
 from math import factorial, prod
@@ -37,6 +37,8 @@ from tubecert.recheck.terms import (
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]
+Weighing = Callable[[Sequence[Ball]], Sequence[float]]
+"""From the entries at the centre of a box to what one unit of each of them counts: it steers what is split."""
 
 _CORNERS = 5  # variables whose corners are all tried
 _VERTICES = 64  # of which curvature may take its share
@@ -46,7 +48,10 @@ _TURNING = 4  # curved variables with which third derivatives are looked at
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Whether a test is proven on a box, and by how much each variable widens the bound, and varies the value."""
+    """Whether a test is proven on a box, and by how much each variable widens the bound, and varies the value.
+
+    Where that is not known, both are empty: then the widest side is split, against the whole domain.
+    """
 
     proven: bool
     caused: list[float] = field(default_factory=list)
@@ -146,14 +151,19 @@ class Field:
             return False
         return all(map(smooth_on, self._tables, self._looked_up.run(values)))
 
-    def expand(self, box: Box) -> tuple[list[Expansion], list[float], list[float]]:
-        """One expansion for every choice of ends of the affine variables; what each variable causes and varies."""
+    def expand(
+        self, box: Box, weighing: Weighing | None = None
+    ) -> tuple[list[Expansion], list[float], list[float]]:
+        """One expansion for every choice of ends of the affine variables; what each variable causes and varies.
+
+        Both are sums over the entries, weighed by what these are at the centre (by default all alike).
+        """
         d = len(self.variables)
         centre = [min(max(0.5 * lo + 0.5 * hi, lo), hi) for lo, hi in box]
         mid = [arb(c) for c in centre]
         whole = [between(lo, hi) for lo, hi in box]
         if self._kinked is not None and not self._is_smooth(whole):
-            return self._kinked.expand(box)
+            return self._kinked.expand(box, weighing)
         radius = [
             larger.upper()
             for (lo, hi), c in zip(box, mid, strict=True)
@@ -161,14 +171,9 @@ class Field:
         ]
         caused, spread = [0.0] * d, [0.0] * d
         if not self._order:
-            wide = [hi - lo for lo, hi in box]
             sides = [program.run([*whole, *self.values.values()]) for program in self._sides]
             values = sides or [self.at(whole)]
-            return (
-                [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value)) for value in values],
-                wide,
-                wide,
-            )
+            return [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value)) for value in values], [], []
         points, ranges = [], []
         for ends in product((0, 1), repeat=len(self._affine)):
             point, range_ = list(mid), list(whole)
@@ -176,17 +181,26 @@ class Field:
                 point[i] = range_[i] = arb(box[i][end])
             points.append([*point, *self.values.values()])
             ranges.append([*range_, *self.values.values()])
-        around = zip(self._centre.run(points), self._whole.run(ranges), strict=True)
-        found = [self._around(at, over, radius, caused, spread) for at, over in around]
+        at_centre = self._centre.run(points)
+        count = len(self._entries)
+        weights = [1.0] * count if weighing is None else weighing(at_centre[0][:count])
+        around = zip(at_centre, self._whole.run(ranges), strict=True)
+        found = [self._around(at, over, radius, weights, (caused, spread)) for at, over in around]
         for place, i in enumerate(self._affine):  # two corners that differ in that variable only
             other = found[1 << (len(self._affine) - 1 - place)]
-            spread[i] = sum(abs(float(x.mid())) for x in (found[0].value - other.value).entries())
+            spread[i] = _weighed(weights, (found[0].value - other.value).entries())
         return found, caused, spread
 
     def _around(
-        self, at: list[Ball], over: list[Ball], radius: list[Ball], caused: list[float], spread: list[float]
+        self,
+        at: list[Ball],
+        over: list[Ball],
+        radius: list[Ball],
+        weights: Sequence[float],
+        steering: tuple[list[float], list[float]],
     ) -> Expansion:
         """Made of values, slopes and curvature at the centre, and of what varies over the box."""
+        caused, spread = steering
         count, curved, second = len(self._entries), len(self._curved), self._order >= 2
         own, varied = _parts(at, count), _parts(over, count)
         value, rest = _column(own[0]), [arb(0)] * count
@@ -194,12 +208,12 @@ class Field:
         for a, slope in enumerate(own[1 : 1 + curved] if second else varied):
             i = self._curved[a]
             step = [radius[i] * s for s in slope]
-            size = sum(float(magnitude(s)) for s in step)
+            size = _weighed(weights, map(magnitude, step))
             spread[i] = max(spread[i], size)
             if self._steady and a < _CORNERS:
                 steps.append(_column(step))
                 if not second:  # the slope of a mean value form is a range
-                    caused[i] += sum(float(s.rad()) for s in step)
+                    caused[i] += _weighed(weights, (s.rad() for s in step))
             else:
                 rest = [r + magnitude(s) for r, s in zip(rest, step, strict=True)]
                 caused[i] += size
@@ -220,10 +234,10 @@ class Field:
                 mixed[a, b], share = near, 0
             rest = [r + share * q for r, q in zip(rest, bend, strict=True)]
             loss = share or 0.25 * (a == b)  # the hull of a parabola is that much larger
-            self._blame((a, b), loss * sum(float(q) for q in bend), caused)
+            self._blame((a, b), loss * _weighed(weights, bend), caused)
         for key, far in self._variation(own[1 + curved :], varied, radius):
             rest = [r + x for r, x in zip(rest, far, strict=True)]
-            self._blame(key, sum(float(x) for x in far), caused)
+            self._blame(key, _weighed(weights, far), caused)
         return Expansion(value, steps, squares, mixed, [r.upper() for r in rest])
 
     def _variation(
@@ -281,6 +295,11 @@ def _sided(entries: Sequence[Term], sides: Mapping[tuple[Term, object], int]) ->
         else:
             new[term] = remade(term, args) if args else term
     return [new[e] for e in entries]
+
+
+def _weighed(weights: Sequence[float], entries: Iterable[Ball]) -> float:
+    """The sum of magnitudes, in floats."""
+    return sum(weight * abs(float(x.mid())) for weight, x in zip(weights, entries, strict=True))
 
 
 def _parts(entries: list[Ball], count: int) -> list[list[Ball]]:

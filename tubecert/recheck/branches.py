@@ -130,6 +130,8 @@ class BranchesBelow:
         for values in self._signs.over([box[i] for i in self._signed]):
             part = self._signs.part(self._test.variables, own, values)
             found = self._test.with_values(values).over(part)
+            if not found.proven and not found.caused:
+                return Found(False)
             if not found.proven:
                 wide = [hi - lo for lo, hi in box]
                 caused, spread = list(wide), list(wide)

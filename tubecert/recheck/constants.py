@@ -28,7 +28,7 @@ from tubecert.recheck.metric import (
     upper_bound,
 )
 from tubecert.recheck.multiplier import column_below
-from tubecert.recheck.pencils import MU, GainBelow, LeastGain, SlopesBelow
+from tubecert.recheck.pencils import GainBelow, LeastGain, SlopesBelow
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
@@ -134,8 +134,7 @@ def feedback_gain(place: Place, limit: Fraction, largest: Fraction) -> Outcome:
     """F <= t (B B'/mu + mu W) for all mu in (0, largest]; where F is 0, t = 0 serves."""
     if vanish([e for row in place.system.F for e in row]):
         return stated(True, "")
-    extra = {MU: (Fraction(0), largest)}
-    return prove(GainBelow(place.system, limit), place.tube(extra), place.budget)
+    return prove(GainBelow(place.system, limit, largest), place.tube(), place.budget)
 
 
 def _input_gain_least(place: Place, limit: Fraction) -> Outcome:

@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
-from tubecert.recheck.boxes import Test
+from tubecert.recheck.boxes import Found, Test
 from tubecert.recheck.clock import time_is_up
 
 _TRIES = 4  # every so many boxes a point is tried
@@ -69,6 +69,7 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
     variables = domain.needed(test.variables)
     own, count = len(test.variables), 0
     waiting = domain.start(variables)
+    sides = _sides(waiting)
     while waiting:
         state = domain.cut(variables, waiting.pop())
         if state is None:
@@ -82,7 +83,7 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
             at = domain.point(variables, state)
             if at is not None and test.broken(at[:own]):
                 return Outcome(verdict="contradicted", why=f"false at {_shown(variables, at)}", boxes=count)
-        halves = _halves(state, _priorities(variables, state, found.caused, found.spread, domain))
+        halves = _halves(state, _priorities(variables, state, found, (domain, sides)))
         late = count % _TRIES == 0 and time_is_up()
         if halves is None or count >= budget or late:
             why = f"not proven near {_shown(variables, [arb(0.5 * lo + 0.5 * hi) for lo, hi in box])}"
@@ -92,15 +93,22 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
     return Outcome(verdict="confirmed", boxes=count)
 
 
+def _sides(states: Sequence[State]) -> list[float]:
+    """How wide a domain is in each variable: other widths are compared with these, so that no unit matters."""
+    boxes = [box for box, _ in states]
+    return [max(hi for _, hi in ends) - min(lo for lo, _ in ends) for ends in zip(*boxes, strict=True)]
+
+
 def _priorities(
-    variables: tuple[str, ...], state: State, caused: list[float], spread: list[float], domain: Domain
+    variables: tuple[str, ...], state: State, found: Found, where: tuple[Domain, list[float]]
 ) -> list[float]:
-    extra = [0.0] * (len(variables) - len(caused))
-    if all(x < _UNKNOWN for x in (*caused, *spread)):
-        pull = domain.pull(variables, state, caused + extra, spread + extra)
+    domain, sides = where
+    extra = [0.0] * (len(variables) - len(found.caused))
+    if found.caused and all(x < _UNKNOWN for x in (*found.caused, *found.spread)):
+        pull = domain.pull(variables, state, found.caused + extra, found.spread + extra)
         if any(x > 0 for x in pull):
             return pull
-    return [hi - lo for lo, hi in state[0]]
+    return [(hi - lo) / side if side > 0 else 0.0 for (lo, hi), side in zip(state[0], sides, strict=True)]
 
 
 def _halves(state: State, priority: list[float]) -> list[State] | None:

@@ -112,8 +112,7 @@ class SymbolsBelow:
 
     def over(self, box: Box) -> Found:
         """The tensors over the box, as balls."""
-        wide = [hi - lo for lo, hi in box]
-        return Found(bool(self._of(self._field.hull(box)) <= self._limit), wide, wide)
+        return Found(bool(self._of(self._field.hull(box)) <= self._limit))
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """An upper bound that is too large refutes nothing."""

@@ -91,6 +91,8 @@ class LipschitzBelow:
 
     def _widened(self, found: Found, box: Box) -> Found:
         """What to split: where there are kinks, whatever is wide in them; else what causes the width."""
+        if not found.caused:
+            return Found(False)
         kinked = range(len(box)) if self._levels else self._signed
         caused = [hi - lo if i in kinked else 0.0 for i, (lo, hi) in enumerate(box)]
         spread = list(caused)

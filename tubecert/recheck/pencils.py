@@ -6,29 +6,36 @@ proven on all of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
-from math import sqrt
 
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import (
     Ball,
     between,
+    ceiling,
     exact,
     is_indefinite,
     proposed_largest,
     whitening,
 )
-from tubecert.recheck.boxes import Box, Found
+from tubecert.recheck.boxes import Box, Field, Found
+from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
-from tubecert.recheck.statements import PositiveDefinite
+from tubecert.recheck.quotients import cancelled
+from tubecert.recheck.statements import PositiveDefinite, definite_on, square, weights
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Rows, names, number, plus, scaled, times, turned, unit_matrix, variable
+from tubecert.recheck.terms import Rows, names, plus, scaled, times, turned, unit_matrix, variable
 
+_APART, _BENT, _EVEN = 0.25, 0.65, 0.1  # of what is left of a limit: by size, by curvature, to all alike
 _INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
-MU, _CURVE_MU, _LINE_MU = "mu#", "p#", "q#"  # no state can have these names
+_RANGES = 40  # of mu, that are looked at on one box
+_DEAR = 4.0  # a range more is passed on to all parts of a box
+_RIM = 0.05  # of what varies on a box: vertices are exact, what lies outside the tube is a part
 
 
 class SlopesBelow:
@@ -57,18 +64,19 @@ class SlopesBelow:
 
     def over(self, box: Box) -> Found:
         """Every share on the whole box."""
-        wide = [hi - lo for lo, hi in box]
         shares = self._proposed(box)
         whole = [between(lo, hi) for lo, hi in box]
         total = [sum((arb(x) for x in column), start=arb(0)) for column in zip(*shares, strict=True)]
         most = sum((g * x for g, x in zip(total[1:], whole, strict=True)), start=total[0])
         if not most <= self._limit:
-            return Found(False, wide, wide)
+            return Found(False)
         for k, share in enumerate(shares):
             for test, columns in self._tests[2 * k : 2 * k + 2]:
                 found = test.with_values(self._share_of(share)).over([box[i] for i in columns])
+                if not found.proven and not found.caused:
+                    return Found(False)
                 if not found.proven:
-                    caused, spread = list(wide), list(wide)
+                    caused, spread = [0.0] * len(box), [0.0] * len(box)
                     for c, i in enumerate(columns):
                         caused[i], spread[i] = found.caused[c], found.spread[c]
                     return Found(False, caused, spread)
@@ -88,11 +96,15 @@ class SlopesBelow:
         )
 
     def _proposed(self, box: Box) -> list[list[float]]:
-        """[a_k, g_k] for every matrix: its least share, with its slopes, and what is left in proportion to it."""
+        """[a_k, g_k] for every matrix: its least share, with its slopes, and of what is left what it bends, and a part.
+
+        A share has a kink where its matrix vanishes: there an affine function has to be above it by what it varies.
+        """
         centre = [0.5 * lo + 0.5 * hi for lo, hi in box]
         steps = [0.25 * (hi - lo) for lo, hi in box]
         near = [
-            [c + h * (i == j) for j, (c, h) in enumerate(zip(centre, steps, strict=True))]
+            [c + sign * h * (i == j) for j, (c, h) in enumerate(zip(centre, steps, strict=True))]
+            for sign in (1, -1)
             for i in range(len(box))
         ]
         least, *further = (
@@ -101,10 +113,14 @@ class SlopesBelow:
         )
         total = sum(least)
         left = (float(self._limit) - total) * _INSIDE
-        parts = [x / total if total > 0 else 1 / self._count for x in least]
+        pairs = list(zip(further[: len(box)], further[len(box) :], steps, strict=True))
+        bends = [sum(max(0.0, p[k] + q[k] - 2 * x) for p, q, _ in pairs) for k, x in enumerate(least)]
+        parts = [
+            _APART * part + _BENT * bend + _EVEN / self._count
+            for part, bend in zip(_in_proportion(least), _in_proportion(bends), strict=True)
+        ]
         slopes = [
-            [(x - y) / h if h > 0 else 0.0 for x, y in zip(there, least, strict=True)]
-            for there, h in zip(further, steps, strict=True)
+            [(x - y) / (2 * h) if h > 0 else 0.0 for x, y in zip(p, q, strict=True)] for p, q, h in pairs
         ]
         shares = []
         for k, part in enumerate(parts):
@@ -119,56 +135,120 @@ class SlopesBelow:
         T = arb_mat(whitening([[float(x.mid()) for x in row] for row in D.tolist()]))
         moved = [T * N * T.transpose() for N in slopes]
         squares = [[[float(x.mid()) for x in row] for row in (N * N.transpose()).tolist()] for N in moved]
-        return [sqrt(proposed_largest(square)) for square in squares]
+        return [math.sqrt(proposed_largest(square)) for square in squares]
+
+
+def _in_proportion(sizes: Sequence[float]) -> list[float]:
+    """Parts of 1; equal ones where all sizes are 0."""
+    total = sum(sizes)
+    return [x / total if total > 0 else 1 / len(sizes) for x in sizes]
 
 
 class GainBelow:
-    """t (B B'/mu + mu W) - F > 0 on boxes of states and mu; 1/mu is replaced by a tangent, which lies below it."""
+    """t (B B'/mu + mu W) - F > 0 for all mu in (0, largest], on boxes of states.
 
-    def __init__(self, s: System, limit: Fraction) -> None:
-        mu, p, q = (variable(name) for name in (MU, _CURVE_MU, _LINE_MU))
-        inverse = q - mu * p  # 2/m - mu/m^2 <= 1/mu
-        bound = [
-            [number(limit) * (inverse * b + mu * w) for b, w in zip(br, wr, strict=True)]
-            for br, wr in zip(s.BBt, s.W, strict=True)
-        ]
-        unit = [
-            [q * b + w / q for b, w in zip(br, wr, strict=True)] for br, wr in zip(s.BBt, s.W, strict=True)
-        ]
-        self._test = PositiveDefinite(plus(bound, s.F, -1), unit, _tangent(1.0))
-        self.variables = self._test.variables
-        self._place = self.variables.index(MU) if MU in self.variables else None
-        centre = [exact((lo + hi) / 2) for lo, hi in (s.safe_set[name] for name in s.states)]
-        entries = Program([e for row in s.W for e in row], s.states).run(centre)
-        self._size = float(limit) * sum(abs(float(e.mid())) for e in entries)
+    1/mu is replaced by tangents, 2/m - mu/m^2 <= 1/mu, which make S affine in mu: what holds at both ends of a range of
+    mu holds between them. B B', W and F are expanded once on a box, and every range takes a combination of them. What
+    is left to be proven on a box is passed on to its parts.
+    """
+
+    def __init__(self, s: System, limit: Fraction, largest: Fraction) -> None:
+        self._limit, self._n = exact(limit), len(s.states)
+        self._whole = (0.0, ceiling(exact(largest)))
+        n = range(self._n)
+        self._field = Field(
+            cancelled([rows[i][j] for rows in (s.BBt, s.W, s.F) for i in n for j in n[: i + 1]])
+        )
+        self.variables = self._field.variables
+        self._left: list[tuple[list[tuple[float, float]], list[tuple[float, float]]]] = []
 
     def over(self, box: Box) -> Found:
-        """With the tangent at the geometric middle of mu, theory 2.1."""
-        if self._place is None:
-            return self._test.over(box)
-        lo, hi = box[self._place]
-        low = max(lo, 0.0)
-        middle = (low * hi) ** 0.5 if low > 0 else hi
-        found = self._test.with_values(_tangent(middle)).over(
-            [*box[: self._place], (low, hi), *box[self._place + 1 :]]
-        )
-        if not found.proven and hi > low:  # the gap of the tangent, where B B'/mu and mu W are of one size
-            ratio = (hi - middle) / middle if low > 0 else 1.0
-            found.caused[self._place] = ratio**2 * middle * self._size
-        return found
+        """Every range of mu that is not proven on a larger box, theory 2.1; halved while that promises more."""
+        waiting, left = self._waiting(box), []
+        near = _tangent(waiting[-1])
+        found, caused, spread = self._field.expand(box, lambda at: self._weights(at, near))
+        count = len(waiting)
+        most = _DEAR * max(caused, default=0.0) * near / 2  # in units of W, as the gaps of tangents are
+        while waiting:
+            ends = waiting.pop()
+            if self._holds(found, ends):
+                continue
+            lo, hi = ends
+            m = _tangent(ends)
+            gap = float(self._limit) * (hi - m) * (hi - m) / m if lo > 0 else float(self._limit) * hi
+            middle = math.sqrt(lo) * math.sqrt(hi) if hi > 4 * lo > 0 else 0.5 * lo + 0.5 * hi
+            if lo < middle < hi and count < _RANGES and gap > most:
+                count += 2
+                waiting += [(lo, middle), (middle, hi)]
+            else:
+                left.append(ends)
+        if left:
+            self._left.append((list(box), left))
+        return Found(not left, caused, [_RIM * x for x in spread])
 
     def broken(self, point: Sequence[Ball]) -> bool:
-        """At a point the tangent at mu itself is exact."""
-        if self._place is None:
-            return self._test.broken(point)
-        mu = float(point[self._place])
-        return mu > 0 and self._test.with_values(_tangent(mu)).broken(
-            [*point[: self._place], arb(mu), *point[self._place + 1 :]]
-        )
+        """At a point, with mu in the middle of the ranges that were left, or the whole."""
+        entries = self._field.at(point)
+        ranges = self._left[-1][1] if self._left else [self._whole]
+        for ends in ranges:
+            mu = arb(_tangent(ends))
+            if mu > 0 and is_indefinite(self._combined(entries, self._limit / mu, self._limit * mu).tolist()):
+                return True
+        return False
+
+    def _waiting(self, box: Box) -> list[tuple[float, float]]:
+        """What was not proven on the last box that was looked at and contains this one: its parts need no more."""
+        while self._left:
+            around, left = self._left[-1]
+            if all(a <= lo and hi <= b for (lo, hi), (a, b) in zip(box, around, strict=True)):
+                return left.copy()
+            self._left.pop()
+        return [self._whole]
+
+    def _holds(self, expansions: Sequence[Expansion], ends: tuple[float, float]) -> bool:
+        """Both ends of a range, with the tangent at its middle."""
+        m = _tangent(ends)
+        inverse, line = 1 / arb(m), arb(m)
+        centre = expansions[0].value.entries()
+        unit = self._combined(centre, 2 * inverse, line / 2, 0)
+        T = arb_mat(whitening([[float(x.mid()) for x in row] for row in unit.tolist()]))
+        for mu in map(arb, ends):
+            part = self._limit * (2 - mu * inverse) * inverse
+            mixing = self._mixing(part, self._limit * mu)
+            sizes = self._mixing(abs(part), abs(self._limit * mu), 1)
+            for e in expansions:
+                rest = (sizes * arb_mat(len(e.rest), 1, e.rest)).entries()
+                if not definite_on(replace(e.mapped(mixing.__mul__), rest=rest), T):
+                    return False
+        return True
+
+    def _mixing(self, of_input: Ball, of_metric: Ball, of_drift: int = -1) -> arb_mat:
+        """The matrix that combines lower triangles of B B', W and F."""
+        k = self._n * (self._n + 1) // 2
+        found = arb_mat(k, 3 * k)
+        for i in range(k):
+            for j, weight in enumerate((of_input, of_metric, arb(of_drift))):
+                found[i, i + j * k] = weight
+        return found
+
+    def _combined(
+        self, entries: Sequence[Ball], of_input: Ball, of_metric: Ball, of_drift: int = -1
+    ) -> arb_mat:
+        mixed = self._mixing(of_input, of_metric, of_drift) * arb_mat(len(entries), 1, entries)
+        return square(self._n, mixed.entries())
+
+    def _weights(self, centre: Sequence[Ball], m: float) -> list[float]:
+        """What an entry of each of the three counts at one mu."""
+        k = self._n * (self._n + 1) // 2
+        unit = [2 / m * b + m / 2 * w for b, w in zip(centre[:k], centre[k : 2 * k], strict=True)]
+        own, t = weights(self._n, unit), float(self._limit)
+        return [share * weight for share in (t / m, t * m, 1.0) for weight in own]
 
 
-def _tangent(m: float) -> dict[str, Ball]:
-    return {_CURVE_MU: 1 / (arb(m) * arb(m)), _LINE_MU: 2 / arb(m)}
+def _tangent(ends: tuple[float, float]) -> float:
+    """Where 1/mu is touched: the geometric middle of a range of mu."""
+    lo, hi = ends
+    return math.sqrt(lo) * math.sqrt(hi) if lo > 0 else hi
 
 
 class LeastGain:
@@ -195,8 +275,7 @@ class LeastGain:
         try:
             Y = [arb(float(y.mid())) for y in W.solve(B).entries()]
         except ZeroDivisionError:
-            wide = [hi - lo for lo, hi in box]
-            return Found(False, wide, wide)
+            return Found(False)
         return self._test.with_values(dict(zip(self._names, Y, strict=True))).over(box)
 
     def broken(self, point: Sequence[Ball]) -> bool:

@@ -5,6 +5,7 @@ Each examines the vertices of an expansion of second order (`boxes`), and adds w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -111,7 +112,6 @@ class PositiveDefinite:
     def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
         self._n = n = len(S)
         self._field = Field(cancelled([S[i][j] for i in range(n) for j in range(i + 1)]), values)
-        self._place = [max(i, j) * (max(i, j) + 1) // 2 + min(i, j) for i in range(n) for j in range(n)]
         self.variables = self._field.variables
         self._unit = (
             None
@@ -131,45 +131,55 @@ class PositiveDefinite:
         return other
 
     def over(self, box: Box) -> Found:
-        """Every corner of the affine part, minus the row sums of what the rest can be."""
-        n = self._n
-        found, caused, spread = self._field.expand(box)
-        t = self._congruence(box, found[0].value.entries())
-        T, size = arb_mat(t), arb_mat([[abs(x) for x in row] for row in t])
-        turned, size_turned = T.transpose(), size.transpose()
-        for e in found:
-            rest = (size * self._square(e.rest) * size_turned).tolist()
-            drop = arb_mat(
-                [[sum(row, start=arb(0)) if i == j else 0 for j in range(n)] for i, row in enumerate(rest)]
-            )
-            moved = e.mapped(lambda S: T * self._square(S.entries()) * turned)
-            if not all(is_positive(S - drop) for S in moved.corners()):
-                return Found(False, caused, spread)
+        """At every vertex of the expansion, minus what the rest can be."""
+        unit = self._unit_at(box)
+        found, caused, spread = self._field.expand(
+            box, lambda at: weights(self._n, at if unit is None else unit)
+        )
+        own = found[0].value.entries() if unit is None else unit
+        T = arb_mat(whitening([[float(x.mid()) for x in row] for row in square(self._n, own).tolist()]))
+        if not all(definite_on(e, T) for e in found):
+            return Found(False, caused, spread)
         return Found(True)
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """Whether S is proven to have a negative eigenvalue at a point."""
-        S = self._rows(self._field.at(point))
-        t = arb_mat(self._congruence_of([[float(x.mid()) for x in row] for row in S]))
+        S = square(self._n, self._field.at(point)).tolist()
+        t = arb_mat(whitening([[float(x.mid()) for x in row] for row in S]))
         moved: Balls = (t * arb_mat(S) * t.transpose()).tolist()
         return is_indefinite(moved) or is_indefinite(S)
 
-    def _congruence(self, box: Box, fallback: Sequence[Ball]) -> list[list[float]]:
-        unit = fallback
-        if self._unit is not None:
-            centre = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
-            unit = self._unit.run([*centre, *self._field.values.values()])
-        return self._congruence_of([[float(x.mid()) for x in row] for row in self._rows(unit)])
+    def _unit_at(self, box: Box) -> list[Ball] | None:
+        """The unit at the centre of a box."""
+        if self._unit is None:
+            return None
+        centre = [arb(0.5 * lo + 0.5 * hi) for lo, hi in box]
+        return self._unit.run([*centre, *self._field.values.values()])
 
-    @staticmethod
-    def _congruence_of(rows: list[list[float]]) -> list[list[float]]:
-        return whitening(rows)
 
-    def _square(self, entries: Sequence[Ball]) -> arb_mat:
-        return arb_mat(self._n, self._n, [entries[k] for k in self._place])
+def square(n: int, entries: Sequence[Ball]) -> arb_mat:
+    """A symmetric matrix from the rows of its lower triangle, (n, n)."""
+    places = (max(i, j) * (max(i, j) + 1) // 2 + min(i, j) for i in range(n) for j in range(n))
+    return arb_mat(n, n, [entries[k] for k in places])
 
-    def _rows(self, entries: Sequence[Ball]) -> Balls:
-        return self._square(entries).tolist()
+
+def weights(n: int, unit: Sequence[Ball]) -> list[float]:
+    """What each entry of a symmetric matrix counts beside a matrix of its units, 1/sqrt(u_ii u_jj): a proposal."""
+    sizes = [abs(float(unit[i * (i + 1) // 2 + i].mid())) for i in range(n)]
+    roots = [size**-0.5 if 0 < size < math.inf else 1.0 for size in sizes]
+    return [roots[i] * roots[j] for i in range(n) for j in range(i + 1)]
+
+
+def definite_on(e: Expansion, T: arb_mat) -> bool:
+    """S > 0 for S(x) that is given by its lower triangle: T S T' at every vertex, minus the row sums of the rest."""
+    n = T.nrows()
+    size = arb_mat([[abs(x) for x in row] for row in T.tolist()])
+    rest = (size * square(n, e.rest) * size.transpose()).tolist()
+    drop = arb_mat(
+        [[sum(row, start=arb(0)) if i == j else 0 for j in range(n)] for i, row in enumerate(rest)]
+    )
+    moved = e.mapped(lambda S: T * square(n, S.entries()) * T.transpose())
+    return all(is_positive(S - drop) for S in moved.corners())
 
 
 class NotNegative:

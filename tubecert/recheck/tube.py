@@ -69,7 +69,7 @@ class Tube:
         window = box[variables.index(TIME)] if TIME in variables and self._curve.moves else None
         if not columns and not tied:
             return state
-        width = max((box[i][1] - box[i][0] for i, _ in columns), default=math.inf)
+        width = max(((box[i][1] - box[i][0]) / self._around.extent(k) for i, k in columns), default=math.inf)
         kept: list[Segment] = []
         reach: dict[int, tuple[float, float]] = {}
         waiting = list(segments)
@@ -115,8 +115,8 @@ class Tube:
             for (i, k), (lo, hi) in zip(columns, cut, strict=True)
         }
 
-    @staticmethod
     def _is_long(
+        self,
         segment: Segment,
         columns: list[tuple[int, int]],
         width: float,
@@ -124,7 +124,7 @@ class Tube:
     ) -> bool:
         if window is not None:
             return segment.when[1] - segment.when[0] > max(window[1] - window[0], 1e-12)
-        motion = max(segment.x[k][1] - segment.x[k][0] for _, k in columns)
+        motion = max((segment.x[k][1] - segment.x[k][0]) / self._around.extent(k) for _, k in columns)
         return motion > _COARSE * width
 
     def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
