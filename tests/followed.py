@@ -151,6 +151,14 @@ def predicting(delay: str, *, held: bool) -> tuple[Controller, Machine]:
     return c, replace(in_recheck("orbit"), recipe=own, section=section, held=held)
 
 
+def predicting_path() -> tuple[Controller, Machine]:
+    """The same of a plan through knots, whose u* is held."""
+    given = GIVEN["predicting_path"]
+    c = assembled(replace(given, held=True, recipe=replace(given.recipe, rounding=(ANY,)), feedback_gain=DU))
+    section = SimpleNamespace(predict=True, clip=given.clip)
+    return c, replace(in_recheck("path"), recipe=given.recipe, section=section, held=True)
+
+
 def with_a_table() -> tuple[Controller, Machine]:
     """The controller "turning" without its prediction, about rounding, and the machine as recheck reads it."""
     given = GIVEN["turning"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from controllers import CONTROLLERS
 from flint import ctx
-from followed import bounds, covered, in_recheck, predicting, texts
+from followed import bounds, covered, in_recheck, predicting, predicting_path, texts
 
 from tubecert.enclosure.interval import Interval
 from tubecert.export import prediction as ahead
@@ -367,6 +367,14 @@ def test_both_bounds_of_a_prediction_are_near_to_each_other(delay, held):
         found, theirs = bounds(c, formulas, texts(c, precision)), rounding_of(c, precision)
         # a certificate allows for twice the exporter's
         assert all(0.05 < found[each] / float(getattr(theirs, each)) < 1.2 for each in (*NAMES, "prediction"))
+
+
+@pytest.mark.slow
+def test_a_prediction_along_a_plan_through_knots_is_followed_where_its_input_is_held():
+    c, formulas = predicting_path()
+    found, theirs = bounds(c, formulas, texts(c, "double")), rounding_of(c, "double")
+    # a certificate allows for twice the exporter's
+    assert all(0.02 < found[each] / float(getattr(theirs, each)) < 1.6 for each in (*NAMES, "prediction"))
 
 
 @pytest.mark.slow
