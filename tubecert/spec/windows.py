@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Final
@@ -16,7 +16,7 @@ from tubecert.spec.reader import Field
 from tubecert.spec.types import Disturbance, Hardware, Spec, Trajectory, Tube
 
 KEY: Final = "windows"
-KEYS: Final = ("epsilon", "rho_a", "coordinates", "half_widths", KEY, "gap")  # of `tube`
+KEYS: Final = tuple(item.name for item in fields(Tube))  # of `tube`
 MOST: Final = 200
 _USUAL: Final = 20
 
