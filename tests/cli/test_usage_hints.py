@@ -27,6 +27,7 @@ def said(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *w
         (("certify", "a.yaml", "-rho-a", "0.1"), "begin with two dashes: --rho-a"),
         (("certify", "a.yaml", "-epsilon=0.1"), "begin with two dashes: --epsilon"),
         (("certify", "a.yaml", "b.yaml"), "one specification at a time"),
+        (("certify", "a.yaml", "--bandwidth", "10", "rad/s"), "leave rad/s out"),
         (("certify", "a.yaml", "--rate", "1"), "tubecert synth --rate"),
         (("certify", "-"), "nothing is read from stdin"),
         (("certify", "a.yaml", "--conditions", "D"), "'--conditions': 'D' is not one of"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -79,11 +80,15 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
             return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
     if option in _OTHER_OPTIONS:
         return f"  {_OTHER_OPTIONS[option]}\n"
-    if not option and "unexpected" in str(getattr(error, "message", "")):
+    message = str(getattr(error, "message", ""))
+    if not option and "unexpected" in message and (unit := _UNIT.search(message)):
+        return f"  a number has no unit: leave {unit[1]} out; times are in s, rates in 1/s, --bandwidth in rad/s\n"
+    if not option and "unexpected" in message:
         return "  one specification at a time; tubecert check takes several, and folders\n"
     return ""
 
 
+_UNIT: Final = re.compile(r"\) \((rad/s|1/s|Hz|kHz|s|ms|m|rad|deg|sec)\)")
 _PLAIN: Final = (
     ("Value error, ", ""),
     ("Input should be a valid integer, unable to parse string as an integer", "it is not a whole number"),

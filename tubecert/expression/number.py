@@ -25,8 +25,9 @@ DIGITS: Final = 30
 _MEASURED: Final = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z][\w/*^ ]*?)\s*"
 )
-_NOT_FINITE = frozenset({"nan", "inf", "infinity"})
+_NOT_FINITE = frozenset({"nan", "inf", "infinity", "infinite", "oo", "forever"})
 _FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
+_THOUSANDS: Final = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 _NOT_NUMBERS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "none", "~"})
 _ONE_FACTOR = re.compile(
     r"\s*[-+]?\s*(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[A-Za-z]\w*|\([^()]*\))"
@@ -90,7 +91,7 @@ def _check_foreign(text: str, word: str) -> None:
             offset=start,
             width=width,
             kind="value",
-            help="write a number: sets have ends, and a horizon without one is left out",
+            help="write a finite number; for a claim for all time leave trajectory.horizon out",
         )
     if word.lower().lstrip("+-.") in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"
@@ -101,6 +102,8 @@ def _check_foreign(text: str, word: str) -> None:
         advice = (
             "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
         )
+        if _THOUSANDS.fullmatch(word):
+            advice = f"write {word.replace(',', '')}, or {word.replace(',', '.', 1)} if the comma is a decimal point"
         raise ExpressionError(
             f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
         )

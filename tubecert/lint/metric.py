@@ -115,12 +115,16 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
         word = (
             f"it supports {near(largest[k], 4)} at most" if largest[k] > 0 else "it does not contract at all"
         )
+        slower = "lower metric.rate, shrink the safe set, or give another dual metric"
+        wrong = (
+            "no rate will do: are the signs right, and is it W and not its inverse? tubecert synth finds one"
+        )
         yield Finding(
             code=codes.NOT_CONTRACTING,
             message=f"C2 fails at {_at(spec, points[k])}: at rate {near(rate)} the metric does not contract; "
             f"there {word}",
             location=spec.location("metric.rate"),
-            help="lower metric.rate, shrink the safe set, or give another dual metric",
+            help=slower if largest[k] > 0 else wrong,
         )
 
 

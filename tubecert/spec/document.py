@@ -192,18 +192,30 @@ def _syntax(source: Source, error: yaml.YAMLError, language: str) -> Finding:
     words = " ".join(str(problem).split())[:200]
     location = source.location(_mark(mark))
     tab = source.text[source.index(_mark(mark)) :].startswith("\t")
+    hidden = _hidden(source.text)
     return Finding(
         code=codes.YAML_SYNTAX,
         message=f"this is not {language}: {words}"
         + (f" ({' '.join(str(context).split())[:100]})" if context else ""),
         location=location,
-        help="indent with spaces, not tabs" if tab else _remedy(words, location.source),
+        help=hidden or ("indent with spaces, not tabs" if tab else _remedy(words, location.source)),
     )
 
 
 _BEGUN: Final = ("simple key", "quoted scalar")
 _ASSIGNED = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)")
 _GLUED = re.compile(r"\s*([A-Za-z_]\w*):(\S.*)")
+
+
+def _hidden(text: str) -> str:
+    """What cannot be seen and breaks a file: blanks of another kind where a line begins, a bracket in a comment."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip() and not line[: len(line) - len(line.lstrip())].isascii():
+            return f"line {number} is indented with a blank that is no space (from a web page or a PDF): type spaces"
+        before, mark, comment = line.partition(" #")
+        if mark and before.count("[") > before.count("]") and "]" in comment:
+            return f"in line {number} the ] stands in a comment: put it before the #"
+    return ""
 
 
 def _remedy(problem: str, line: str) -> str:

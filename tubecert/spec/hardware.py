@@ -130,7 +130,7 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         entries["delay"].fail(
             codes.RANGE,
             f"hardware.delay is {number_text(delay)} s, longer than the sample time of {number_text(sample_time)} s",
-            f"write `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep over hardware.rate, too), or less",
+            f"write a time in seconds, or `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep, too)",
         )
     feedback = _positive(entries, "feedback_rate", names)
     found = (

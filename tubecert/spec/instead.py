@@ -31,7 +31,7 @@ _SAME: Final[Mapping[str, str]] = {
     **dict.fromkeys(("bounds", "state_bounds", "state_constraints", "region", "set"), "safe_set"),
     **dict.fromkeys(("corners", "vertices", "points"), "polygon"),
     **dict.fromkeys(("goal", "end", "final", "x_goal", "xf"), "target"),
-    **dict.fromkeys(("P", "W_x"), "dual_metric"),
+    "W_x": "dual_metric",
     **dict.fromkeys(("controls", "control"), "inputs"),
 }
 """Keys that are another one by another name, where that one may stand."""
@@ -62,7 +62,7 @@ _KEYS: Final[Mapping[str, str]] = {
         "how wide the tube is follows from epsilon and rho_a, or is given by state: half_widths: {NAME: 0.1}",
     ),
     **dict.fromkeys(("W", "dual", "matrix"), "the inverse of the metric is the key dual_metric"),
-    "M": "the metric is given by its inverse, dual_metric",
+    **dict.fromkeys(("M", "P"), "the metric is given by its inverse, W = M^-1: the key dual_metric"),
     **dict.fromkeys(("lambda", "lam", "decay"), "the contraction rate is the key rate, in 1/s"),
     **dict.fromkeys(("synthesize", "synthesis", "synth"), "to have a metric found write synthesise: {}"),
     **dict.fromkeys(("g", "G"), "the matrix of the inputs is the key B"),
@@ -117,7 +117,10 @@ OTHER_WORDS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("tracking", "trajectory", "expression", "function", "analytic"), "expressions"),
     **dict.fromkeys(("table", "file", "spline", "waypoints", "samples"), "csv"),
     **dict.fromkeys(("optimal", "planner", "plan", "ddp", "lqr", "mpc", "ocp"), "ilqr"),
-    **dict.fromkeys(("proven", "proved", "yes", "ok"), "certified"),
+    **dict.fromkeys(("proven", "proved", "ok"), "certified"),
+    **dict.fromkeys(("yes", "on", "1"), "true"),
+    **dict.fromkeys(("no", "off", "0"), "false"),
+    **dict.fromkeys(("zoh", "zero_order_hold"), "held"),
 }
 """Words that other formats have for a choice."""
 
@@ -176,6 +179,15 @@ def of_value(path: str, text: str) -> str:
             return "to have a metric found write metric: {synthesise: {}}; a known one is {dual_metric: ..., rate: ...}"
         case "metric.synthesise":
             return "write synthesise: {}, or its wishes in the braces: {rate: 1}"
+        case "uncertainty" if word.replace(".", "", 1).isdecimal():
+            bounds = f"{{bounds: {{h: {word[:20]}, h_x: ..., h_t: ...}}}}"
+            return f"for a bound write {bounds}, else {{h: [...]}}, an expression per input"
+        case "tube":
+            return (
+                "write {half_widths: {NAME: 0.1}}: how far each state may be from the plan, in its own unit"
+            )
+        case "hardware.noise":
+            return "noise by state is written {NAME: size}; one number bounds the length of the error"
         case "uncertainty":
             return 'write {h: ["0.1*sin(t)"]}, an expression per input; {h: ["0"]} if there is none'
         case "conditions" if word:

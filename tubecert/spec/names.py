@@ -223,7 +223,7 @@ def _problem(name: str, taken: Mapping[str, str]) -> tuple[str, str] | None:
         return "t is the time; it cannot be a name", "choose another name"
     if name in _RESERVED:
         return f"{name} is a reserved word", f"choose another name, e.g. {name}_"
-    if name.isdigit():
+    if re.fullmatch(r"[0-9]+(?:[eE][-+]?[0-9]+)?", name):
         return (
             f"{name[:60]!r} is not a name",
             "after a decimal comma it would be a key: write a decimal point",

@@ -191,7 +191,7 @@ class Field:
     ) -> Fraction | None:
         """A rational number, in its range; what contains pi is rounded to a side."""
         if not isinstance(self.node, Scalar):
-            self._wrong_type("a number")
+            self._wrong_type("a number", self._one_number())
             return None
         try:
             value = parse_number(self.node.text, parameters, side)
@@ -322,10 +322,21 @@ class Field:
             text = text[1:-1].strip()
         if count == 2 and (size := re.fullmatch(r"(?:\+-|\+/-|±)\s*([0-9.]+)", text)):
             return f"write [-{size[1]}, {size[1]}]"
+        if text.startswith("[") and text.endswith("]"):
+            return "remove the quotes around it: a list is not a text"
+        if self.path.startswith(("safe_set.", "limits.")) and re.fullmatch(r"[0-9.]+", text):
+            return f"write [-{text}, {text}], or whatever its ends are"
         plain = text and len(text) <= 40 and not set(text) & set("[]{}\n;")
         if not plain or (count is not None and text.count(",") + 1 != count):
             return f"write a list in brackets: [{', '.join(['...'] * min(count or 2, 8))}]"
         return f'write ["{text}"]' if "(" in text else f"write [{text}]"
+
+    def _one_number(self) -> str:
+        """What to write for a range that is symmetric, or a list of one number."""
+        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
+        if len(texts) == 1 or (len(texts) == 2 and texts[0] == f"-{texts[1]}"):
+            return f"write {texts[-1]}"
+        return ""
 
     def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
         texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
@@ -333,6 +344,8 @@ class Field:
             help = "entries are separated by commas: [..., ...]"
         elif found > wanted and what == "numbers" and all(text.lstrip("+-").isdecimal() for text in texts):
             help = help or "if a comma was meant as a decimal point, write the point"
+        if found == 1 and wanted > 1 and isinstance(self._nodes[0], ListNode) and "rows" not in what:
+            help = help or "one pair of brackets is too many"
         entries = "1 entry" if found == 1 else f"{found} entries"
         self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help)
 
