@@ -294,6 +294,18 @@ def test_bound_is_that_of_cvxpy(floor):
     assert np.linalg.eigvalsh(V - least)[0] > -1e-6
 
 
+def test_of_metrics_of_one_input_gain_a_smaller_one_is_taken(monkeypatch):
+    """The rate is that of a and v; W_11 may be anything from .25, the floor, up: no last digit of a solver decides."""
+    drift = ["-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2", "v", "0"]
+    model = system(["x1", "x2", "a", "v"], drift, [["0.5", "0"], ["-2", "0"], ["0", "0"], ["0", "1"]])
+    asked = problem(model, (*TWO_BOX, *box((-1, 1), (-1, 1))), 1.0, floor="input")
+    small = cegis.propose(asked)
+    monkeypatch.setattr(program, "_SMALL", 0.0)
+    any_one = cegis.propose(asked)
+    assert small.kappa == pytest.approx(any_one.kappa, rel=3e-3)
+    assert 0.25 <= small.coefficients[0][0, 0] < 0.4 < any_one.coefficients[0][0, 0]
+
+
 @pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10_000), rate=st.sampled_from([0.2, 0.7]))

@@ -171,6 +171,7 @@ class _Synthesis:
             high=metric,
             contraction=contraction,
             floor=self.problem.floor,
+            rate=self.problem.rate / self.problem.scaled.rate,
             solver=self.problem.solver,
         )
 

@@ -22,6 +22,7 @@ from tubecert.synthesis.problem import Floor
 
 _TOLERANCE, _ROUGH = 1e-7, 1e-5
 _LEAST = 1e-4  # of kappa: keeps W definite where the floor is B B'
+_SMALL = 0.01  # of the rate, for a W of mean eigenvalue kappa: of metrics alike, the smaller one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,13 +46,14 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointProgram:
-    """The conditions at `low` and `high` points (C1) and `contraction` points (C2)."""
+    """The conditions at `low` and `high` points (C1) and `contraction` points (C2); `rate` in the unit of the rows."""
 
     unknowns: Unknowns
     low: Points
     high: Points
     contraction: Points
     floor: Floor
+    rate: float
     solver: str
 
     def least_kappa(self) -> ConicSolution:
@@ -66,10 +68,15 @@ class PointProgram:
         """With kappa given, the greatest extra rate mu (the last unknown), W kept inside by a relative `slack`.
 
         -N'(F_0 + 2 rate W)N >= 2 mu N'W_r N with W_r given by `reference`, the unknowns found before (U,); mu is in the
-        unit of the rows.
+        unit of the rows. Under the floor B B' parts of W may be anything between the floor and kappa I; so that no last
+        digit of a solver decides, a little is paid for the trace of W.
         """
         cost = np.zeros(self.unknowns.count + 1)
         cost[-1] = -1.0
+        if self.floor == "input":
+            diagonal = upper(np.eye(self.unknowns.mask.shape[1])) > 0
+            trace = self.low.rows[:, diagonal].sum(axis=1).mean(axis=0)
+            cost[:-1] = _SMALL * self.rate / (kappa * diagonal.sum()) * trace
         blocks = [*self._between(slack, kappa), *self._contracting(reference)]
         return solve(ConicProgram(cost=cost, semidefinite=blocks), self.solver, tolerance=_ROUGH)
 
