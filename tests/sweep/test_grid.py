@@ -58,6 +58,8 @@ def test_a_range_goes_from_end_to_end_in_equal_steps_or_factors(first, last, cou
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
+        ("a=.1-.6", "TC112", "is one value, not a range"),
+        ("a=0.1..0.6", "TC112", "is one value, not a range"),
         ("a=1:2", "TC112", "is no range"),
         ("a=1:2:x", "TC112", "is no range"),
         ("a=1:2:3:4", "TC112", "is no range"),

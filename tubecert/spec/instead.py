@@ -158,7 +158,9 @@ def of_key(key: str, known: Sequence[str]) -> tuple[str, list[str]]:
         return f"it is called {other}: {EXAMPLES.get(other, '...')}", [other]
     close = near(key, known)
     if key in _PLACES and not close:
-        return f"it belongs to {_PLACES[key]}", list(_MEANT.get(key, ())) if key in _KEYS else close
+        return f"it belongs to {_PLACES[key]}: {_PLACES[key]}.{key}", list(
+            _MEANT.get(key, ())
+        ) if key in _KEYS else close
     advice = _KEYS.get(key) or suggestion(key, known, what="known keys")
     return advice, list(_MEANT.get(key, ())) if key in _KEYS else close
 

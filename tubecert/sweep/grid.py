@@ -28,6 +28,7 @@ _SHORT: Final = 12  # digits of a value between the ends that is exact
 _DIGITS: Final = 6  # of one that is not
 _FORM: Final = "write KEY=FIRST:LAST:COUNT, KEY=FIRST:LAST:logCOUNT or KEY=VALUE,VALUE,..."
 _COUNT = re.compile(r"(log)?(\d{1,6})", re.ASCII)
+_DASHED: Final = re.compile(r"[0-9.]*[0-9]\s*(?:-|to|\.\.)\s*[0-9.]*[0-9]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +109,8 @@ def printed_in(settings: Sequence[Setting]) -> bool:
 
 def _listed(setting: Setting) -> tuple[str, ...]:
     texts = tuple(part.strip() for part in setting.text.split(","))
+    if len(texts) == 1 and _DASHED.fullmatch(texts[0]):
+        _refuse(setting, f"{texts[0]} is one value, not a range", _FORM)
     if not all(texts) or len(set(texts)) < len(texts):
         _refuse(setting, "a value of the list is empty or occurs twice", _FORM)
     return texts
