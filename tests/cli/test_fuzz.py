@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "harness"))
 
 import fuzz
 
-LINT = ["--cases", "250", "--jobs", "2", "--budget", "200", "--alarm", "60"]
+LINT = ["--cases", "100", "--jobs", "2", "--budget", "200", "--alarm", "60"]
 CERTIFY = ["--cases", "10", "--first", "50", "--jobs", "2", "--mode", "certify", "--budget", "300"]
 
 

@@ -74,7 +74,7 @@ def test_a_library_does_not_decide_on_the_exit_code(status):
 def test_a_library_that_gets_no_memory_refutes_nothing():
     """OpenBLAS ends the process with 1 when it gets no memory for its threads."""
     codes = set()
-    for kilobytes in range(100_000, 240_000, 20_000):
+    for kilobytes in range(100_000, 240_000, 40_000):
         limit = kilobytes * 1024
         process = started(
             "certify", SPEC, "-q",
