@@ -166,6 +166,11 @@ def test_a_gain_is_not_said_to_be_smaller(ends):
     assert gain(1 + Fraction(1, 100), ends).over([]).proven
 
 
+def test_where_nothing_varies_ranges_are_halved_as_often_as_it_takes():
+    """A linear system has no boxes to halve: of 1/mu + mu >= 2 all but a millionth is proven by ranges alone."""
+    assert gain(1 + Fraction(1, 10**6), (0.0, 10.0)).over([]).proven
+
+
 def test_a_gain_at_the_ends_of_a_range():
     """Towards mu = 0 a gain that B does not reach has no bound; elsewhere the least of 1/mu + mu is at an end."""
     lost = gain(100, (0.0, 1.0), BBt="0*x")

@@ -23,7 +23,7 @@ Side = Literal["nearest", "below", "above"]
 
 DIGITS: Final = 30
 _MEASURED: Final = re.compile(
-    r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z][\w/*^ ]*?)\s*"
+    r"\s*([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z][\w/*^ ]*?)\s*"
 )
 _NOT_FINITE = frozenset({"nan", "inf", "infinity", "infinite", "oo", "forever"})
 _FOREIGN_NUMBER = re.compile(r"[-+]?[0-9]+[,:][0-9,:.]+")
@@ -125,8 +125,8 @@ def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, E
     try:
         return parse(text, symbols=symbols), factor
     except ExpressionError as error:
-        measured = _MEASURED.fullmatch(text)
-        if error.kind == "symbol" and measured and re.split(r"\W", measured[2])[0] in UNITS:
+        measured = _MEASURED.fullmatch(text) if error.kind == "symbol" else None  # short, or it was not read
+        if measured and re.split(r"\W", measured[2])[0] in UNITS:
             help = instead_of(*measured.groups())
             raise ExpressionError(
                 HAS_NONE, help=help, offset=measured.start(2), width=len(measured[2]), kind="value"
