@@ -331,6 +331,7 @@ def test_the_closed_form_of_the_feedback_gain_is_above_the_exact_one(three, thre
     assert closed <= 1.1 * three_truth["feedback_gain"]
 
 
+@pytest.mark.slow
 def test_the_feedback_gain_of_the_sheet():
     # at |x2| -> 0 of the two-state system: du 6.29599, beta 1.03048
     model = two_state_model()

@@ -100,6 +100,7 @@ def test_the_inverse_is_exact(values):
             assert sum(own[i][k] * found[k][j] for k in range(3)) == (i == j)
 
 
+@pytest.mark.slow
 def test_derivatives_are_by_the_components_of_z():
     """Each field of `Fields` is what one obtains by writing the system in z and differentiating there."""
     own = model()
@@ -199,6 +200,7 @@ def test_a_factor_that_promises_too_much_is_given_up(monkeypatch):
         sections.factor.cache_clear()
 
 
+@pytest.mark.slow
 def test_a_moving_plan_carries_the_ellipsoid():
     t = symbol("t")
     plan = Plan((t, parse("sin(t)", symbols={"t": t}).expression, t * 0), (t * 0,), Fraction(1))

@@ -83,6 +83,7 @@ def test_noise_per_state_is_that_of_the_worst_corner(linear):
     assert len(corners((Fraction(1), Fraction(0), Fraction(1)))) == 2
 
 
+@pytest.mark.slow
 def test_a_curved_drift_in_one_dimension():
     s = suprema_of(model_of(["sin(x1)"], [["1"]], [["2"]]), ["t"], ["cos(3*t)"], horizon=Fraction(2))
     # F = 2 cos(x) 2 + 2 rate 2, over W = 2: 2 cos(x) + 1 on [-.5, 2.5]

@@ -230,6 +230,7 @@ def knots(interpolation, x=((0, 0), ("1/10", "-1/20"), (0, "1/10")), u=(0, "1/5"
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["linear", "hold"])
 def test_a_plan_through_knots(interpolation):
     own = model_of()

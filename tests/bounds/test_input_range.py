@@ -115,6 +115,7 @@ def test_through_knots_it_is_the_range_of_the_knots_that_count(u, interpolation,
         assert abs(Fraction(greatest.above) - max(values)) <= Fraction(SHARP) + abs(max(values)) / 50
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(texts(smooth=True, leaves=4))
 def test_no_sample_is_outside(text):

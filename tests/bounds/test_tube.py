@@ -254,6 +254,7 @@ def test_a_tube_within_the_safe_set_is_certified():
     assert judge("circle", 0.25, (-1.26, 1.26), (-1.26, 1.26), (-0.26, 0.57)).verdict == "certified"
 
 
+@pytest.mark.slow
 def test_a_tube_that_leaves_is_refuted_with_the_worst_time_and_point():
     found = judge("circle", 0.25, (-1.26, 1.26), (-1.2, 1.26), (-0.26, 0.5))
     assert (found.verdict, found.state, found.side) == ("refuted", "z", "upper")

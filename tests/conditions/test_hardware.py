@@ -360,6 +360,7 @@ def test_the_scale_of_the_metric_does_not_matter(name):
 # -- the comparison equation of step 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

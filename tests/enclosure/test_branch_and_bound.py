@@ -139,6 +139,7 @@ def test_an_exhausted_budget_is_reported_and_the_bounds_still_hold(name, budget)
     assert found.boxes <= budget + 2 * bnb._BATCH
 
 
+@pytest.mark.slow
 def test_the_budget_holds_when_many_boxes_are_taken_at_once():
     effort = Effort(gap=0.0, absolute=0.0, budget=30_000)
     found = supremum(scalar(read("-(x - y)**2 - (y - z)**2")), box(x=(-3, 2), y=(-3, 2), z=(-3, 2)), effort)

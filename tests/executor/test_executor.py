@@ -99,6 +99,7 @@ def test_processes_that_are_held_stay_until_one_fails_and_none_is_left():
         assert alone == Serial()
 
 
+@pytest.mark.slow
 def test_an_interruption_ends_the_workers():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(2, lambda: os.kill(os.getpid(), signal.SIGINT))

@@ -52,6 +52,7 @@ def of_python(module, y):
     return np.array([own.start(y[0]), *(own.step(row) for row in y)])
 
 
+@pytest.mark.slow
 def test_python_computes_what_the_reference_computes(controller, tmp_path):
     module = loaded(controller, tmp_path)
     y = wandering(controller, 40, 1, 3)[:, 0]
@@ -117,6 +118,7 @@ def test_strict_compilers_and_sanitizers_have_nothing_to_say(controller, precisi
     assert "passes" in done.stdout
 
 
+@pytest.mark.slow
 @needs_cc
 @pytest.mark.parametrize("cc", PRESENT)
 @pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only", "-Ofast"])

@@ -40,6 +40,7 @@ def bound(precision, low, high, error=0.0):
     return float(lookups.followed(BEND, x, own.real, own._rounded).error[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("precision", "real"), [("single", np.float32), ("double", np.float64)])
 def test_what_a_table_gives_is_within_its_bound(precision, real):
     """At numbers of the type, many of them next to knots as they are and as they are rounded."""

@@ -37,6 +37,7 @@ def by_definition(rows: list[list[Fraction]]) -> Fraction:
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())

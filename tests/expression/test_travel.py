@@ -72,6 +72,7 @@ else:
 """
 
 
+@pytest.mark.slow
 def test_a_process_with_another_history_reads_the_same_expression() -> None:
     """The order of sums and products is the order in which a process met their terms."""
 

@@ -136,6 +136,7 @@ def test_recheck_shares_nothing_with_the_producer(path):
     assert not {name.split(".")[0] for name in imported(tree)} & {"numpy", "scipy", "cvxpy", "sympy"}
 
 
+@pytest.mark.slow
 def test_recheck_knows_every_kind_and_no_other():
     """By a table of its own; beside the file of a kind, no file of the room names one."""
     own = [(kind.key, kind.adapts) for kind in recheck_kinds.KINDS]

@@ -85,6 +85,7 @@ def refused(code, function, *arguments, **options):
 # specifications
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_a_mapping_is_the_same_system_as_its_file(path):
     data = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.BaseLoader)
@@ -273,6 +274,7 @@ def test_what_is_saved_is_read_back(tmp_path):
     refused("TC601", tc.read, tmp_path / "x.json")
 
 
+@pytest.mark.slow
 def test_the_values_are_those_of_the_certificate():
     result, data = certified(), json.loads(certified().text)["result"]
     section = data["conditions_26"]
@@ -433,6 +435,7 @@ def test_wishes_that_mean_nothing_are_refused(options):
 # recheck, report, simulate
 
 
+@pytest.mark.slow
 def test_a_certificate_is_examined_again(tmp_path):
     found = tc.recheck(certified())
     assert found.confirmed
@@ -453,6 +456,7 @@ def test_a_certificate_that_lies_is_not_confirmed():
     assert not tc.recheck(undecided).confirmed
 
 
+@pytest.mark.slow
 def test_a_page_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     certified().save("x.json")
@@ -553,6 +557,7 @@ def test_figures_are_drawn_into_the_axes_that_are_given():
     refused("TC112", result.plot_tube, axes, states=("p", "q"))
 
 
+@pytest.mark.slow
 def test_the_tube_that_is_drawn_is_as_wide_as_it_is():
     from matplotlib.figure import Figure
 

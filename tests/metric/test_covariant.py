@@ -53,6 +53,7 @@ SPHERE = [["1", "0"], ["0", "1/cos(x1)**2"]]
 HYPERBOLIC = [["x2**2", "0"], ["0", "x2**2"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("W", "x", "value"),
     [(SPHERE, (0.3, 0.1), 1.0), (HYPERBOLIC, (0.2, 1.5), 1.0)],

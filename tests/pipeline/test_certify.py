@@ -117,6 +117,7 @@ def test_as_printed_reproduces_the_papers_own_formulas():
     assert fixed["conditions_26"]["adaptation_rate"] == pytest.approx(1.967e7, rel=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "largest"),
     [

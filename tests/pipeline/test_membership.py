@@ -46,6 +46,7 @@ def codes(findings):
 IS = [("TC411", Severity.NOTE)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "words"),
     [

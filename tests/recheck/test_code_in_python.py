@@ -139,6 +139,7 @@ def test_what_is_not_of_the_grammar_is_refused(change, orbit_module):
         read_python(orbit_module.replace(old, new, 1))
 
 
+@pytest.mark.slow
 def test_every_number_of_a_table_and_of_the_header_is_that_of_the_certificate():
     text = module_of(CONTROLLERS["turning"]())
     formulas = in_recheck("turning")

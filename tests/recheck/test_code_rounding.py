@@ -331,6 +331,7 @@ UNKNOWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", sorted(UNKNOWN))
 def test_what_is_not_understood_is_refused(change):
     c = covered("orbit")

@@ -200,6 +200,7 @@ def test_without_a_bug_the_readings_agree(told):
     assert not differs(told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bug", IN_RECHECK)
 def test_a_bug_in_recheck_is_found_by_the_producer(bug, told, monkeypatch):
     before, after = IN_RECHECK[bug]

@@ -305,6 +305,7 @@ def test_another_metric_in_the_section_alone_is_named(shipped):
     assert "dual_metric" in examine(sealed(document), 100).failing.outcome.why
 
 
+@pytest.mark.slow
 def test_a_refuted_metric_is_confirmed_at_its_witness():
     text = THREE.read_text(encoding="utf-8").replace("rate: 0.9999", "rate: 1")
     result = pipeline.certify(spec.load_text(text, "faster.yaml"), pipeline.Options()).to_json()
@@ -387,6 +388,7 @@ def test_a_failing_claim_is_named_first(certified):
     assert done.stdout.splitlines()[1].startswith("  first failing claim: f_x <= 1.8: false at x1 = ")
 
 
+@pytest.mark.slow
 def test_a_small_budget_is_undecided(certified):
     done = command(certified, "--budget", "3")
     assert done.exit_code == ExitCode.UNDECIDED

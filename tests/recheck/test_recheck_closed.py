@@ -213,6 +213,7 @@ def renamed(document, old, new):
     return {**document, "result": json.loads(text)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["pi", "t", "True", "None", "sin", "norm", "lambda", "x y", "1x", "", "x*", "é", "_x"]
 )

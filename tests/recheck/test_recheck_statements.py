@@ -154,6 +154,7 @@ def gain(limit, ends, F="2", W="1", BBt="1"):
     return test
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "ends", [(0.0, 1.0), (0.5, 2.0), (0.9, 1.1), (1.0, 1.0), (1.0, 4.0), (0.25, 1.0), (0.1, 10.0)]
 )
@@ -171,6 +172,7 @@ def test_where_nothing_varies_ranges_are_halved_as_often_as_it_takes():
     assert gain(1 + Fraction(1, 10**6), (0.0, 10.0)).over([]).proven
 
 
+@pytest.mark.slow
 def test_a_gain_at_the_ends_of_a_range():
     """Towards mu = 0 a gain that B does not reach has no bound; elsewhere the least of 1/mu + mu is at an end."""
     lost = gain(100, (0.0, 1.0), BBt="0*x")
@@ -180,6 +182,7 @@ def test_a_gain_at_the_ends_of_a_range():
         assert gain(2 / least + Fraction(1, 100), ends).over([]).proven
 
 
+@pytest.mark.slow
 def test_what_is_proven_of_a_box_is_not_proven_again_on_its_parts_and_on_no_other():
     """Of F = 2 + x: at x = 1 and mu = 1 the gain has to be 3/2."""
     test = gain(Fraction(14, 10), (0.0, 10.0), F="2 + x")
@@ -192,6 +195,7 @@ def test_what_is_proven_of_a_box_is_not_proven_again_on_its_parts_and_on_no_othe
     assert prove(test, Boxed({"x": (Fraction(-1), Fraction(1))}), 1000).verdict == "contradicted"
 
 
+@pytest.mark.slow
 def test_a_gain_needs_the_rest_of_the_expansion_and_both_ends(monkeypatch):
     """2 + x^5 is 3 at 1, of which nothing is seen at 0; 1/mu + mu is 5.2 at .2 and 2 at 1."""
     wide, long = gain(Fraction(12, 10), (0.99, 1.01), F="2 + x**5"), gain(Fraction(9, 10), (0.2, 1.0))
@@ -334,6 +338,7 @@ def test_apart_from_its_kink_a_norm_is_expanded_to_second_order():
         assert 0 <= top - math.hypot(0.3 + width, 0.4 + width) < 2 * width**3
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.floats(-1, 1), st.floats(-1, 1))
 def test_slopes_of_the_left_inverse_of_two_columns(x, y):

@@ -140,6 +140,7 @@ def test_every_style_of_a_mark_is_in_the_style_sheet(orbit, outside, regulated):
         assert used - known <= {"start", "axis"}, "drawn as every dot and every text is"
 
 
+@pytest.mark.slow
 def test_the_same_certificate_gives_the_same_page_before_and_after_it_is_written(any_certificate):
     read_back = json.loads(certificate.dump(any_certificate))
     shuffled = {key: read_back[key] for key in reversed(read_back)}

@@ -69,6 +69,7 @@ def grown(inner):
     )
 
 
+@pytest.mark.slow
 @example("x1*(x2 + q)")
 @example("(x2 + q)*x1")
 @example("x1 - (x2 - q)")

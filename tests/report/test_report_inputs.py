@@ -39,6 +39,7 @@ def told(text, **options):
     return out.getvalue()
 
 
+@pytest.mark.slow
 def test_the_report_says_where_an_input_stays_and_what_takes_it_there():
     shown = told(ONE + "limits: {u: [-1, 1]}\n")
     assert "u stays within [0.09999, 0.3001] N; limits [-1, 1]: 30.1 % used (the plan is in" in shown

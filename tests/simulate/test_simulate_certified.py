@@ -129,6 +129,7 @@ def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
     assert "metric, C1: W " in finding.message
 
 
+@pytest.mark.slow
 def test_the_plan_is_that_of_the_certificate():
     spec, result = certified("two_state", "0.4")
     plan = certified_plan(spec, build(spec), result)

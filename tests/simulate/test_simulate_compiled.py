@@ -44,6 +44,7 @@ def nowhere(monkeypatch):
         numba.njit(cache=True)(lambda x: x)
 
 
+@pytest.mark.slow
 def test_kernels_compile_where_nothing_can_be_kept(monkeypatch):
     nowhere(monkeypatch)
     kernel = fresh_kernel()

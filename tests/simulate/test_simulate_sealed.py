@@ -111,6 +111,7 @@ class Planted:
         return os.mkdir, (str(self.mark),)
 
 
+@pytest.mark.slow
 def test_planted_machine_code_is_never_unpickled(kernels, tmp_path, monkeypatch):
     """Without a seal, under another key, and as numba's own kinds of files."""
     used(kernels)
@@ -134,6 +135,7 @@ def test_planted_machine_code_is_never_unpickled(kernels, tmp_path, monkeypatch)
     assert mark.exists()
 
 
+@pytest.mark.slow
 def test_files_of_other_kernels_and_of_other_sources_do_not_fit(kernels, tmp_path, monkeypatch):
     used(kernels), used(kernels, "other")
     own, foreign = files(tmp_path), files(tmp_path, "other")

@@ -53,6 +53,7 @@ def run(problem, start=(0.1, 0.0), tolerance=1e-3):
     return integrate(problem, np.array([start]), h, tolerance=tolerance)
 
 
+@pytest.mark.slow
 def test_growth_is_that_of_the_loop_step_by_step():
     rng = np.random.default_rng(3)
     A, B, dt, Gamma = -2 * np.eye(3), rng.normal(size=(3, 2)), 0.01, 50.0

@@ -61,6 +61,7 @@ def as_editor(path: Path) -> Any:
     return yaml.safe_load(path.read_text("utf-8-sig"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(SCHEMAS))
 def test_schemas_are_schemas(name):
     jsonschema.Draft202012Validator.check_schema(SCHEMAS[name])

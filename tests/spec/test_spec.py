@@ -452,6 +452,7 @@ def test_hostile_files_are_refused(name: str) -> None:
     assert all(f.location is not None and len(str(f)) < 2_000 for f in found)
 
 
+@pytest.mark.slow
 def test_large_but_honest_files_load() -> None:
     n = 32
     names = [f"s{i}" for i in range(n)]

@@ -34,6 +34,7 @@ def test_the_values_of_a_range(words, texts):
     assert Axis.of(words).texts == texts
 
 
+@pytest.mark.slow
 @given(NUMBERS, NUMBERS, st.integers(2, 40), st.booleans())
 def test_a_range_goes_from_end_to_end_in_equal_steps_or_factors(first, last, count, log):
     if first == last:

@@ -65,6 +65,7 @@ def random_program(seed):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from(["cvxpy:CLARABEL", "cvxpy:SCS"]))
 def test_the_program_is_the_same(seed, solver):

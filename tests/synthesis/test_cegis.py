@@ -294,6 +294,7 @@ def test_bound_is_that_of_cvxpy(floor):
     assert np.linalg.eigvalsh(V - least)[0] > -1e-6
 
 
+@pytest.mark.slow
 def test_of_metrics_of_one_input_gain_a_smaller_one_is_taken(monkeypatch):
     """The rate is that of a and v; W_11 may be anything from .25, the floor, up: no last digit of a solver decides."""
     drift = ["-x1 + 2*x2", "-0.25*x2**3 - 3*x1 + 4*x2", "v", "0"]

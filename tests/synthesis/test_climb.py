@@ -152,6 +152,7 @@ class Valley:
         )
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(most=st.floats(0.05, 1e4), start=st.floats(1e-2, 20))
 def test_the_climb_finds_the_edge_of_what_fits(most, start):
@@ -220,6 +221,7 @@ def test_the_degree_that_suffices_is_told():
     assert set(asked[1:]) == {1}
 
 
+@pytest.mark.slow
 def test_a_metric_that_no_file_can_hold_ends_the_search_at_once(monkeypatch):
     """The fields of a moving B are what is long: no rate makes them shorter, other inputs do."""
     spec = load(str(CONFIGS / "state_dependent_input.yaml"))
@@ -320,6 +322,7 @@ def test_the_verdict_is_told_before_advice(monkeypatch):
     assert said[1] == "advice"
 
 
+@pytest.mark.slow
 def test_advice_costs_no_more_than_the_search():
     lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
     wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)

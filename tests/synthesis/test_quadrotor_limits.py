@@ -79,6 +79,7 @@ def is_certificate(Z, slopes):
     return total == sp.zeros(3, 3) and all(z[:k, :k].det() > 0 and z == z.T for z in Z for k in (1, 2, 3))
 
 
+@pytest.mark.slow
 def test_no_constant_metric_on_the_published_box():
     slopes = exact_slopes("4/7")  # 59.5 degrees, inside the published 60
     assert 2 * np.arctan(4 / 7) < np.pi / 3
@@ -88,6 +89,7 @@ def test_no_constant_metric_on_the_published_box():
     assert not is_certificate(Z, slopes)
 
 
+@pytest.mark.slow
 def test_where_there_is_a_metric_there_is_no_certificate():
     slopes = exact_slopes("4/10")  # 43.6 degrees
     assert not is_certificate(certificate(slopes), slopes)

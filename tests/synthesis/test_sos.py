@@ -136,6 +136,7 @@ def test_too_few_iterations_are_said():
     assert "max iterations" in found.status
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 5), st.integers(1, 3))
 def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
@@ -369,6 +370,7 @@ def test_affine_variables_become_vertices():
     assert [c.orders for c in contraction] == [(3,), (3,)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "box", "degree"),
     [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 2), (PENDULUM, BOX_PENDULUM, 2)],

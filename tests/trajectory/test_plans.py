@@ -382,6 +382,7 @@ def two(*values: str) -> tuple[Fraction, ...]:
 # -- the safe set ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_curve_may_leave_between_its_knots():
     data = Knots(
         t=(Fraction(0), Fraction(1)),
@@ -516,6 +517,7 @@ def test_the_initial_state_is_the_first_row_unless_it_is_given(tmp_path):
     assert result["constants"]["initial_distance"]["above"] == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_plan_outside_the_safe_set_is_refuted_with_time_and_point(tmp_path):
     rows = "t,p,q,u\n0,0,0,0\n1,0,1.7,0\n2,0,0,0\n"
     result = certify(load(str(written(tmp_path, rows))), Options()).to_json()
