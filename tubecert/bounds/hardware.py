@@ -176,7 +176,12 @@ class HardwareSuprema(Suprema):
             slope = self.fields.vector(self.plan.slope)
             return self._on_plan("plan_speed", SumOfNorms([slope], self.plan.fixed))
         drift = self.plan.on(self.model, self.fields.drift_on_plan())
-        speed = self._on_plan("plan_speed", SumOfNorms([drift], self.plan.fixed))
+        objective, at = SumOfNorms([drift], self.plan.fixed), self.plan.at_times_of(self.model)
+        speed = (
+            Constant.exactly(0.0)
+            if objective.is_zero
+            else self._constant(self._run("plan_speed", objective, at, self.effort_for("plan_speed")))
+        )
         total = Interval(speed.below, speed.above) + Interval(defect.below, defect.above)
         return Constant(below=0.0, above=float(total.hi))
 

@@ -20,6 +20,7 @@ from tubecert.export import blocks, geodesics
 from tubecert.export.blocks import INTEGRATION, Machine, forgotten
 from tubecert.export.continuous.assembly import of_samples
 from tubecert.export.controller import Boxes, Continuous, Controller, refused
+from tubecert.export.followed import frobenius
 from tubecert.export.question import gain_of, horizon_of, identifier, pieces_of, question
 from tubecert.expression import free_symbols, topological
 from tubecert.kinds import HARDWARE, SAMPLED
@@ -136,6 +137,7 @@ def assembled(machine: Machine) -> Controller:
         bend=blocks.bend(plan) if played and pieces is None and boxes is None and covered else None,
         predictor=None if recipe.prediction is None else blocks.predictor(model, recipe.delay / INTEGRATION),
         estimator=blocks.estimator(machine),
+        stretch=_stretch(machine),
         steep=blocks.steep(model) if covered and recipe.prediction is not None else None,
         swept=geodesics.swept(model, machine.geodesic) if bent and machine.geodesic is not None else None,
         moves=_moves(machine),
@@ -169,6 +171,14 @@ def _moves(machine: Machine) -> tuple[Fraction, ...]:
     far = recipe.speed * recipe.sample_time + 2 * recipe.noise * machine.noise_size
     sizes = [Fraction(1) if back is None else sum((q * q for q in back[i]), Fraction(0)) for i in range(n)]
     return tuple(Fraction(float((Interval.of(far) * sqrt(Interval.of(size))).hi)) for size in sizes)
+
+
+def _stretch(machine: Machine) -> Fraction:
+    """|S| from above: what is off in x is at most that many times as long in the coordinates of the tube."""
+    if machine.coordinates is None:
+        return Fraction(1)
+    rows = [[Fraction(q) for q in row] for row in machine.coordinates]
+    return Fraction(float(frobenius(rows).hi))
 
 
 def _require(model: ControlAffineModel, recipe: HardwareRecipe, geodesic: Picard | None) -> None:

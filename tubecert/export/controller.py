@@ -139,6 +139,7 @@ class Controller(Steering):
     predictor: Program | None
     estimator: Program
     moves: tuple[Fraction, ...] = ()
+    stretch: Fraction = Fraction(1)
     every: int = 1
     steep: Program | None = None
 

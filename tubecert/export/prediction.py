@@ -66,7 +66,7 @@ def off(c: Controller, given: Predicted, follow: Runner) -> Interval:
     lost = exp(D * tau) * (B * given.wrong * tau + INTEGRATION * (h**ORDER * cut + rounded))
     if not bool(np.all(lost.sanitised().hi < room.lo)):
         raise UncoveredError("a prediction over so long a delay")
-    return largest_of(lost)
+    return largest_of(lost) * Interval.of(c.stretch)
 
 
 def _cut(c: Controller, x: Sequence[Interval], kappa: Sequence[Interval], given: Predicted) -> list[Interval]:

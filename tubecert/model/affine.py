@@ -199,7 +199,9 @@ def _time_of(spec: Spec) -> Range | None:
 
     The reader takes no f that has neither.
     """
-    if TIME not in free_symbols(term.expression for term in spec.drift or spec.f):
+    terms = spec.drift or spec.f
+    owed = [duty.argument for term in terms for duty, _ in term.owed()]
+    if TIME not in free_symbols([*(term.expression for term in terms), *owed]):
         return None
     if spec.trajectory.horizon is not None:
         return Fraction(0), spec.trajectory.horizon

@@ -14,7 +14,7 @@ from functools import cached_property
 from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
-from tubecert.recheck.cover import Range
+from tubecert.recheck.cover import Range, as_ball
 from tubecert.recheck.curve import Curve, Ends, Part, Segment
 from tubecert.recheck.specified.trajectory import AnyPlan
 from tubecert.recheck.terms import Term, variable
@@ -79,11 +79,13 @@ def _outward(box: Sequence[tuple[Fraction, Fraction]]) -> Ends:
     return [(floor(exact(low)), ceiling(exact(high))) for low, high in box]
 
 
-def everyone(family: AnyPlan, states: Sequence[str], inputs: Sequence[str]) -> Everyone:
-    """The plans of a family as a curve; its start is not known."""
+def everyone(
+    family: AnyPlan, states: Sequence[str], inputs: Sequence[str], times: Range | None = None
+) -> Everyone:
+    """The plans of a family as a curve; its start is not known. `times`: those of f, from 0 on; None if it has none."""
     P, U = (tuple(box[name] for name in names) for box, names in ((family.x, states), (family.u, inputs)))
     stars = [[f"{name}*" for name in names] for names in (states, inputs)]
     x, u = (tuple(map(variable, names)) for names in stars)
     named = dict(zip([*stars[0], *stars[1]], (*P, *U), strict=True))
-    part = Part(exact(0), exact(0), {})
+    part = Part(exact(0), exact(0) if times is None else as_ball(times[1]), {})
     return Everyone(x, u, (part,), family.horizon, (), (P, U), named, family.defect)

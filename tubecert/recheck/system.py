@@ -186,7 +186,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     """The plan: expressions of the specification, or the knots that the certificate holds."""
     trajectory = spec.trajectory
     if isinstance(trajectory, AnyPlan):
-        return everyone(trajectory, s.states, s.inputs)
+        return everyone(trajectory, s.states, s.inputs, s.time)
     if isinstance(trajectory, Resting):
         return expressed(
             [number(q) for q in trajectory.at],

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+
+from flint import arb
 
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.code.prediction import Model
@@ -34,6 +36,7 @@ class About:
     held: bool
     moves: Sequence[Ball] = ()
     model: Model | None = None
+    stretch: Ball = field(default_factory=lambda: arb(1))
     tables: tuple[Table, ...] = ()
 
 

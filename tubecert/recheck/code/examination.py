@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from flint import arb, arb_mat, ctx
 
-from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root, spectral_norm
+from tubecert.recheck.balls import Ball, exact, larger, length, magnitude, root, sharp_norm
 from tubecert.recheck.code.about import About
 from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.lookups import tables_in
@@ -194,7 +194,7 @@ def about(formulas: Formulas) -> About:
         raise UnreadError("there is no machine")
     looked = noise.noise_metric * exact(recipe.noise)
     if recipe.prediction is not None:  # n_P of theorem H-P; what it is at the feedback is larger
-        looked = larger(looked, root(spectral_norm(formulas.metric)) * exact(recipe.prediction))
+        looked = larger(looked, root(exact(case.bound("upper"))) * exact(recipe.prediction))
     decay = None if recipe.bandwidth is None else exact(recipe.bandwidth * recipe.sample_time)
     return About(
         curve=case.curve,
@@ -210,6 +210,7 @@ def about(formulas: Formulas) -> About:
         held=formulas.held,
         moves=moves_of(formulas, noise.noise_size),
         model=model_of(formulas),
+        stretch=stretch_of(formulas),
         tables=read_by(formulas),
     )
 
@@ -236,6 +237,12 @@ def model_of(formulas: Formulas) -> Model | None:
         delay=formulas.recipe.delay,
         u=() if formulas.whole else tuple(curve.u),
     )
+
+
+def stretch_of(formulas: Formulas) -> Ball:
+    """|S|: radii, and what is off of a predicted state, are lengths in the coordinates of the tube."""
+    S = formulas.case.tube.coordinates
+    return arb(1) if S is None else sharp_norm([[exact(q) for q in row] for row in S])
 
 
 def moves_of(formulas: Formulas, noise_size: Ball) -> list[Ball]:

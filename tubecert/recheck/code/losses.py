@@ -109,7 +109,7 @@ class _Analysis:
         self._machine().call("predicted", [known(own) for own in seen], t, given, found)
         narrow = min(self.box, key=lambda side: float(side.lower()))
         exactly = cut(model, seen, acting, narrow, until)
-        return length([own.error for own in numbers(found)]) + exactly
+        return self.of.stretch * (length([own.error for own in numbers(found)]) + exactly)
 
     def _machine(self, **instead: Own) -> Machine:
         return Machine(self.code, self.rounded, self._functions | instead, self.tables)

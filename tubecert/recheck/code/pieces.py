@@ -93,7 +93,7 @@ def tables_of(code: Code, curve: Curve) -> dict[str, Vector]:
     # which piece is found depends on nothing but the knots that are not later
     if [plain.call("piece", begin) for begin in own["START"]] != list(range(len(own["START"]))):
         raise UnreadError("the pieces of the plan are not those of their times")
-    if set(own) != {"START", "X", "U"} or any(len(table) < len(parts) for table in own.values()):
+    if set(own) != {"START", "X", "U"} or any(len(table) != len(parts) for table in own.values()):
         raise UnreadError("the tables of the plan are of another one")
     begun = [_meant(v, part.start) for v, part in zip(own["START"], parts, strict=False)]
     return {

@@ -287,9 +287,11 @@ class Machine:
     def _truth(self, tree: Expr, memory: Mapping[str, Value]) -> bool | None:
         match tree:
             case Binary("&&" | "||" as sign, left, right):
-                first, second = self._truth(left, memory), self._truth(right, memory)
-                sure = sign == "||"
-                if sure in (first, second):
+                first, sure = self._truth(left, memory), sign == "||"
+                if first is sure:  # what stands on the right is not computed
+                    return sure
+                second = self._truth(right, memory)
+                if second is sure:
                     return sure
                 return None if None in (first, second) else not sure
             case Unary("!", arg):
