@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
-from followed import predicting
+from flint import arb, ctx
+from followed import predicting, texts
 
+import tubecert as tc
 from tubecert.enclosure.interval import Interval
 from tubecert.export import prediction
+from tubecert.export.assembly import controller_of
 from tubecert.export.followed import UncoveredError
 from tubecert.export.program import FUNCTIONS, Writer
 from tubecert.export.reference import Reference, execute
 from tubecert.export.rounding import rounding_of
 from tubecert.export.series import ORDER, moving, run
+from tubecert.recheck.code.examination import about
+from tubecert.recheck.code.losses import lost_by
+from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.controller import machine_of
 
 
 def solution(c, t, y, kappa):
@@ -113,3 +121,52 @@ def test_slopes_of_the_model_are_those_of_its_speed():
         slope = (execute(c.flow, x + aside, u)[0] - execute(c.flow, x - aside, u)[0]) / (2 * h)
         assert slope[0] == pytest.approx(J[0].reshape(2, 2)[:, j], abs=1e-8)
     assert B[0].tolist() == [0.5, -2.0]
+
+
+STRETCHED = """
+tubecert: 1
+name: stretched
+system:
+  states: [x, y]
+  inputs: [u]
+  parameters: {s: 20}
+  f: ["-x + 2*y", "-0.25*s**2*y**3 - 3*x + 4*y"]
+  B: [["0.5/s"], ["-2/s"]]
+safe_set: {x: ["-6/s", "6/s"], y: ["-6/s", "6/s"]}
+uncertainty: {h: ["0.1*sin(2*t)"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+metric:
+  rate: 1.74
+  dual_metric: [["4.25828/s**2", "-0.93423/s**2"], ["-0.93423/s**2", "3.76692/s**2"]]
+tube: {epsilon: 0.3, rho_a: 0.05, coordinates: auto}
+hardware: {rate: 500, delay: 0.002, noise: "0.00001/s", predict: true, arithmetic: double}
+conditions: {decides: H}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("barely")
+def test_what_a_prediction_is_off_is_a_length_in_the_coordinates_of_the_tube(tmp_path):
+    """r_p stands beside np in (H.17): |S| times what it is in x; and recheck looks as far as n_P = sqrt(A) np says."""
+    path = tmp_path / "stretched.yaml"
+    path.write_text(STRETCHED)
+    result = tc.certify(path)
+    assert result.certified
+    machine = machine_of(result.text, "certificate")
+    S = np.array([[float(q) for q in row] for row in machine.case.tube.coordinates])
+    size = np.linalg.norm(S, 2)
+    assert size > 10
+    c = controller_of(result.certificate)
+    assert float(c.stretch) >= size * (1 - 1e-12)
+    found, plain = (rounding_of(own, "double").prediction for own in (c, replace(c, stretch=Fraction(1))))
+    assert found == pytest.approx(float(c.stretch) * float(plain), rel=1e-9)
+    with ctx.workprec(200):
+        own = about(machine)
+        assert float(own.stretch) == pytest.approx(size, rel=1e-9)
+        far = float(machine.recipe.level) + np.sqrt(float(machine.case.bound("upper"))) * float(
+            machine.recipe.prediction
+        )
+        assert float(own.reach) == pytest.approx(far, rel=1e-9)
+        code = read_code(*texts(c, "double"))
+        lost, short = (lost_by(code, each).prediction for each in (own, replace(own, stretch=arb(1))))
+        assert float(lost) == pytest.approx(size * float(short), rel=1e-6)

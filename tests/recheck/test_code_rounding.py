@@ -412,3 +412,35 @@ def test_every_number_of_a_table_is_that_of_the_certificate(change):
         source = source.replace(*change, 1)
     found = list(of_tables(read_code(header, source), in_recheck("turning")))
     assert found == ([] if change is None else ["at_bend" if change[0].startswith("(") else "cubic_bend"])
+
+
+def _rows(c):
+    return [[exact(Fraction(float(q))) for q in row] for row in vectors(c).given]
+
+
+def test_an_honest_controller_along_knots_agrees_within_its_horizon():
+    """Its last samples are later: there code goes on along its last piece, and nothing is claimed."""
+    c = covered("path")
+    with ctx.workprec(200):
+        _, share = agreement(read_code(*texts(c, "double")), in_recheck("path"), _rows(c))
+    assert share <= 1
+
+
+def test_a_piece_more_than_the_plan_has_is_refused():
+    """Within the last one, with another x*: found at some times, and at none where stations are looked at."""
+
+    def more(text):
+        return text.replace("#define PIECES 4", "#define PIECES 5")
+
+    c = covered("path")
+    header, source = texts(c, "double")
+    source = source.replace("0.0, 0.013, 0.02, 0.3,\n", "0.0, 0.013, 0.02, 0.3, 0.302,\n")
+    for table, row in (
+        ("X[][N][4]", "{{5.0, 0.0, 0.0, 0.0}, {7.0, 0.0, 0.0, 0.0}}"),
+        ("U[]", "{{9.0, 0.0}}"),
+    ):
+        end = source.index("};", source.index(f"static const real {table}"))
+        source = source[:end] + f"    {row},\n" + source[end:]
+    source = source.replace("for (k = 0; k < 2; k++) {", "for (k = 0; k < 3; k++) {", 1)
+    with pytest.raises(UnreadError, match="tables of the plan"):
+        bounds(c, in_recheck("path"), (more(header), more(source)))

@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from rechecked import certified, examine, failing, respecified, sealed
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from tubecert.certificate import dump, seal
+from tubecert.certificate import FORMAT, dump, seal
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError, TubecertError
 from tubecert.findings import Severity
@@ -22,7 +23,13 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.pipeline import Options, certify, synthesise
 from tubecert.pipeline.membership import membership
+from tubecert.recheck import machine
+from tubecert.recheck.document import read
+from tubecert.recheck.place import Place
+from tubecert.recheck.specification import read_specification
+from tubecert.recheck.system import curve_of, system_of
 from tubecert.spec import load_text
+from tubecert.spec.canonical import canonical
 from tubecert.spec.types import Synthesis
 
 SPEC = (Path(__file__).parents[1] / "specs/ok/moving.yaml").read_text(encoding="utf-8")
@@ -384,3 +391,41 @@ def returned(text):
     except SpecError as error:
         return "no period" if "without a period" in str(error) else str(error)
     return ""
+
+
+FAMILY = """
+tubecert: 1
+name: family
+system: {states: [x, y], inputs: [u], f: ["-x + y + 3*t*y", "-y + 0.1*t*x"], B: [[0], [1]]}
+safe_set: {x: [-2, 2], y: [-2, 2]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: any, x: {x: [-0.1, 0.1], y: [-0.1, 0.1]}, u: {u: [-0.1, 0.1]}, defect: 0.01, horizon: 1}
+metric: {rate: 0.2, dual_metric: [[1, -0.1], [-0.1, 2]]}
+tube: {epsilon: 0.3, rho_a: 0.1}
+initial_state: {within: 0.05}
+hardware: {rate: 500, noise: 0.0001}
+"""
+
+
+@pytest.mark.parametrize(
+    ("limit", "holds"), [("0.3", False), ("0.5", False), ("0.53", False), ("0.57", True)]
+)
+def test_members_of_a_family_move_at_all_times_of_f(limit, holds):
+    """|f + B u*| + defect is sqrt(.5^2 + .21^2) + .01 = .552 at t = 1, and .293 at t = 0."""
+    data = {"format": FORMAT, "spec": canonical(load_text(FAMILY))}
+    spec = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
+    s = system_of(spec)
+    place = Place(s, curve_of(spec, SimpleNamespace(knots=None), s), Fraction(2, 5), 2000)
+    assert machine.bounded(place, "plan_speed", Fraction(limit), None, lambda _: None).holds == holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["a family", "t where f owes"])
+def test_a_machine_with_t_in_f_is_certified_and_confirmed(kind):
+    rest = FAMILY.replace('"-x + y + 3*t*y", "-y + 0.1*t*x"', '"-x + y", "-y + 0*sqrt(t + 1)"')
+    begin, end = rest.index("trajectory:"), rest.index("metric:")
+    rest = rest[:begin] + "trajectory: {kind: equilibrium, at: [0, 0], input: [0], horizon: 1}\n" + rest[end:]
+    text = FAMILY.replace("3*t*y", "t*y/4") if kind == "a family" else rest
+    document = certified(text, conditions="hardware")
+    assert document["result"]["hardware"]["verdict"] == "certified"
+    assert failing(examine(document)) == []

@@ -100,9 +100,16 @@ def agreement(
 
     Raises `UnreadError` where what the numbers of the text are off has no bound.
     """
+    measured = measured[: _claimed(formulas)]
     expected = list(formulas.answers(measured))
     slack = _PREDICTED if formulas.section.predict and formulas.steps != STEPS else _SLACK
     return apart(code.real, expected, _answers(code, formulas, measured), answered, slack)
+
+
+def _claimed(formulas: Formulas) -> int | None:
+    """How many samples lie within the horizon: of later ones nothing is claimed, nor what a plan is there."""
+    horizon = formulas.case.curve.horizon
+    return None if horizon is None else int(horizon / formulas.recipe.sample_time) + 1
 
 
 def apart(
