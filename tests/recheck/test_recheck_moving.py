@@ -393,7 +393,7 @@ def returned(text):
     return ""
 
 
-FAMILY = """
+MEMBERS = """
 tubecert: 1
 name: family
 system: {states: [x, y], inputs: [u], f: ["-x + y + 3*t*y", "-y + 0.1*t*x"], B: [[0], [1]]}
@@ -412,7 +412,7 @@ hardware: {rate: 500, noise: 0.0001}
 )
 def test_members_of_a_family_move_at_all_times_of_f(limit, holds):
     """|f + B u*| + defect is sqrt(.5^2 + .21^2) + .01 = .552 at t = 1, and .293 at t = 0."""
-    data = {"format": FORMAT, "spec": canonical(load_text(FAMILY))}
+    data = {"format": FORMAT, "spec": canonical(load_text(MEMBERS))}
     spec = read_specification(read(json.dumps(data), "spec").closed("format", "spec")["spec"])
     s = system_of(spec)
     place = Place(s, curve_of(spec, SimpleNamespace(knots=None), s), Fraction(2, 5), 2000)
@@ -422,10 +422,10 @@ def test_members_of_a_family_move_at_all_times_of_f(limit, holds):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["a family", "t where f owes"])
 def test_a_machine_with_t_in_f_is_certified_and_confirmed(kind):
-    rest = FAMILY.replace('"-x + y + 3*t*y", "-y + 0.1*t*x"', '"-x + y", "-y + 0*sqrt(t + 1)"')
+    rest = MEMBERS.replace('"-x + y + 3*t*y", "-y + 0.1*t*x"', '"-x + y", "-y + 0*sqrt(t + 1)"')
     begin, end = rest.index("trajectory:"), rest.index("metric:")
     rest = rest[:begin] + "trajectory: {kind: equilibrium, at: [0, 0], input: [0], horizon: 1}\n" + rest[end:]
-    text = FAMILY.replace("3*t*y", "t*y/4") if kind == "a family" else rest
+    text = MEMBERS.replace("3*t*y", "t*y/4") if kind == "a family" else rest
     document = certified(text, conditions="hardware")
     assert document["result"]["hardware"]["verdict"] == "certified"
     assert failing(examine(document)) == []
