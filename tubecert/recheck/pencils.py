@@ -34,7 +34,7 @@ from tubecert.recheck.terms import Rows, names, plus, scaled, times, turned, uni
 _APART, _BENT, _EVEN = 0.25, 0.65, 0.1  # of what is left of a limit: by size, by curvature, to all alike
 _INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
 _RANGES = 40  # of mu, that are looked at on one box
-_ALL_RANGES = 2000  # where nothing varies on it: its parts would know no more
+_ALL_RANGES = 2000  # where nothing varies with the states: there are no parts
 _DEAR = 4.0  # a range more is passed on to all parts of a box
 _RIM = 0.05  # of what varies on a box: vertices are exact, what lies outside the tube is a part
 
@@ -168,7 +168,7 @@ class GainBelow:
         waiting, left = self._waiting(box), []
         near = _tangent(waiting[-1])
         found, caused, spread = self._field.expand(box, lambda at: self._weights(at, near))
-        count, enough = len(waiting), _RANGES if any(x > 0 for x in caused) else _ALL_RANGES
+        count, enough = len(waiting), _RANGES if box else _ALL_RANGES
         most = _DEAR * max(caused, default=0.0) * near / 2  # in units of W, as the gaps of tangents are
         while waiting:
             ends = waiting.pop()
