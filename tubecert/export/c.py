@@ -229,13 +229,11 @@ def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"#define SAMPLES {count}"
     yield f"#define TOLERANCE {language.number(Fraction(vectors.tolerance))}"
     yield f"static const {name}_real MEASURED[SAMPLES][{len(vectors.given[0])}] = {{"
-    for row in vectors.given:
-        yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
+    yield from numbers_in_c(vectors.given, language)
     yield "};"
     yield "/* of start, and of every step, as the producer of this file computed them */"
     yield f"static const {name}_real EXPECTED[SAMPLES + 1][{len(c.inputs)}] = {{"
-    for row in vectors.u:
-        yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
+    yield from numbers_in_c(vectors.u, language)
     yield "};"
     zero = language.number(Fraction(0))
     yield ""
@@ -251,13 +249,30 @@ def _self_test(c: Controller, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"            (void){name}_step(&state, {step.format(k='k - 1')}, u);"
     yield "        }"
     yield f"        for (i = 0; i < {len(c.inputs)}; i++) {{"
-    yield f"            const {name}_real error = u[i] - EXPECTED[k][i];"
+    yield from compared(c, "u", zero)
+    yield from judged()
+
+
+def numbers_in_c(rows: Sequence[Sequence[float]], language: C) -> Iterator[str]:
+    """Rows of a table of a self-test."""
+    for row in rows:
+        yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
+
+
+def compared(c: Steering, found: str, zero: str) -> Iterator[str]:
+    """In a self-test: the largest difference of what was found, and the end of both loops."""
+    name = c.name
+    yield f"            const {name}_real error = {found}[i] - EXPECTED[k][i];"
     yield f"            const {name}_real size = error < {zero} ? -error : error;"
     yield "            if (!(size <= worst)) {"
     yield "                worst = size;"
     yield "            }"
     yield "        }"
     yield "    }"
+
+
+def judged() -> Iterator[str]:
+    """The end of a self-test."""
     yield "    if (!(worst <= TOLERANCE)) {"
     yield '        printf("the self-test fails: the largest difference is %g\\n", (double)worst);'
     yield "        return 1;"

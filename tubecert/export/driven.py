@@ -125,20 +125,8 @@ def driven(
             if length:
                 x = plant.moved(x, (k * controller.sample_time + begin, length), u, seen)
         acting = new
-    return Driven(
-        runs=given.count,
-        samples=samples,
-        difference=seen.difference,
-        scale=seen.scale,
-        distance=float(seen.distance.max()),
-        level=float(controller.level),
-        escapes=tuple(int(lane) for lane in np.flatnonzero(~(seen.distance < float(controller.level)))),
-        told=seen.told,
-        step=float(np.median(code.seconds)),
-        worst=float(np.max(code.seconds)),
-        precision=given.precision,
-        lost=None if accounted is None else accounted.share,
-    )
+    found = seen.driven(given, samples, float(controller.level), code.seconds)
+    return found if accounted is None else replace(found, lost=accounted.share)
 
 
 def following(controller: C, plan: Plan) -> C:
@@ -180,6 +168,22 @@ class Seen:
         """Inputs (N, m) of the code and of the reference."""
         self.difference = max(self.difference, float(np.abs(found - expected).max()))
         self.scale = max(self.scale, float(np.abs(expected).max()))
+
+    def driven(self, given: Given, samples: int, level: float, seconds: Sequence[float]) -> Driven:
+        """What is told of it; `seconds` are those of every call of the code."""
+        return Driven(
+            runs=given.count,
+            samples=samples,
+            difference=self.difference,
+            scale=self.scale,
+            distance=float(self.distance.max()),
+            level=level,
+            escapes=tuple(int(lane) for lane in np.flatnonzero(~(self.distance < level))),
+            told=self.told,
+            step=float(np.median(seconds)),
+            worst=float(np.max(seconds)),
+            precision=given.precision,
+        )
 
 
 class Plant:

@@ -89,7 +89,8 @@ def readme(c: Controller, files: Mapping[str, str], *, precision: str | None) ->
     return "\n".join(_readme(c, files, precision)) + "\n"
 
 
-def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> Iterator[str]:
+def introduced(c: Steering, files: Mapping[str, str]) -> Iterator[str]:
+    """What every README begins with: the certificate, and what each file is."""
     yield f"# The controller of {c.system}"
     yield ""
     yield "Written by `tubecert export` from the certificate"
@@ -99,6 +100,10 @@ def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> I
     for name, what in sorted(files.items()):
         yield f"- `{name}`: {what}"
     yield ""
+
+
+def _readme(c: Controller, files: Mapping[str, str], precision: str | None) -> Iterator[str]:
+    yield from introduced(c, files)
     yield "## What is proven of it"
     yield ""
     yield "The certificate proves that this loop keeps the state in its tube, for the noise, wind and uncertainty"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from tubecert.export.c import preamble
+from tubecert.export.c import compared, judged, numbers_in_c, preamble
 from tubecert.export.c_language import C, comment
 from tubecert.export.c_loop import feedback_in_c, handed, plan_in_c
 from tubecert.export.continuous.vectors import Vectors
@@ -203,13 +203,11 @@ def _self_test(c: Continuous, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"#define TOLERANCE {language.number(Fraction(vectors.tolerance))}"
     yield "/* the time since the last sample (0: a sample), the state, and xhat */"
     yield f"static const {name}_real GIVEN[ROWS][{len(vectors.given[0])}] = {{"
-    for row in vectors.given:
-        yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
+    yield from numbers_in_c(vectors.given, language)
     yield "};"
     yield "/* u and xhat', as the producer of this file computed them */"
     yield f"static const {name}_real EXPECTED[ROWS][{m + n}] = {{"
-    for row in vectors.expected:
-        yield f"    {{{', '.join(language.number(Fraction(value)) for value in row)}}},"
+    yield from numbers_in_c(vectors.expected, language)
     yield "};"
     yield ""
     yield "int main(void)"
@@ -228,22 +226,10 @@ def _self_test(c: Continuous, language: C, vectors: Vectors) -> Iterator[str]:
     yield f"        (void){name}_law(&state, GIVEN[k][0], x, {plan}found);"
     yield f"        {name}_predictor(&state, x, x + {big}_STATES, found, found + {big}_INPUTS);"
     yield f"        for (i = 0; i < {m + n}; i++) {{"
-    yield f"            const {name}_real error = found[i] - EXPECTED[k][i];"
-    yield f"            const {name}_real size = error < {zero} ? -error : error;"
-    yield "            if (!(size <= worst)) {"
-    yield "                worst = size;"
-    yield "            }"
-    yield "        }"
-    yield "    }"
+    yield from compared(c, "found", zero)
     yield "    for (i = 0; i < " + f"{big}_STATES; i++) {{"
     yield "        if (!(xhat[i] <= GIVEN[0][1 + i]) || !(xhat[i] >= GIVEN[0][1 + i])) {"
     yield "            worst = 2 * TOLERANCE;"
     yield "        }"
     yield "    }"
-    yield "    if (!(worst <= TOLERANCE)) {"
-    yield '        printf("the self-test fails: the largest difference is %g\\n", (double)worst);'
-    yield "        return 1;"
-    yield "    }"
-    yield '    printf("the self-test passes: the largest difference is %g\\n", (double)worst);'
-    yield "    return 0;"
-    yield "}"
+    yield from judged()

@@ -61,19 +61,7 @@ def driven(
             x, xhat = _moved(plant, (code, planner), (k * Ts, j * Ts / steps, Ts / steps), x, xhat)
             seen.told += int((code.status > 1).sum())
             plant.look(x, k * Ts + (j + 1) * Ts / steps, seen)
-    return Driven(
-        runs=given.count,
-        samples=samples,
-        difference=seen.difference,
-        scale=seen.scale,
-        distance=float(seen.distance.max()),
-        level=float(controller.level),
-        escapes=tuple(int(lane) for lane in np.flatnonzero(~(seen.distance < float(controller.level)))),
-        told=seen.told,
-        step=float(np.median(code.seconds)),
-        worst=float(np.max(code.seconds)),
-        precision=given.precision,
-    )
+    return seen.driven(given, samples, float(controller.level), code.seconds)
 
 
 def _hand(code: Compiled, planner: Around | None, t: float) -> None:

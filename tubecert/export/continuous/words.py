@@ -8,7 +8,7 @@ from typing import Final
 
 from tubecert.export.controller import Continuous
 from tubecert.export.program import TABLE
-from tubecert.export.words import OPERATIONS, boxed
+from tubecert.export.words import OPERATIONS, boxed, introduced
 
 PROMISE: Final = (
     "What the proof covers: the loop of theorem C, in EXACT arithmetic and in CONTINUOUS TIME. Its adaptation",
@@ -50,15 +50,7 @@ def readme(c: Continuous, files: Mapping[str, str], *, precision: str | None) ->
 
 
 def _readme(c: Continuous, files: Mapping[str, str], precision: str | None) -> Iterator[str]:
-    yield f"# The controller of {c.system}"
-    yield ""
-    yield "Written by `tubecert export` from the certificate"
-    yield f"`{c.hash}`."
-    yield "Do not edit: it is these very files that belong to it."
-    yield ""
-    for name, what in sorted(files.items()):
-        yield f"- `{name}`: {what}"
-    yield ""
+    yield from introduced(c, files)
     yield "## What is proven of it, and what is assumed"
     yield ""
     yield from PROMISE
