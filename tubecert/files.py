@@ -13,6 +13,8 @@ import stat
 import sys
 import tempfile
 from dataclasses import dataclass
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +23,8 @@ from tubecert.findings import Finding, Location
 from tubecert.printable import visible
 
 STDIN: Final = "-"
+_LISTED: Final = 1000  # files of a folder that are looked at for a name that was mistyped
+_NEAR: Final = 0.72  # how alike two names are then, from 0 to 1: g.yml and g.yaml
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,8 +46,21 @@ def read(path: str, kind: Kind) -> bytes:
     except (OSError, ValueError) as error:
         reason = (getattr(error, "strerror", None) or str(error)).lower()
         message = f"cannot read '{visible(path)}': {reason}"
-        raise TargetError([Finding(code=kind.unreadable, message=message, help=kind.help)]) from None
+        help = (isinstance(error, FileNotFoundError) and _beside(path)) or kind.help
+        raise TargetError([Finding(code=kind.unreadable, message=message, help=help)]) from None
     return _within(path, data, max(size, len(data)), kind)
+
+
+def _beside(path: str) -> str:
+    """A hint at the file in the same folder that has nearly the name of a missing one; empty if none has."""
+    wanted = Path(path)
+    try:
+        with os.scandir(wanted.parent) as found:
+            names = sorted(entry.name for entry in islice(found, _LISTED) if entry.is_file())
+    except OSError:
+        return ""
+    near = get_close_matches(wanted.name, names, n=1, cutoff=_NEAR)
+    return f"there is {visible(str(wanted.with_name(near[0])))}" if near else ""
 
 
 def read_regular(path: Path, most: int) -> bytes:

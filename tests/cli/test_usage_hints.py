@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from mistakes import GOOD
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app, start
@@ -40,6 +41,36 @@ def said(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *w
 def test_a_command_line_that_means_something_else(
     words: tuple[str, ...], hint: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    assert hint in said(capsys, monkeypatch, *words)
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("certify", "plant.yml"), "there is plant.yaml"),
+        (("certify", "folder/plan.yaml"), "no such file or directory"),
+        (("certify", "plant.yaml", "--metric", "plant.json"), "there is plant.metric.json"),
+        (
+            ("certify", "plant.yaml"),
+            "`tubecert synth plant.yaml` finds one; then add --metric plant.metric.json",
+        ),
+        (("verify", "plant.yaml"), "a metric file after the specification (tubecert synth finds one)"),
+        (("report", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
+        (("export", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
+        (("recheck", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
+        (("recheck", "other.json"), "give a file that tubecert certify wrote"),
+    ],
+)
+def test_a_file_that_is_another_one(
+    words: tuple[str, ...],
+    hint: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plant.yaml").write_text(GOOD[: GOOD.index("metric:")], "utf-8")
+    Path("plant.metric.json").touch()
     assert hint in said(capsys, monkeypatch, *words)
 
 

@@ -81,6 +81,8 @@ CASES = {
     "defect": ("TC407", "12:69", [(HELD, MOVING % "0"), (START, ALONG)]),
     "collision with a disc": ("TC408", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [0, 0], radius: 1}")]),
     "collision": ("TC408", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - polygon: [[-1, -1], [1, -1], [0, 1]]")]),
+    "input beyond": ("TC415", "12:52", [("[0], horizon", "[1], horizon"), (TUBE, TUBE + "\nlimits: {u: [-1/2, 2/3]}")]),
+    "inputs beyond": ("TC415", "12:69", [(HELD, MOVING % "9*sin(t)"), (START, f"{ALONG}\nlimits: {{u: [-8, 9]}}")]),
     "far obstacle": ("TC409", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [9, 0], radius: 0.2}")]),
 }  # fmt: skip
 

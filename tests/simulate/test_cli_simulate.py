@@ -233,7 +233,7 @@ def test_the_sampled_loop_at_its_sample_time_and_far_above_it():
         (["--seed", "x"], "--seed"),
         (["--control-rate", "0"], "positive"),
         (["--duration", "9"], "the plan ends at 4 s"),
-        (["--certificate", "flat.yaml"], "cannot read flat.yaml: it is not JSON"),
+        (["--certificate", "flat.yaml"], "`tubecert certify flat.yaml` writes one: flat.certificate.json"),
         (["--certificate", "none.json"], "cannot read"),
         (["--controllers", "sampled", "--control-rate", "500", "--sample-time", "0.005"], "no multiple"),
         (["-o", "flat.yaml"], "cannot write"),

@@ -70,6 +70,8 @@ def parse(data: bytes, name: str) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise unreadable(name, "it is not UTF-8") from None
     except json.JSONDecodeError as error:
+        if name.endswith((".yaml", ".yml")):
+            raise _a_specification(name) from None
         raise unreadable(name, f"it is not JSON (line {error.lineno}: {error.msg})") from None
     except RecursionError:
         raise unreadable(name, "it is nested too deeply") from None
@@ -117,6 +119,13 @@ def _prints(data: Any) -> bool:
 def unreadable(name: str, why: str) -> TargetError:
     """The error for a file that cannot be read as a certificate."""
     return TargetError([Finding(code="TC600", message=f"cannot read {visible(name)}: {why}", help=KIND.help)])
+
+
+def _a_specification(name: str) -> TargetError:
+    shown = visible(name)
+    message = f"cannot read {shown}: it is not JSON, but a specification, and a certificate is needed here"
+    help = f"`tubecert certify {shown}` writes one: {visible(Path(name).stem)}.certificate.json"
+    return TargetError([Finding(code="TC600", message=message, help=help)])
 
 
 def foreign(name: str, why: str) -> TargetError:

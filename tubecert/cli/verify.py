@@ -128,7 +128,7 @@ def _cases(files: Sequence[str], rate: Fraction | None, settings: Sequence[Setti
 
 def _case(file: str, spec: Spec, rate: Fraction | None) -> Case:
     if spec.metric is None:
-        remedy = "give metric.dual_metric and metric.rate, or a metric file after the specification"
+        remedy = "give a metric file after the specification (tubecert synth finds one), or metric.dual_metric and rate"
         raise _error(file, "there is no metric to verify", remedy)
     return Case(file=file, spec=at_rate(spec, rate))
 

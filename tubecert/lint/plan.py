@@ -43,6 +43,7 @@ def plan_findings(spec: Spec) -> list[Finding]:
     findings = [*_start(spec)]
     outside = list(_outside(spec, curve))
     findings += outside or _room(spec, curve)
+    findings += _beyond_limits(spec, curve)
     if not outside and spec.trajectory.written:
         findings += _defect(spec, curve, build(spec))
     if spec.trajectory.table is not None:  # exchanged columns leave the safe set, too
@@ -119,6 +120,32 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
             location=spec.location(curve.path),
             help=f"enlarge safe_set.{spec.states[i]}, or plan inside it",
         )
+
+
+def _beyond_limits(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+    """Inputs of the plan itself that are not within the limits: what feedback and adaptation need comes on top."""
+    plan = spec.trajectory
+    if plan.task is not None:  # its inputs are still to be found
+        return
+    values = curve.u
+    if plan.bundle is not None:
+        values = np.array([floats([ends[side] for ends in plan.bundle.u]) for side in (0, 1)])
+    for name, (low, high) in spec.limits:
+        u = np.nan_to_num(values[:, spec.inputs.index(name)])
+        beyond = np.maximum(nearest(low) - u, u - nearest(high))
+        k = int(np.argmax(beyond))
+        if beyond[k] > _ROUNDING * max(abs(nearest(low)), abs(nearest(high))):
+            when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
+            held = plan.kind == "equilibrium"
+            yield Finding(
+                code=codes.PLAN_BEYOND_LIMITS,
+                severity=Severity.WARNING,
+                message=f"the plan's input {name} is {near(u[k])}{when}, beyond its limits: "
+                f"[{number_text(low)[:40]}, {number_text(high)[:40]}]",
+                location=spec.location("trajectory.input" if held else "trajectory.u"),
+                help=f"{'hold another point' if held else 'plan with less of it'}, or give limits.{name} more room: "
+                "what feedback and adaptation need comes on top",
+            )
 
 
 def _least_radius(spec: Spec) -> float:
@@ -212,7 +239,7 @@ def _obstacles(spec: Spec, curve: _Curve) -> Iterator[Finding]:
                 severity=Severity.WARNING,
                 message=f"the plan meets the obstacle at t = {near(hit, 4)} s",
                 location=spec.location(path),
-                help="plan around it; a certificate says nothing about obstacles",
+                help="plan around it: no tube around this plan keeps away from the obstacle",
             )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.findings import Finding, Location, Severity
 from tubecert.letters import ALL, HARDWARE, name_of
@@ -44,7 +46,11 @@ def _rank_findings(spec: Spec, effort: Effort) -> list[Finding]:
 
 def missing_parts(spec: Spec) -> list[Finding]:
     """What a certification needs and a specification may lack."""
-    remedy = "give metric.dual_metric and metric.rate, or metric.synthesise, or certify with --metric FILE"
+    file = Path(spec.path)
+    found = f"{file.stem}.metric.json"
+    remedy = "give metric.dual_metric and metric.rate, or have one found: metric: {synthesise: {}}"
+    if file.suffix in (".yaml", ".yml"):
+        remedy = f"`tubecert synth {spec.path}` finds one; then add --metric {found}. Or {remedy}"
     has_none = spec.metric is None and spec.synthesis is None
     return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]
 

@@ -230,7 +230,8 @@ def _of_decimal(text: str) -> Fraction:
 
 def _given_instead(file: str) -> str:
     if file.endswith((".yaml", ".yml")):
-        return "give a file that tubecert certify wrote; a specification is certified first"
+        stem = file.replace("\\", "/").rpartition("/")[2].rpartition(".")[0]
+        return f"`tubecert certify {file}` writes one: {stem}.certificate.json"
     return "give a file that tubecert certify wrote"
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.printable import visible
 from tubecert.report.claimed import place
 from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.sections import VERDICTS
@@ -65,7 +66,7 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
         parts += [Text(), Text(_CUT[data.cut], style="yellow")]
     if file is None:
         return [*parts, *_failure(data, system.states)]
-    certify = f"certify with it: tubecert certify SPEC --metric {target}"
+    certify = f"certify with it: tubecert certify {visible(system.path)} --metric {target}"
     return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
 
 

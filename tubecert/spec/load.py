@@ -58,7 +58,11 @@ VERSION: Final = 1
 _SYSTEM = ("tubecert", "name", "system", "safe_set")
 _REQUIRED = (*_SYSTEM, "uncertainty", "trajectory")
 _FORMATS = (
-    ("tubecert-certificate/", "a certificate", "tubecert recheck and tubecert report read certificates"),
+    (
+        "tubecert-certificate/",
+        "a certificate",
+        "name the specification (YAML) that it was made from; simulate takes both: simulate SPEC --certificate FILE",
+    ),
     (
         "tubecert-metric/",
         "a metric file",

@@ -200,6 +200,12 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
     items = field.items(None, f"{what} names") if field else None
     if items is None:
         return None
+    if len(items) == 1 and isinstance(items[0].node, ListNode):
+        inner = [node.text for node in items[0].node.items if isinstance(node, Scalar)]
+        help = f"write [{', '.join(inner)[:60]}]: one pair of brackets is too many"
+        message = f"{items[0].path} must be the name of {_with_article(what)}, not a list"
+        items[0].fail(codes.WRONG_TYPE, message, help)
+        return None
     names = [new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None
 

@@ -34,6 +34,7 @@ from tubecert.spec.types import Matrix, Term, TermMatrix
 T = TypeVar("T")
 
 
+_DECIMAL = re.compile(r"[+-]?[0-9]+(\.[0-9]*)?")
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
     "symbol": codes.UNKNOWN_SYMBOL,
@@ -237,6 +238,9 @@ class Field:
             if value is None:
                 return None
             return tuple(tuple(value if i == j else Fraction(0) for j in range(n)) for i in range(n))
+        if self._nodes and all(isinstance(node, Scalar) for node in self._nodes):
+            self.fail(codes.WRONG_SHAPE, f"{self.path} must be a matrix, not a list", self._diagonal(n))
+            return None
         rows = self.items(n, "rows", f"write one number, or {n} rows of {n} numbers")
         return _all([row.numbers(n, parameters) for row in rows or []], n)
 
@@ -338,6 +342,16 @@ class Field:
             return f"write {texts[-1]}"
         return ""
 
+    def _diagonal(self, n: int) -> str:
+        """What to write for a list that gives a matrix by its diagonal."""
+        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
+        if len(texts) != n or n > 4:
+            return f"write one number for a multiple of the identity, or {n} rows of {n} numbers"
+        if len(set(texts)) == 1:
+            return f"write {texts[0][:40]}: one number stands for a multiple of the identity"
+        rows = [", ".join(text[:20] if i == j else "0" for j in range(n)) for i, text in enumerate(texts)]
+        return f"with these numbers on its diagonal it is [{', '.join(f'[{row}]' for row in rows)}]"
+
     def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
         texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
         if any(";" in text for text in texts):
@@ -375,6 +389,8 @@ class Field:
         found = "a list" if isinstance(self.node, ListNode) else "a mapping"
         if isinstance(self.node, Scalar):
             found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
+            if not self.node.style and _DECIMAL.fullmatch(self.node.text):
+                found = f"the number {self.node.text[:40]}"
         instead = of_value(self.path, self.node.text if isinstance(self.node, Scalar) else "")
         name = self.path or self.reader.document
         self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", instead or help)

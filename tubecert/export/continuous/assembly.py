@@ -123,8 +123,8 @@ def _require(model: ControlAffineModel) -> None:
     if varies(model):
         raise refused(
             "the metric is not constant: its geodesics have to be computed, and theorem C assumes exact ones",
-            "certify a section hardware with geodesic: {nodes: 16, sweeps: 3} (certificate H allows for what that "
-            "loses), or look for a constant metric with synth",
+            "describe the computer: hardware: {rate: 500, geodesic: {nodes: 16, sweeps: 3}}, and certify again "
+            "(certificate H allows for what they lose), or find a constant metric: tubecert synth SPEC --degree 0",
         )
     known = free_symbols([*model.f, *(e for row in model.B for e in row)]) - {*model.states}
     if TIME in known:
