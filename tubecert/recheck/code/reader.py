@@ -19,14 +19,16 @@ from tubecert.recheck.code.tree import (
     Loop,
     Number,
     Return,
+    Shape,
     Statement,
     Test,
 )
+from tubecert.recheck.code.typed import require_typed
 from tubecert.recheck.code.words import UnreadError, Word, words
 
 Table: TypeAlias = "str | tuple[Table, ...]"  # literals
 
-_DEFINE = re.compile(r"#define (\w+)(?: (.*?))?(?: /\*.*\*/)?")
+_DEFINE = re.compile(r"#define (\w+)(?: (.*?))?(?: /\*(?:(?!\*/).)*\*/)?")
 _UNSAFE = (
     "__FAST_MATH__", "__ASSOCIATIVE_MATH__", "__RECIPROCAL_MATH__", "__NO_SIGNED_ZEROS__", "_M_FP_FAST",
 )  # fmt: skip
@@ -69,8 +71,10 @@ class Code:
 
 def read_code(header: str, source: str) -> Code:
     """The code of a header and its source; raises `UnreadError` for what is not of the grammar."""
-    head, macros = _preprocessed(header)
-    body, more = _preprocessed(source)
+    head, macros, above = _preprocessed(header)
+    body, more, below = _preprocessed(source)
+    if not macros.keys().isdisjoint(more):
+        raise UnreadError("a macro is defined twice")
     types = re.findall(r"^typedef (double|float) (\w+)_real;$", header, re.MULTILINE)
     if len(types) != 1:
         raise UnreadError("the header has no type of numbers")
@@ -82,13 +86,15 @@ def read_code(header: str, source: str) -> Code:
             raise UnreadError(f"{macro} is no macro that is known")
     _require_lines(header, source, real, name)
     own = _Reader(name)
-    own.read(words(head))
-    own.read(words(body))
+    own.read(words(head, above))
+    own.read(words(body, below))
+    found = {key: _expression(text) for key, text in (macros | more).items()}
+    require_typed(own.functions, found, own.members, own.depths, real)
     return Code(
         name=name,
         real=real,
         hash=own.hash,
-        macros={key: _expression(text) for key, text in (macros | more).items()},
+        macros=found,
         tables=own.tables,
         members=own.members,
         functions=own.functions,
@@ -103,17 +109,19 @@ def function_of(text: str, name: str = "") -> Function:
     return found
 
 
-def _preprocessed(text: str) -> tuple[str, dict[str, str]]:
-    """What is left for the compiler, with empty lines in place of others, and the macros."""
-    left, macros = [], {}
-    for line in text.split("\n"):
+def _preprocessed(text: str) -> tuple[str, dict[str, str], list[int]]:
+    """What is left for the compiler, with empty lines in place of others, the macros, and which lines those are."""
+    left, macros, gone = [], {}, []
+    for count, line in enumerate(text.split("\n"), start=1):
         found = _DEFINE.fullmatch(line)
         if found and found[2]:
             if found[1] in macros:
                 raise UnreadError(f"{found[1]} is defined twice")
             macros[found[1]] = found[2]
+        if line.startswith("#"):
+            gone.append(count)
         left.append("" if line.startswith("#") else line)
-    return "\n".join(left), macros
+    return "\n".join(left), macros, gone
 
 
 def _require_lines(header: str, source: str, real: str, name: str) -> None:
@@ -147,6 +155,7 @@ class _Reader:
     def __init__(self, name: str) -> None:
         self.own, self.hash = name, ""
         self.tables: dict[str, Table] = {}
+        self.depths: dict[str, int] = {}  # of tables
         self.members: dict[str, Expr | None] = {}
         self.functions: dict[str, Function] = {}
 
@@ -200,12 +209,16 @@ class _Reader:
 
     def _table(self) -> None:
         w = self._w
-        name = w.name()
-        while not w.took("="):
-            w.take(w.next.text)
+        name, depth = w.name(), 0
+        while w.took("["):
+            depth += 1
+            if not w.took("]"):
+                w.expression()
+                w.take("]")
+        w.take("=")
         if name in self.tables:
             raise w.refused("a table twice")
-        self.tables[name] = self._braces()
+        self.tables[name], self.depths[name] = self._braces(), depth
         w.take(";")
 
     def _braces(self) -> Table:
@@ -230,7 +243,7 @@ class _Reader:
 
     def _function(self, *, kept: bool) -> None:
         w = self._w
-        w.take("void", "int", "real")
+        kind = w.take("void", "int", "real")
         name = w.name()
         w.take("(")
         given = [self._parameter()]
@@ -238,18 +251,18 @@ class _Reader:
             given.append(self._parameter())
         if not kept and w.took(";"):
             return  # what the header promises
-        if name in self.functions or len(set(given)) < len(given):
+        names, shapes = zip(*given, strict=True)
+        if name in self.functions or len(set(names)) < len(names):
             raise w.refused(f"{name} twice")
-        self.functions[name] = Function(name=name, given=tuple(given), body=self._block())
+        self.functions[name] = Function(name=name, given=names, body=self._block(), kind=kind, shapes=shapes)
 
-    def _parameter(self) -> str:
+    def _parameter(self) -> tuple[str, Shape]:
         w = self._w
-        w.took("const")
-        w.take("real", "int", f"{self.own}_real", f"{self.own}_state")
-        w.took("*")
+        const = w.took("const")
+        kind = w.take("real", "int", f"{self.own}_real", f"{self.own}_state").removeprefix(f"{self.own}_")
+        pointer = w.took("*")
         name = w.name()
-        w.sizes()
-        return name
+        return name, Shape(kind, pointer + len(w.sizes()), const)
 
     def _block(self) -> tuple[Statement, ...]:
         w, found = self._w, list[Statement]()

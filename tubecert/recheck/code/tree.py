@@ -126,13 +126,27 @@ class Do:
 Statement = Declare | Assign | Loop | Test | Return | Do
 
 
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a name stands for: `real`, `int`, `state` or (of a function) `void`, with so many indices.
+
+    `const`: what it points to is not written.
+    """
+
+    kind: str
+    depth: int = 0
+    const: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Function:
-    """A function: names of what it is given, and its body."""
+    """A function: names of what it is given, and its body; its type and theirs, where the text says them."""
 
     name: str
     given: tuple[str, ...]
     body: tuple[Statement, ...]
+    kind: str = "void"
+    shapes: tuple[Shape, ...] = ()
 
 
 def parts(tree: Expr) -> tuple[Expr, ...]:

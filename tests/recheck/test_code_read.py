@@ -1,0 +1,85 @@
+"""What a compiler makes of a text of C that recheck reads is what recheck makes of it; everything else is refused."""
+
+from __future__ import annotations
+
+import pytest
+from controllers import CONTROLLERS
+from followed import texts
+
+from tubecert.recheck.code.reader import read_code
+from tubecert.recheck.code.words import UnreadError
+
+# of the controller "turning": what is changed, and into what; C does something else than the words at first sight
+OTHERWISE = {
+    "one less": ("u[i] = kappa[i] + us[i];", "u[i] = --kappa[i] + us[i];"),
+    "a place to the base 8": ("out_f[1] = r0;", "out_f[01] = r0;"),
+    "a number to the base 8": ("0.0, 0.03,\n", "0.0, 010,\n"),
+    "a number of many digits": ("0.0, 0.03,\n", "0.0, 12345678901234567890123,\n"),
+    "entries that are whole numbers": ("const real before[2],", "const int before[2],"),
+    "an argument that is a whole number": ("table_bend(real x)", "table_bend(int x)"),
+    "a function of whole numbers": ("static real table_bend", "static int table_bend"),
+    "a variable that is a whole number": ("    real s;\n    for", "    int s;\n    for"),
+    "a vector of whole numbers": ("    real from[N], a[M]", "    int from[N], a[M]"),
+    "a whole number from another one": ("u[i] = kappa[i] + us[i];", "u[i] = kappa[i] + us[i]; i = 0.5;"),
+    "a truth that is a number": ("if (c->sample > 0) {", "if (t) {"),
+    "lines of a comment that go on": (
+        "u[i] = kappa[i] + us[i];",
+        "u[i] = kappa[i] + us[i]; /* *\\\n/ u[i] = 0.0; /* */",
+    ),
+    "a trigraph": ("u[i] = kappa[i] + us[i];", "u[i] = kappa[i] + us[i]; /* *??/\n/ u[i] = 0.0; /* */"),
+    "two tables in one line": (
+        "static const real at_bend[] =",
+        "static const real at_bend[5], other[] =",
+    ),
+    "a variable that hides another one": (
+        "    return cubic_bend[low][0]",
+        "    if (0 < 1) {\n        real s = 0.0;\n        low = low + 0;\n    }\n    return cubic_bend[low][0]",
+    ),
+    "a variable that hides a table": (
+        "    int low = 0, high = 4, k;",
+        "    int low = 0, high = 4, k, at_bend;",
+    ),
+    "a number that is written where it is pointed to": (
+        "static void plan(const real t[1], real out_x[3], real out_u[2])\n{\n    (void)t;",
+        "static void plan(real t[1], real out_x[3], real out_u[2])\n{\n    t[0] = 1.0;",
+    ),
+    "what is constant is written": (
+        "static void drift(const real x[3], real out_f[3])\n{\n",
+        "static void drift(const real x[3], real out_f[3])\n{\n    x[0] = 0.0;\n",
+    ),
+    "a state that is a copy": ("turning_step(turning_state *c", "turning_step(turning_state c"),
+}
+
+
+@pytest.fixture(scope="module")
+def turning():
+    return texts(CONTROLLERS["turning"](), "double")
+
+
+def test_the_text_itself_is_read(turning):
+    assert read_code(*turning).name == "turning"
+
+
+@pytest.mark.parametrize("change", sorted(OTHERWISE))
+def test_what_c_means_otherwise_is_refused(change, turning):
+    header, source = turning
+    assert source.count(OTHERWISE[change][0]) >= 1
+    with pytest.raises(UnreadError):
+        read_code(header, source.replace(*OTHERWISE[change], 1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "more"),
+    [
+        ("_DELAY 0.002 /* s,", "_DELAY 0.002 /* s */ * 1.5 /* s,", ""),
+        ("_DELAY 0.002 ", "_DELAY 0.003 ", "/*\n#define TURNING_DELAY 0.002\n*/\n"),
+        ("_DELAY 0.002 ", "_DELAY 0.003 ", "#define TURNING_DELAY 0.002\n"),
+        ("#define TURNING_DELAY", "/*\n#define TURNING_DELAY 0.002\n*/\n#define TURNING_SLOW", ""),
+    ],
+    ids=["behind its comment", "in a comment", "twice", "in a comment of the header"],
+)
+def test_a_macro_is_what_the_preprocessor_makes_of_it(old, new, more, turning):
+    header, source = turning
+    assert old in header
+    with pytest.raises(UnreadError):
+        read_code(header.replace(old, new), source.replace("\n/* f(x) */\n", f"\n{more}\n/* f(x) */\n"))
