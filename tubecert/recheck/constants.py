@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from tubecert.recheck.balls import exact, sharp_norm
+from tubecert.recheck.blocks import blocks
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.branches import norms_below, slopes_below
 from tubecert.recheck.coordinates import Fields
@@ -36,7 +37,9 @@ from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,
     Rows,
+    Term,
     all_zero,
+    in_order,
     matrix_replaced,
     number,
     plus,
@@ -74,6 +77,9 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
 
 
 def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
+    parts = blocks(matrices[0]) if len(matrices) == 1 else []
+    if len(parts) > 1:
+        return together([_norms(place, [part], limit) for part in parts])
     test = norms_below(matrices, limit)
     found = prove(test, place.tube(), min(place.budget, _FIRST))
     if found.verdict != "undecided" or place.budget <= _FIRST:
@@ -297,11 +303,19 @@ def _own_uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
     if s.h is None:
         return stated(name in s.declared, "it is neither declared nor derived")
     if name == "h_x":
-        test: Test = LipschitzBelow([row[0] for row in s.h], place.fields, limit)
-        return prove(test, place.tube(), place.budget)
+        return _lipschitz(place, [row[0] for row in s.h], limit)
     if name == "h_t":
         return prove(slopes_below(s.h, TIME, limit), place.tube(), place.budget)
     return _norms(place, [s.h], limit)
+
+
+def _lipschitz(place: Place, h: Sequence[Term], limit: Fraction) -> Outcome:
+    """|dh/dz| <= limit, of smooth entries part by part."""
+    if not any(e.op == "norm" for e in in_order(h)):
+        parts = blocks(place.fields.jacobian([[e] for e in h]))
+        if len(parts) > 1:
+            return together([prove(NormsBelow([part], limit), place.tube(), place.budget) for part in parts])
+    return prove(LipschitzBelow(h, place.fields, limit), place.tube(), place.budget)
 
 
 def _covers(limit: Fraction, place: Place, name: str) -> bool:
