@@ -19,7 +19,6 @@ from tubecert.simulate.clearance import Clearance, of_curve, of_tube
 from tubecert.simulate.compare import Comparison, check_class, compare, merged
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.monte_carlo import (
-    ATTACKS,
     Case,
     Sample,
     along,
@@ -143,19 +142,6 @@ def _exits(found: Comparison) -> int:
     return sum(lane in found.outside for lane, _, _ in found.failures)
 
 
-@dataclass(slots=True)
-class _Whole:
-    """Tells how many runs of all are done, `before` of them before the part that is told of."""
-
-    shown: Progress | None
-    of: int
-    before: int = 0
-
-    def __call__(self, step: Step) -> None:
-        if self.shown is not None:
-            self.shown(replace(step, done=self.before + step.done, of=self.of))
-
-
 def simulate(
     setting: Setting,
     loops: Sequence[Loop],
@@ -173,17 +159,15 @@ def simulate(
     Random runs are done by the `executor`. The loops are drawn under the specification's h, or as random run `replay`.
     Raises `TubecertError` if the specification's h leaves its class while the state is in the tube.
     """
-    whole = _Whole(
-        report, len(loops) + sum(loop.tested for loop in loops) * (count + ATTACKS if count else 0)
-    )
     if setting.h is None and replay is None:
         replay = 0
     words = SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed)
     drawn = []
-    for loop in loops:
-        whole(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, {words}"))
+    for number, loop in enumerate(loops):
+        if report is not None:
+            name = f"{loop.controller}, {words}"
+            report(Step(phase=Phase.SIMULATION, name=name, done=number, of=len(loops)))
         drawn.append(_drawn(setting, loop, *_uncertainty(setting, loop, seed, replay)))
-        whole.before += 1
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -192,7 +176,7 @@ def simulate(
     interrupted = False
     for loop, own in zip(loops, drawn, strict=True):
         if loop.tested and count and not interrupted and not own.comparison.unreliable:
-            attacks.append(_attack(setting, loop, count, seed, whole, executor))
+            attacks.append(_attack(setting, loop, count, seed, report, executor))
             sample = attacks[-1].sample
             interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
     first = drawn[0].runs
@@ -276,14 +260,14 @@ def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
     )
 
 
-def _attack(setting: Setting, loop: Loop, count: int, seed: int, whole: _Whole, executor: Executor) -> Attack:
-    sample = monte_carlo(setting, loop, count, seed, whole, executor)
-    whole.before += count
+def _attack(
+    setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None, executor: Executor
+) -> Attack:
+    sample = monte_carlo(setting, loop, count, seed, report, executor)
     found, worst, measured = None, None, None
     if sample is not None and not sample.interrupted:
         try:
-            found = attack(setting, loop, seed, whole)
-            whole.before += ATTACKS
+            found = attack(setting, loop, seed, report)
             one = disturbance_of(setting, setting.class_of(loop), [found])
             worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
             measured = compare(setting, worst, loop.promise)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import takewhile
+from functools import lru_cache, partial
+from itertools import pairwise, takewhile
 from typing import Final
 
 import numpy as np
@@ -25,11 +25,13 @@ from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import Class, Member, adversary, assembled, genes_of, random_member
 
-BATCH: Final = 256
+BATCH: Final = 32  # runs that are kept, and told of, when they are finished
+FIRST: Final = 8  # of them: soon enough to say how long the others will take
 TIMES: Final = 201  # output times of a run
 _POPULATION: Final = 64
 _ELITE: Final = 12
 _ROUNDS: Final = 4
+_FIT: Final = 10  # times the tolerance: a search only compares, what it finds is integrated again
 _HERE: Final = Serial()
 ATTACKS: Final = _ROUNDS * _POPULATION  # runs of an adversary's search
 
@@ -98,7 +100,8 @@ def monte_carlo(
     executor: Executor = _HERE,
 ) -> Sample | None:
     """`count` runs; fewer, or None, if the user interrupts: those before the first one that is missing."""
-    batches = [range(first, min(first + BATCH, count)) for first in range(0, count, BATCH)]
+    starts = [0, *range(min(FIRST, BATCH), count, BATCH)]
+    batches = [range(first, last) for first, last in pairwise([*starts, count])]
     found: dict[int, Runs] = {}
 
     def ready(place: int, runs: Runs) -> None:
@@ -124,12 +127,14 @@ def along(setting: Setting, loop: Loop, seed: int, numbers: Sequence[int]) -> Ru
     """The runs of some numbers, without what only drawings need."""
     kind = setting.class_of(loop)
     cases = [case(setting, kind, seed, number) for number in numbers]
-    return _slim(_run(setting, kind, with_times(loop.problem, TIMES), cases))
+    return _slim(_run(setting, kind, with_times(loop.problem, TIMES), cases, setting.tolerance))
 
 
-def _run(setting: Setting, kind: Class, problem: LoopProblem, cases: Sequence[Case]) -> Runs:
+def _run(
+    setting: Setting, kind: Class, problem: LoopProblem, cases: Sequence[Case], tolerance: float
+) -> Runs:
     starts = np.array([item.start for item in cases])
-    return integrate(problem, starts, disturbance_of(setting, kind, cases), tolerance=setting.tolerance)
+    return integrate(problem, starts, disturbance_of(setting, kind, cases), tolerance=tolerance)
 
 
 def _slim(runs: Runs) -> Runs:
@@ -144,13 +149,17 @@ def _slim(runs: Runs) -> Runs:
     )
 
 
+@lru_cache(maxsize=4)
 def with_times(problem: LoopProblem, count: int) -> LoopProblem:
-    """The problem with another number of output times."""
+    """The problem with another number of output times, the same one for all batches, which share its levels."""
     return replace(problem, times=np.linspace(0.0, problem.horizon, count))
 
 
 def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = None) -> Case:
-    """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed."""
+    """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed.
+
+    The evolution's own runs are known up to ten times the tolerance: what they find is a proposal.
+    """
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     problem, kind = with_times(loop.problem, 2), setting.class_of(loop)
     size = genes_of_case(setting, kind)
@@ -161,7 +170,8 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
         if report is not None:
             name = f"{loop.controller}, adversary"
             report(Step(phase=Phase.SIMULATION, name=name, done=turn * _POPULATION, of=ATTACKS))
-        runs = _run(setting, kind, problem, [bred(setting, kind, row) for row in genes])
+        cases = [bred(setting, kind, row) for row in genes]
+        runs = _run(setting, kind, problem, cases, _FIT * setting.tolerance)
         worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])
         order = np.argsort(-values, kind="stable")[:_ELITE]
