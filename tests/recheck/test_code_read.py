@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 from controllers import CONTROLLERS
-from followed import texts
+from flint import arb, ctx
+from followed import bounds, covered, in_recheck, texts
 
+from tubecert.recheck.code.constants import of_plan
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
 
@@ -83,3 +85,64 @@ def test_a_macro_is_what_the_preprocessor_makes_of_it(old, new, more, turning):
     assert old in header
     with pytest.raises(UnreadError):
         read_code(header.replace(old, new), source.replace("\n/* f(x) */\n", f"\n{more}\n/* f(x) */\n"))
+
+
+# of the controller "path", whose plan goes through knots
+OF_KNOTS = {
+    "fewer numbers than there are": ("X[][N][4] =", "X[][N][1] ="),
+    "more than there are": ("U[][M][2] =", "U[][M][3] ="),
+    "rows of another length": ("START[] =", "START[5] ="),
+}
+
+
+@pytest.fixture(scope="module")
+def path():
+    return texts(CONTROLLERS["path"](), "double")
+
+
+@pytest.mark.parametrize("change", sorted(OF_KNOTS))
+def test_tables_have_the_sizes_of_their_numbers(change, path):
+    header, source = path
+    assert source.count(OF_KNOTS[change][0]) == 1
+    with pytest.raises(UnreadError, match="other sizes"):
+        read_code(header, source.replace(*OF_KNOTS[change]))
+
+
+def in_plan(header, source):
+    with ctx.workprec(200):
+        return list(of_plan(read_code(header, source), in_recheck("path").case.curve, arb("0.081")))
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_the_plan_through_knots_is_that_of_the_certificate(precision):
+    assert in_plan(*texts(CONTROLLERS["path"](), precision)) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("2915.0, (-195500", "2915.0001, (-195500", "X"),
+        ("{0.30000000000000004, (-30.0)}", "{0.30000000000000004, (-30.0000001)}", "U"),
+        ("0.02, 0.3,\n", "0.02, 0.30000000001,\n", "START"),
+        ("t >= START[middle]", "t >= START[middle] - 0.001", "the pieces of the plan"),
+        (
+            "k < 2; k++) {\n        const int middle",
+            "k < 1; k++) {\n        const int middle",
+            "the pieces of the plan",
+        ),
+    ],
+)
+def test_every_number_of_a_plan_through_knots_is_looked_at(old, new, named, path):
+    """Also of pieces that the self-test does not come to."""
+    header, source = path
+    assert source.count(old) == 1
+    assert in_plan(header, source.replace(old, new)) == [named]
+
+
+def test_no_bound_is_given_where_pieces_are_found_in_another_way():
+    """At the knots themselves it is the same piece."""
+    header, source = texts(covered("path"), "double")
+    changed = source.replace("t >= START[middle]", "t >= START[middle] - 0.001")
+    assert changed != source
+    with pytest.raises(UnreadError, match="another way"):
+        bounds(covered("path"), in_recheck("path"), (header, changed))

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
-from tubecert.recheck.balls import exact
+from flint import arb
+
+from tubecert.recheck.balls import Ball, exact, larger
+from tubecert.recheck.code.pieces import rows_of, tables_of
 from tubecert.recheck.code.reader import Code, Table
-from tubecert.recheck.code.seen import KINDS
+from tubecert.recheck.code.run import numbers
+from tubecert.recheck.code.seen import KINDS, Kind, Seen
 from tubecert.recheck.code.shape import ball_of, box_of, law_of
 from tubecert.recheck.code.tree import (
     Assign,
@@ -21,10 +26,16 @@ from tubecert.recheck.code.tree import (
     Test,
     parts,
 )
+from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.controller import Machine
+from tubecert.recheck.curve import Curve
 from tubecert.recheck.family import Everyone
 from tubecert.recheck.steering import Steering
 from tubecert.recheck.terms import in_order, table_of
+
+_OF_PLAN = ("START", "X", "U")
+_ROUNDED = 64  # units of rounding, of the coefficients of a plan
+_SLIGHT = 2.0**-34
 
 
 def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
@@ -41,6 +52,7 @@ def otherwise(code: Code, formulas: Machine) -> Iterator[str]:
         yield "EVERY"
     yield from of_tables(code, formulas)
     yield from of_boxes(code, formulas)
+    yield from of_plan(code, case.curve, exact(recipe.speed * recipe.sample_time))
     own, m = code.functions["estimator"], len(case.system.inputs)
     box = box_of(own, m)
     ends = [(Number(low), Number(high)) for low, high in box or ()]
@@ -73,6 +85,40 @@ def of_tables(code: Code, formulas: Steering) -> Iterator[str]:
                 is_number(code, Number(text), value) for text, value in zip(found, wanted, strict=True)
             ):
                 yield f"{kind}_{table.name}"
+
+
+def of_plan(code: Code, curve: Curve, size: Ball) -> Iterator[str]:
+    """Names of tables of a plan through knots of which a number is another one.
+
+    Coefficients are rounded from ranges: what they are off counts over the length of their piece, beside their row;
+    of a slope f + B u, in which large terms may cancel, beside a `size` of what the loop does.
+    """
+    if "START" not in code.tables:
+        return
+    try:
+        own = tables_of(replace(code, tables={name: code.tables[name] for name in _OF_PLAN}), curve)
+    except (UnreadError, KeyError):
+        yield "the pieces of the plan"
+        return
+    kind = KINDS[code.real]
+    if not all(each.error <= 2 * kind.unit * each.most + kind.least for each in numbers(own["START"])):
+        yield "START"
+    for name, slight in (("X", _SLIGHT * size), ("U", arb(0))):
+        pairs = zip(rows_of(own[name]), curve.parts, strict=True)
+        rows = ((numbers(row), part.length) for entries, part in pairs for row in rows_of(entries))
+        if not all(_is_near(row, length, slight, kind) for row, length in rows):
+            yield name
+
+
+def _is_near(row: Sequence[Seen], length: Ball, slight: Ball, kind: Kind) -> bool:
+    """Of a polynomial on [0, length]; what is `slight` is none of its numbers' fault."""
+    most = arb(0)
+    for k, each in enumerate(row):
+        most = larger(most, each.most * length**k)
+    return all(
+        each.error * length**k <= _ROUNDED * kind.unit * most + slight + kind.least
+        for k, each in enumerate(row)
+    )
 
 
 def of_boxes(code: Code, formulas: Steering) -> Iterator[str]:

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 from flint import ctx
 
-from tubecert.recheck.balls import exact
-from tubecert.recheck.code.constants import is_number, of_boxes, of_tables
+from tubecert.recheck.balls import exact, root
+from tubecert.recheck.code.constants import is_number, of_boxes, of_plan, of_tables
 from tubecert.recheck.code.examination import Agreement, apart, place_of
 from tubecert.recheck.code.reader import Code
 from tubecert.recheck.code.run import Machine, Vector
@@ -79,6 +79,8 @@ def otherwise(code: Code, formulas: Adapted) -> Iterator[str]:
         yield "REACH"
     yield from of_tables(code, formulas)
     yield from of_boxes(code, formulas)
+    widths = [root(row[i]) * formulas.reach for i, row in enumerate(formulas.dual)]
+    yield from of_plan(code, case.curve, min(widths, key=float))
     if not is_number(code, Number(ball_of(code.functions["estimator"], m)), gains.projection_radius):
         yield "the radius of the clip"
     if not is_number(code, Number(law_of(code.functions["law"], m).gain), case.bound("feedback_gain")):

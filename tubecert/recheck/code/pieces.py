@@ -39,6 +39,33 @@ static void mean_of_plan(real begin, real end, real mean[M])
 }
 """
 
+# the last piece that does not begin later: nothing but times of knots decides
+SEARCH = """
+static int piece(real t)
+{
+    int low = 0, high = %(count)s - 1, k;
+    for (k = 0; k < %(halvings)s; k++) {
+        const int middle = (low + high + 1) / 2;
+        if (low < high) {
+            if (t >= START[middle]) {
+                low = middle;
+            } else {
+                high = middle - 1;
+            }
+        }
+    }
+    return low;
+}
+"""
+
+
+def searches(code: Code) -> bool:
+    """Whether the piece of a time is found in the one way that is known."""
+    count = len(code.tables.get("START", ()))
+    halvings = max(1, (count - 1).bit_length())
+    every = [function_of(SEARCH % {"count": own, "halvings": halvings}) for own in ("PIECES", count)]
+    return code.functions.get("piece") in every and code.macros.get("PIECES") == Number(str(count))
+
 
 def mean_of(own: Function, real: str) -> int:
     """How many pieces the mean of u* looks at; raises `UnreadError` for a function of another form."""
@@ -91,6 +118,8 @@ def tables_of(code: Code, curve: Curve) -> dict[str, Vector]:
     parts, plain = curve.parts, Machine(code, Rounded(KINDS[code.real], stands=False, rounds=False))
     own = {name: plain.within_tables(name) for name in code.tables}
     # which piece is found depends on nothing but the knots that are not later
+    if not searches(code):
+        raise UnreadError("the piece of a time is found in another way")
     if [plain.call("piece", begin) for begin in own["START"]] != list(range(len(own["START"]))):
         raise UnreadError("the pieces of the plan are not those of their times")
     if set(own) != {"START", "X", "U"} or any(len(table) != len(parts) for table in own.values()):
@@ -135,16 +164,17 @@ def _coefficients(table: Vector, letter: str, parts: Sequence[Part]) -> Vector:
     found: Vector = []
     for rows, part in zip(table, parts, strict=False):
         own: Vector = []
-        for i, row in enumerate(_list(rows)):
-            names = [f"{letter}{i}#{k}" for k in range(len(_list(row)) + 1)]
+        for i, row in enumerate(rows_of(rows)):
+            names = [f"{letter}{i}#{k}" for k in range(len(rows_of(row)) + 1)]
             if names.pop() in part.values or not part.values.keys() >= set(names):
                 raise UnreadError("the pieces of the plan have other powers")
-            own.append([_meant(c, part.values[name]) for c, name in zip(_list(row), names, strict=True)])
+            own.append([_meant(c, part.values[name]) for c, name in zip(rows_of(row), names, strict=True)])
         found.append(own)
     return found
 
 
-def _list(value: Value) -> Vector:
+def rows_of(value: Value) -> Vector:
+    """The entries of a table that has rows."""
     if not isinstance(value, list):
         raise UnreadError("a number stands where there has to be a row")
     return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -17,6 +17,7 @@ from tubecert.recheck.code.tree import (
     Expr,
     Function,
     Loop,
+    Name,
     Number,
     Return,
     Shape,
@@ -89,7 +90,11 @@ def read_code(header: str, source: str) -> Code:
     own.read(words(head, above))
     own.read(words(body, below))
     found = {key: _expression(text) for key, text in (macros | more).items()}
-    require_typed(own.functions, found, own.members, own.depths, real)
+    for key, table in own.tables.items():
+        if not _fits(table, own.sizes[key], found):
+            raise UnreadError(f"the table {key} has other sizes than its numbers")
+    depths = {key: len(sizes) for key, sizes in own.sizes.items()}
+    require_typed(own.functions, found, own.members, depths, real)
     return Code(
         name=name,
         real=real,
@@ -149,13 +154,24 @@ def _expression(text: str) -> Expr:
     return found
 
 
+def _fits(table: Table, sizes: Sequence[Expr | None], macros: Mapping[str, Expr]) -> bool:
+    """Whether a table has these sizes: C fills up with 0, and leaves out what is too much."""
+    if isinstance(table, str) or not sizes:
+        return isinstance(table, str) and not sizes
+    size = sizes[0]
+    for _ in macros:
+        size = macros.get(size.name) if isinstance(size, Name) else size
+    right = sizes[0] is None or size == Number(str(len(table)))
+    return right and all(_fits(own, sizes[1:], macros) for own in table)
+
+
 class _Reader:
     """What stands at the top of a file, and the statements in functions."""
 
     def __init__(self, name: str) -> None:
         self.own, self.hash = name, ""
         self.tables: dict[str, Table] = {}
-        self.depths: dict[str, int] = {}  # of tables
+        self.sizes: dict[str, list[Expr | None]] = {}  # of tables; None: as many as there are
         self.members: dict[str, Expr | None] = {}
         self.functions: dict[str, Function] = {}
 
@@ -209,16 +225,13 @@ class _Reader:
 
     def _table(self) -> None:
         w = self._w
-        name, depth = w.name(), 0
-        while w.took("["):
-            depth += 1
-            if not w.took("]"):
-                w.expression()
-                w.take("]")
+        name = w.name()
+        sizes: list[Expr | None] = [None] if w.took("[", "]") else []
+        sizes += w.sizes()
         w.take("=")
         if name in self.tables:
             raise w.refused("a table twice")
-        self.tables[name], self.depths[name] = self._braces(), depth
+        self.tables[name], self.sizes[name] = self._braces(), sizes
         w.take(";")
 
     def _braces(self) -> Table:
