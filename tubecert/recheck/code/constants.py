@@ -34,7 +34,7 @@ from tubecert.recheck.steering import Steering
 from tubecert.recheck.terms import in_order, table_of
 
 _OF_PLAN = ("START", "X", "U")
-_ROUNDED = 64  # units of rounding, of the coefficients of a plan
+_NEAR, _ROUNDED = 8, 64  # units of rounding: of the times of knots, and of coefficients
 _SLIGHT = 2.0**-34
 
 
@@ -101,7 +101,7 @@ def of_plan(code: Code, curve: Curve, size: Ball) -> Iterator[str]:
         yield "the pieces of the plan"
         return
     kind = KINDS[code.real]
-    if not all(each.error <= 2 * kind.unit * each.most + kind.least for each in numbers(own["START"])):
+    if not all(each.error <= _NEAR * kind.unit * each.most + kind.least for each in numbers(own["START"])):
         yield "START"
     for name, slight in (("X", _SLIGHT * size), ("U", arb(0))):
         pairs = zip(rows_of(own[name]), curve.parts, strict=True)
