@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from io import StringIO
 
 import pytest
 from rechecked import certified, examine, failing
-from systems import IN_WINDOWS, SCALAR
+from rich.console import Console
+from systems import IN_WINDOWS, SCALAR, SMALL
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import EaseHardware, LessenCause, TakeWindows
+from tubecert.digits import exact
 from tubecert.pipeline import Options, certify, design
 from tubecert.pipeline.design import narrowest, needed_of
 from tubecert.pipeline.width import Measure, size_of
@@ -88,6 +91,7 @@ def test_attempts_are_brief_and_the_one_that_is_shown_is_what_certify_gives(monk
 
     monkeypatch.setattr(design, "certify", attempt)
     (best,) = narrowest(scaled(), Options(), RADIUS).attempts
+    assert "has no `hardware`" not in words_of(design.Design(attempts=(best,)))
     assert best.result.to_json() == certify(scaled()(Fraction(1)), Options()).to_json()
     (first,) = brief
     assert (first.verdict, size_of(first, RADIUS)) == (best.result.verdict, best.size)
@@ -106,6 +110,26 @@ def test_where_none_serves_the_nearest_is_told_with_what_would_help(monkeypatch)
     assert any(isinstance(each, EaseHardware) for each in found.shown.result.reason.relax)
     told = [str(line) for part in report(None, found, None) for line in [getattr(part, "plain", part)]]
     assert "Not certified" in " ".join(told)
+
+
+def words_of(found):
+    console = Console(width=200, file=StringIO())
+    console.print(*report(None, found, None))
+    return console.file.getvalue()
+
+
+@pytest.mark.usefixtures("barely")
+@pytest.mark.slow
+def test_without_a_machine_the_gains_of_every_size_are_told(monkeypatch):
+    """It used to end at a Gamma of 1e12 without a word."""
+    monkeypatch.setattr(design, "_FARTHEST", 0)
+    monkeypatch.setattr(design, "_NARROWINGS", 0)
+    found = narrowest(scaled(SMALL), Options(conditions="B"), RADIUS)
+    told = words_of(found)
+    assert "hardware: {rate: 500" in told
+    assert "\nMachine\n" not in told
+    best = found.best.result.sections["distance"].pairs(asked=False)[0]
+    assert f"Gamma = {exact(best.adaptation_rate)}" in told.split("Attempts")[1]
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
 
@@ -14,13 +14,22 @@ from tubecert.claims.gains import ConditionHolds
 from tubecert.digits import exact, near, percent, up
 from tubecert.kinds import HARDWARE
 from tubecert.kinds.hardware import HardwareData
+from tubecert.pipeline.width import machine_of
 from tubecert.report import reach, sections
 from tubecert.report.console import verdict_line
+from tubecert.report.gains import deciding
 from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 from tubecert.words.machine import PARTS
+
+_GAINS_ALONE: Final = (
+    "The specification has no `hardware`: nothing stops a narrower tube but the gains, which grow with every step "
+    "and which nothing limits; whether a machine can run them was not asked. Take `tubecert certify` for the tube "
+    "that you need, or say what the machine is, as in `hardware: {rate: 500, delay: 0.001, noise: 0.001}` (Hz, s, "
+    "length of the error of a measured state): then design finds the narrowest tube that it keeps."
+)
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -43,15 +52,19 @@ def report(
     parts: list[RenderableType] = [summary(spec, found)]
     best = found.best
     if best is not None:
-        parts += titled("Machine", [Text(line) for line in lines(best.result)])
+        if machine_of(best.result) is not None:
+            parts += titled("Machine", [Text(line) for line in lines(best.result)])
         scale = f"{exact(best.scale)} times as wide as the specification's"
         parts += titled("Tube", [Text(f"{scale}: {reach.extent(best.result)}")])
+        if machine_of(best.result) is None:
+            parts += titled("No machine", [Text(_GAINS_ALONE)])
     else:
         nearest = f"{exact(found.shown.scale)} times as wide as the specification's comes nearest"
         parts += titled("Not certified", [Text(f"{nearest}:"), *sections.failures(found.shown.result)])
     if better:
         parts += titled("What a better machine would buy", _bought(found, better))
-    table = plain_table(">scale", "verdict", ">proven size", ">used", "what stops it", wrapped=4)
+    used = "used" if machine_of(found.shown.result) is not None else "gains"
+    table = plain_table(">scale", "verdict", ">proven size", f">{used}", "what stops it", wrapped=4)
     for each in sorted(found.attempts, key=lambda each: each.scale):
         mark = " *" if each is found.shown else ""
         table.add_row(
@@ -94,6 +107,9 @@ def _size(found: Design, each: Sensitivity | None) -> tuple[str, str]:
 
 
 def _used(each: Attempt) -> str:
+    """The part of the level that is used; of a loop without a machine, what it asks for."""
+    if machine_of(each.result) is None:
+        return "" if each.size is None else "; ".join(gains.text() for gains in deciding(each.result))
     own = each.result.sections.get(HARDWARE.key)
     known = isinstance(own, HardwareData) and own.level_margin is not None and each.size is not None
     return percent(1 - own.level_margin.below) if known else ""  # type: ignore[union-attr]
