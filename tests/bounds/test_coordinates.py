@@ -232,6 +232,18 @@ def test_half_widths_of_a_constant_metric_are_exact():
     assert found.sides[0] <= Fraction(3, 20)
 
 
+def test_states_that_are_not_asked_for_stay_in_the_safe_set():
+    """A tube that would leave it through x3, 3.9 times as wide as x1, is as much narrower; one that fits is not."""
+    own = model(W=CONSTANT_W)
+    wish, plan = wished((Fraction(5), None, None)), suprema(own, None).plan
+    W = np.array(CONSTANT_W, dtype=float)
+    sides = np.array([float(side) for side in propose(own, plan, wish)[1].sides])
+    assert sides[2] == pytest.approx(0.97 * (9 - CENTRE[2]))
+    assert sides == pytest.approx(sides[2] * np.sqrt(np.diag(W) / W[2, 2]))
+    asked = propose(own, plan, wished((None, None, Fraction(8))))[1].sides
+    assert float(asked[2]) == pytest.approx(8)
+
+
 @pytest.mark.slow
 def test_half_widths_are_those_of_the_domain_itself():
     """(1.7), by samples: no W_ii of the domain is above what its half-widths allow, nor M below a."""

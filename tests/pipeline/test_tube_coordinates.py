@@ -163,12 +163,20 @@ def test_a_tube_whose_half_widths_fit_is_not_refused():
 
 
 def test_half_widths_that_leave_the_safe_set_are_told_by_state():
-    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {w: 1.9}")), COARSE)
+    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.5}")), COARSE)
     assert found.verdict is Verdict.UNDECIDED  # half-widths are bounds: nothing is refuted
     claim = found.reason.claim
     assert isinstance(claim, TubeInSafeSet)
     assert claim.state == "q"
     assert found.tube is None
+
+
+def test_a_tube_fits_into_the_safe_set_through_states_that_were_not_asked_for():
+    """As wide in w as was asked for, q would leave the safe set: the tube is narrower, and not refused."""
+    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {w: 1.9}")), COARSE)
+    widths = found.tube.half_widths
+    assert 0.95 * 0.4 < widths["q"] < 0.4
+    assert widths["w"] == pytest.approx(widths["q"] * np.sqrt(2.4 / 0.3), rel=1e-6)
 
 
 @pytest.mark.slow

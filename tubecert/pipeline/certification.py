@@ -103,6 +103,7 @@ def tube(planned: Planned) -> TubeFound | Stopped:
         within=float(spec.within or 0),
         box=np.array(spec.safe_set, dtype=float),
         outputs=np.array([output.row for output in spec.outputs], dtype=float).reshape(-1, len(spec.states)),
+        fits=HARDWARE.key not in deciding(question),  # H has a level of its own in the tube
     )
     return find_tube(planned, propose(question.model, planned.plan, wish))
 

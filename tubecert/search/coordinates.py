@@ -25,13 +25,15 @@ _TIMES = 17
 _DIRECTIONS = 48
 _PASSES = 4
 _DIGITS = Context(prec=9)
+_INSIDE = 0.97  # of the room in the safe set: samples may miss the widest place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wish:
     """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance.
 
-    Those of the states are followed by those of the `outputs` (k, n).
+    Those of the states are followed by those of the `outputs` (k, n). `fits`: a tube that would leave the safe set
+    through a state for which nothing is asked is made as much narrower.
     `apart` (n,) is x(0) - x*(0); where any start within a radius is allowed, that is `within`. `box` (n, 2) is the safe
     set.
     """
@@ -42,18 +44,27 @@ class Wish:
     within: float
     box: Array
     outputs: Array
+    fits: bool = True
 
     def start(self, S: Array) -> float:
         """How far the start is from the plan's, in z."""
         return float(np.linalg.norm(S @ self.apart) + self.within * np.linalg.norm(S, 2))
 
-    def level(self, around: Array, start: float) -> float:
-        """Dbar, given W at points (K, n, n) and the start's distance."""
+    def level(self, around: Array, start: float, centres: Array) -> float:
+        """Dbar, given W at points (K, n, n), the start's distance, and points of the plan (K', n)."""
         if self.asked is None:
             return self.width + start
-        C = np.vstack([np.eye(len(self.box)), self.outputs])
+        n = len(self.box)
+        C = np.vstack([np.eye(n), self.outputs])
         widths = np.sqrt(np.max(np.diagonal(C @ around @ C.T, axis1=1, axis2=2), axis=0))
-        return min(float(w) / float(s) for w, s in zip(self.asked, widths, strict=True) if w is not None)
+        level = min(float(w) / float(s) for w, s in zip(self.asked, widths, strict=True) if w is not None)
+        room = np.minimum(centres - self.box[:, 0], self.box[:, 1] - centres).min(axis=0)
+        beyond = [
+            _INSIDE * float(free) / float(width)
+            for asked, free, width in zip(self.asked[:n], room, widths[:n], strict=True)
+            if self.fits and asked is None and 0 < free < level * width
+        ]
+        return min([level, *beyond])
 
 
 def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordinates, Proposed]:
@@ -69,7 +80,7 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
         S = S * sqrt(bounds[0])
         ratio = sqrt(bounds[1] / bounds[0])
         widths = np.sqrt(np.max(np.diagonal(around, axis1=1, axis2=2), axis=0))
-        level = wish.level(around, ratio * wish.start(S))
+        level = wish.level(around, ratio * wish.start(S), centres)
         if all(e.is_constant for row in model.W for e in row):
             break
         around = _values(dual, _samples(centres, S, level, level * widths, wish.box))
