@@ -95,6 +95,37 @@ OF_KNOTS = {
 }
 
 
+_BLOCK = (
+    "#if !defined(FLT_EVAL_METHOD) || FLT_EVAL_METHOD != 0\n"
+    '#error "every operation must be done in its own type (on x86: -msse2 -mfpmath=sse)"\n'
+)
+
+
+@pytest.mark.parametrize(
+    "own", ["const real idle = 0.0;", "#define M TURNING_INPUTS", "/* */ typedef char c;"]
+)
+def test_nothing_is_compiled_in_some_cases_only(own, turning):
+    header, source = turning
+    assert source.count(_BLOCK) == 1
+    without = source.replace("#define M TURNING_INPUTS\n", "") if "define" in own else source
+    with pytest.raises(UnreadError, match=r"above or between|no word|does not belong"):
+        read_code(header, without.replace(_BLOCK, f"{_BLOCK}{own}\n"))
+
+
+def test_a_statement_is_not_hidden_from_the_compiler(turning):
+    """The lines are the same, in the same order: below them what is compiled, and between them nothing."""
+    header, source = turning
+    begin, end = source.index(_BLOCK), source.index("typedef turning_real real;")
+    block, line = source[begin:end], "        u[i] = kappa[i] + us[i];\n"
+    head, tail = block.split("#endif\n", 1)
+    inside = source.replace(block, "").replace(line, f"{head}{line}#endif\n{tail}")
+    below = f"{source.replace(block, '')}{block}"
+    for changed in (inside, below):
+        assert changed.count(line) == 1
+        with pytest.raises(UnreadError, match="above or between"):
+            read_code(header, changed)
+
+
 @pytest.fixture(scope="module")
 def path():
     return texts(CONTROLLERS["path"](), "double")

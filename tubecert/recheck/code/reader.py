@@ -144,6 +144,13 @@ def _require_lines(header: str, source: str, real: str, name: str) -> None:
         raise UnreadError("lines of the preprocessor in the header are others")
     if lines(source) != wanted:
         raise UnreadError("lines of the preprocessor in the source are others")
+    # nothing is compiled in some cases only, and all that is compiled stands below what is asked of the compiler
+    whole = source.split("\n")
+    end = len(whole) - whole[::-1].index("#endif")
+    above = [line for line in whole[:end] if line.startswith("#")]
+    left, _, gone = _preprocessed("\n".join(whole[:end]))
+    if above != wanted or len(words(left, gone)) > 1:
+        raise UnreadError("something stands above or between the lines that ask for a compiler")
 
 
 def _expression(text: str) -> Expr:
