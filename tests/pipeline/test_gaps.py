@@ -70,3 +70,17 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
     own, plain = (proven(each, conditions="B", by_effect=by) for each, by in ((text, False), (SMALL, None)))
     assert own["result"]["constants"] == plain["result"]["constants"]
     assert "gaps" not in own["result"]["effort"]
+
+
+@pytest.mark.parametrize(
+    ("file", "wanted", "options"),
+    [
+        ("tubecert/templates/csv.yaml", True, {}),
+        ("tubecert/templates/csv.yaml", False, {"by_effect": False}),
+        ("tubecert/templates/regulation.yaml", False, {}),
+        ("configs/two_state_orbit.yaml", False, {}),
+        ("configs/hardware_pvtol_moving.yaml", False, {}),
+    ],
+)
+def test_half_widths_along_a_plan_that_moves_ask_for_it_by_themselves(file, wanted, options):
+    assert question_of(load(str(CONFIGS.parent / file)), Options(**options)).by_effect is wanted

@@ -72,9 +72,15 @@ class Question:
 
     @property
     def by_effect(self) -> bool:
-        """Whether the gap of each constant is to follow from its effect on the gains."""
-        own = self.options.by_effect
-        return self.spec.tube.gap == "auto" if own is None else own
+        """Whether the gap of each constant is to follow from its effect on the gains.
+
+        Half-widths along a plan that moves ask for it by themselves: all constants as close as that take minutes there.
+        """
+        if self.options.by_effect is not None:
+            return self.options.by_effect
+        spec = self.spec
+        moving = spec.trajectory.kind in ("expressions", "csv", "ilqr")
+        return spec.tube.gap == "auto" or (moving and bool(spec.tube.half_widths) and spec.hardware is None)
 
     @cached_property
     def model(self) -> ControlAffineModel:
