@@ -74,6 +74,14 @@ def test_a_file_that_is_another_one(
     assert hint in said(capsys, monkeypatch, *words)
 
 
+def test_a_session_is_told_in_its_order() -> None:
+    said = CliRunner().invoke(app, ["--help"]).stdout
+    order = [
+        said.index(f"  tubecert {word} robot.") for word in ("init", "check", "synth", "certify", "report")
+    ]
+    assert order == sorted(order)
+
+
 def test_nothing_is_guessed_of_an_option_of_one_letter(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

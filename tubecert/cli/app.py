@@ -32,12 +32,16 @@ _USAGE: type[Exception] = typer.BadParameter.__mro__[2]
 _ABOUT = """Proven tracking tubes for contraction-metric control with L1 adaptation.
 
 From a YAML file that describes a control-affine system with matched uncertainty, tubecert proves: with this
-metric, this filter bandwidth and this adaptation rate, the state stays within rho of the plan.
+metric, this filter bandwidth and this adaptation rate, every state stays within its half-width of the plan.
 """
 
 _AFTER = """\b
-Example:
-  tubecert certify configs/three_state.yaml --rho-a 0.01
+Example, in this order, for a robot of your own:
+  tubecert init robot.yaml
+  tubecert check robot.yaml
+  tubecert synth robot.yaml
+  tubecert certify robot.yaml --metric robot.metric.json
+  tubecert report robot.certificate.json
 
 \b
 Exit codes:
@@ -104,10 +108,16 @@ def certify(
     *,
     set_: Settings = None,
     rho_a: Annotated[
-        str | None, number_option("--rho-a", "Radius left to the adaptation (overrides tube.rho_a).")
+        str | None,
+        number_option(
+            "--rho-a", "Radius left to the adaptation, a length over all states (overrides tube.rho_a)."
+        ),
     ] = None,
     epsilon: Annotated[
-        str | None, number_option("--epsilon", "Radius beyond the initial offset (overrides).")
+        str | None,
+        number_option(
+            "--epsilon", "Radius beyond the initial offset (overrides tube.epsilon; not beside half_widths)."
+        ),
     ] = None,
     metric: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Metric file (JSON) in place of the specification's.")
@@ -115,7 +125,8 @@ def certify(
     conditions: Annotated[
         Conditions | None,
         typer.Option(
-            help="Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
+            help="Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
+            "C (sampled), H (hardware), or all of them; all are always computed.  [conditions.decides, or A]",
             show_default=False,
             case_sensitive=False,
         ),

@@ -26,6 +26,7 @@ from tubecert.library.simulating import (
     wishes_of,
 )
 from tubecert.library.workers import cluster_at
+from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report import progress
 from tubecert.report.terminal import Terminal
@@ -108,8 +109,9 @@ def _certificate(
     from tubecert import pipeline
 
     options = pipeline.Options(epsilon=numbers.epsilon, rho_a=numbers.rho_a, metric=given.metric)
-    _tell("no certificate is given: certifying first")
-
+    there = f"{Path(given.spec).stem}.certificate.json"
+    hint = f" (--certificate {visible(there)} takes the one that is there)" if Path(there).is_file() else ""
+    _tell(f"no certificate is given: certifying first{hint}")
     result = pipeline.certify(system, options, report)
     sealed = certificate.seal(result.to_json(), {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)

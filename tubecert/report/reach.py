@@ -94,7 +94,7 @@ def in_states(result: Result, tube: TubeData, length: Fraction, name: str) -> st
     """What a share of dbar is in each state: a distance within it keeps |x_i - x_i*| within that share."""
     share = float(length / tube.rho)
     widths = half_widths(result, {name: share * width for name, width in (tube.half_widths or {}).items()})
-    return f"{name} is {percent(share)} of the tube; a distance of that share of dbar is at most {widths}"
+    return f"{name} is {percent(share)} of the tube: by state at most {widths}"
 
 
 def clearances(result: Result) -> Iterator[str]:

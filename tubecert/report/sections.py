@@ -136,7 +136,8 @@ def without_adaptation(result: Result) -> Iterator[str]:
     )
     joined = result.spec.effective.part("disturbance") or not all(map(_is_one, _parameters(result)))
     whole = "|h| with what wind and parameters add to it" if joined else "|h|"
-    yield f"In this tube the feedback alone can take {limit}; the uncertainty has {whole} <= {up(h.above)}."
+    end = ": this tube needs no adaptation." if section.verdict is Verdict.CERTIFIED else "."
+    yield f"In this tube the feedback alone can take {limit}; the uncertainty has {whole} <= {up(h.above)}{end}"
 
 
 def _parameters(result: Result) -> Iterable[object]:
@@ -182,9 +183,15 @@ def _metric(result: Result, metric: MetricData) -> list[RenderableType]:
 
 def metric_bounds(metric: MetricData, tube: TubeData | None) -> Iterator[tuple[str, str]]:
     """Where the metric is bounded, and by what; over a tube with coordinates, by S'S."""
-    unit = "I" if tube is None or tube.coordinates is None else "S'S"
+    plain = tube is None or tube.coordinates is None
+    unit = "I" if plain else "S'S"
     for words, a, A, of in (
-        ("over the tube", metric.lower, metric.upper, unit),
+        (
+            "over the tube" if plain else "over the tube (z = S x: its coordinates)",
+            metric.lower,
+            metric.upper,
+            unit,
+        ),
         ("on the safe set", metric.lower_on_set, metric.upper_on_set, "I"),
     ):
         if a is not None and A is not None:

@@ -40,6 +40,7 @@ _CAUSES: Mapping[str, str] = {
     "wind_estimate": "wind that the estimate takes for uncertainty",
 }
 _START = "the start, until the filter has learned the uncertainty"
+_START_ALONE = "the start, until the feedback has made it good"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +76,8 @@ def _of_kind(result: Result, key: str) -> list[Share]:
     parts = [Share(cause=_CAUSES[name], share=float(each.hi)) for name, each in causes.items()]
     used = 1 - min(margin.below for margin in pair.margins.values())
     start = used - float(sum(causes.values(), Interval.of(0)).lo)
-    told = [each for each in [*parts, Share(cause=_START, share=start)] if each.share > _LEAST]
+    began = _START_ALONE if isinstance(recipe, NoGains) else _START
+    told = [each for each in [*parts, Share(cause=began, share=start)] if each.share > _LEAST]
     return sorted(told, key=lambda each: -each.share)
 
 

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
+_COLUMNS = (
+    "rate in 1/s, omega in rad/s; omega and Gamma are those of certificate B. beta/sqrt(a): how strongly the metric "
+    "lets inputs act over the tube (tubecert explain input_gain)."
+)
 _HARDLY = 1.05  # times as much
 _CUT = {
     "deadline": "cut short by the deadline: this is the best of what was proven by then",
@@ -59,7 +63,7 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
     if file is not None:
         parts += map(indented, _proven(file))
     if data.table:
-        parts += titled("Metrics compared", [_compared(data.table)])
+        parts += titled("Metrics compared", [_compared(data.table), Text(_COLUMNS, style="dim")])
     if data.limits is not None:
         parts += titled("What limits the rate", _limits(data.limits))
     if data.cut is not None:
