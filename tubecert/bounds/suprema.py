@@ -14,11 +14,12 @@ from tubecert.bounds.affine import NormOverRest
 from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
-from tubecert.bounds.linear import linear_bound
+from tubecert.bounds.linear import LEAST, linear_bound
 from tubecert.bounds.lipschitz import lipschitz_constant, substituted
+from tubecert.bounds.multiplier import eased_bound
 from tubecert.bounds.searches import Searches
 from tubecert.coordinates import Fields
-from tubecert.enclosure.branch_and_bound import Effort, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
@@ -38,7 +39,7 @@ from tubecert.trajectory.defect import Defect
 _FEW = 20_000  # boxes
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
 _BESIDE = 500  # boxes beside a bound by the linear part
-_NEAR = 0.05  # that bound serves where it is this close, however close was asked for
+_NEAR = 0.05  # such bounds serve where they are this close, however close was asked for
 _COARSE, _ROUGH = 0.1, 1e-2  # from that gap on the metric, too, need not be known sharply
 
 
@@ -88,37 +89,44 @@ class Suprema(Searches):
 
     def norms(self, name: str, matrices: list[Matrix]) -> Constant:
         """sup over the tube of the sum of spectral norms, (2.1)-(2.3)."""
-        objective = SumOfNorms(matrices)
-        if objective.is_zero:
+        plain = SumOfNorms(matrices)
+        if plain.is_zero:
             return Constant.exactly(0.0)
-        whole = self._over_rest(matrices)
-        near = self._nearly_linear(name, objective if whole is None else whole, matrices)
-        if near is not None:
-            return near
-        if whole is None:
-            return self._constant(self._over_tube(name, objective))
-        found = self._over_tube(name, whole)
-        # recheck proves it by boxes in all states: to be sharper than was asked for would cost it minutes
-        above = max(found.above, found.below * (1 + self.effort_for(name).gap))
-        known = set(whole.variables) <= set(found.at)  # or no point was found
-        at = {**found.at, **whole.completed(found.at)} if known else {}
-        return self._constant(replace(found, above=above, at=at))
+        rest = self._over_rest(matrices)
+        objective: Objective = plain if rest is None else rest
+        if name in self.gaps and len(matrices) == 1 and len(matrices[0][0]) == 1:
+            return self._eased(name, objective, matrices[0])
+        return self._constant(self._searched(name, objective, self.effort_for(name)))
 
-    def _nearly_linear(self, name: str, objective: Objective, matrices: list[Matrix]) -> Constant | None:
-        """The norm of one vector of many states by its linear part, where that is close and gaps go by effect.
+    def _searched(self, name: str, objective: Objective, effort: Effort) -> Supremum:
+        """By boxes, with the states that need no search put back.
 
-        A few boxes say what the supremum is at least; where the linear part is too far from that, they say the rest.
+        recheck proves such a norm by boxes in all states: to be sharper than was asked for would cost it minutes.
         """
-        if name not in self.gaps or len(matrices) > 1 or len(matrices[0][0]) > 1:
-            return None
-        above = linear_bound(self, matrices[0])
-        if above is None:
-            return None
-        effort = self.effort_for(name)
-        found = self._over_tube(name, objective, replace(effort, budget=min(effort.budget, _BESIDE)))
-        if above > found.below * (1 + max(effort.gap, _NEAR)):
-            return None
-        return Constant(below=found.below, above=min(found.above, above), at=self._constant(found).at)
+        found = self._over_tube(name, objective, effort)
+        if not isinstance(objective, NormOverRest):
+            return found
+        known = set(objective.variables) <= set(found.at)  # or no point was found
+        at = {**found.at, **objective.completed(found.at)} if known else {}
+        return replace(found, above=max(found.above, found.below * (1 + effort.gap)), at=at)
+
+    def _eased(self, name: str, objective: Objective, v: Matrix) -> Constant:
+        """The norm of one vector where gaps go by effect: by its linear part, by the constraint of the tube, by boxes.
+
+        A few boxes say what the supremum is at least. With a multiplier, too, no closer than was asked for.
+        """
+        effort, few = self.effort_for(name), len(free_symbols(row[0] for row in v)) < LEAST
+        found = self._searched(name, objective, replace(effort, budget=min(effort.budget, _BESIDE)))
+        above, enough = found.above, found.below * (1 + effort.gap)
+        if above > enough:
+            above = min(above, linear_bound(self, v) or np.inf)
+        if above > enough:
+            close = replace(effort, gap=1e-9, absolute=effort.gap * found.below**2)
+            above = min(above, max(enough, eased_bound(self, name, v, found.at, close) or np.inf))
+        if above > (enough if few else found.below * (1 + max(effort.gap, _NEAR))):
+            found = self._searched(name, objective, effort)
+            above = min(above, found.above)
+        return self._constant(replace(found, above=above))
 
     def _over_rest(self, matrices: list[Matrix]) -> NormOverRest | None:
         """The norm of one vector as a function of fewer states, where those that it is affine in need no search."""

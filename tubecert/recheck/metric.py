@@ -104,7 +104,8 @@ def null_space(s: System, domain: Domain, budget: int) -> Matrix | Outcome:
     n, m = len(s.states), len(s.inputs)
     centre = [exact((lo + hi) / 2) for lo, hi in (s.safe_set[name] for name in s.states)]
     minors = []
-    for rows in islice(combinations(range(n), m), _MINORS):
+    used = [i for i in range(n) if any(e is not NOUGHT for e in s.B[i])]
+    for rows in islice(combinations(used, m), _MINORS):
         d = determinant([s.B[i] for i in rows])
         if d is not NOUGHT:
             minors.append((-abs(float(Program([d], s.states).run(centre)[0].mid())), rows, d))
