@@ -653,10 +653,14 @@ def scripts(tmp_path):
 
 
 @pytest.mark.slow
-def test_mypy_checks_the_script_of_a_user(scripts):
+def test_mypy_checks_the_script_of_a_user(scripts, monkeypatch):
+    """With the project's options, hence with what its own check of the package has kept beside it."""
     from mypy import api
 
-    options = ["--strict", "--no-error-summary", "--config-file", "", "--cache-dir", str(scripts / "cache")]
+    root = Path(__file__).parents[2]
+    monkeypatch.chdir(root)
+    monkeypatch.setenv("MYPYPATH", str(root))
+    options = ["--strict", "--no-error-summary", "--config-file", "pyproject.toml"]
     said, _, _ = api.run([*options, str(scripts / "right.py"), str(scripts / "wrong.py")])
     errors = [
         line.removeprefix(f"{scripts}/").split(": ")[0] for line in said.splitlines() if "error" in line
