@@ -3,8 +3,9 @@
 Written from their definitions (theory 8), with every index raised by W, so that the metric M = adj(W)/d, d = det W,
 occurs once at most; each claim is multiplied by d. With D^a = sum_i W_ai d/dx_i and covectors p, |p|^2 = p'W p,
     G^kab = (-(D^a W)_kb - (D^b W)_ka + (D^k W)_ab)/2,    (D^b X)_k = (X_x W)_kb + G^kbc (M X)_c,
-    D_nX: [t W, D X; (D X)', t W] >= 0;   beta_O: t^2 W >= B B';   phi_M: [W, X; X', t^2] >= 0;
-    D_nF: |p_a (D^a F)| <= t |p| W, (D^a F)_kl = (D^a F_kl) + G^kac (M F)_cl + G^lac (M F)_ck;
+    D_nX: [t W, D X; (D X)', t W] >= 0;   beta_O: t^2 W >= B B';   phi_M: X' M X <= t^2;
+    D_nF: |p_a (D^a F)| <= t |p| W, (D^a F)_kl = (D^a F_kl) + G^kac (M F)_cl + G^lac (M F)_ck:
+          q' M q <= t^2 (v'W v)^2 for q_a = v'(D^a F) v, the largest p.q being |q|_M |p|;
     D_nb: [W, C'; C, t^2 |p|^2] >= 0, C_jk = p_a (D^a b_j)_k, on the plan;
     K_R: |R| <= t (W_ik W_jl - W_il W_jk), R_ijkl the curvature as a form of bivectors.
 """
@@ -20,7 +21,7 @@ from itertools import combinations
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.metric import adjugate, determinant, stated, together
 from tubecert.recheck.place import Place
-from tubecert.recheck.statements import PositiveDefinite
+from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.terms import (
     NOUGHT,
     UNIT,
@@ -28,7 +29,6 @@ from tubecert.recheck.terms import (
     Rows,
     Term,
     all_zero,
-    function,
     matrix_replaced,
     matrix_slopes,
     number,
@@ -146,6 +146,10 @@ class _Geometry:
         """S > 0 over the tube."""
         return prove(PositiveDefinite(S, unit), self.place.tube(others), self.place.budget)
 
+    def nonnegative(self, e: Term, others: dict[str, tuple[Fraction, Fraction]] | None = None) -> Outcome:
+        """e >= 0 over the tube."""
+        return prove(NotNegative(e), self.place.tube(others), self.place.budget)
+
     @cached_property
     def drift(self) -> Matrix:
         """f + B u*, u* by its names, or as it is where it rests."""
@@ -159,21 +163,21 @@ def _by(weight: Term, a: Rows) -> Matrix:
     return [[weight * e for e in row] for row in a]
 
 
-def _directions(
-    matrices: Sequence[Matrix],
-) -> Iterator[tuple[Matrix, list[Term], dict[str, tuple[Fraction, Fraction]]]]:
-    """sum_a p_a N_a on the faces p_k = 1 of a cube, with p and the ranges of its other entries."""
-    names = [f"p{a}#" for a in range(len(matrices))]
-    for k in range(len(matrices)):
+def _faces(n: int) -> Iterator[tuple[list[Term], dict[str, tuple[Fraction, Fraction]]]]:
+    """A vector p on the faces p_k = 1 of a cube: every direction but for its sign; and the ranges of its entries."""
+    names = [f"p{a}#" for a in range(n)]
+    for k in range(n):
         p = [UNIT if a == k else variable(name) for a, name in enumerate(names)]
-        total = scaled(0, matrices[0])
-        for weight, a in zip(p, matrices, strict=True):
-            total = plus(total, _by(weight, a))
-        yield total, p, {name: (Fraction(-1), Fraction(1)) for a, name in enumerate(names) if a != k}
+        yield p, {name: (Fraction(-1), Fraction(1)) for a, name in enumerate(names) if a != k}
 
 
 def _dot(a: Sequence[Term], b: Sequence[Term]) -> Term:
     return sum((x * y for x, y in zip(a, b, strict=True)), start=NOUGHT)
+
+
+def _form(a: Rows, v: Sequence[Term]) -> Term:
+    """v'A v."""
+    return _dot(v, [_dot(row, v) for row in a])
 
 
 def _drift_slope(g: _Geometry, limit: Fraction) -> Outcome:
@@ -186,21 +190,20 @@ def _drift_slope(g: _Geometry, limit: Fraction) -> Outcome:
 
 
 def _form_slope(g: _Geometry, limit: Fraction) -> Outcome:
-    """Direction by direction of p, both signs of which are opposite directions: D_nF of theory 8.6."""
+    """Direction by direction of v: t^2 d^3 (v'W v)^2 - q' adj(W) q >= 0, D_nF of theory 8.6."""
     F, n = g.place.system.F, range(len(g.W))
     mixed = times(g.dM, F)
-    found = []
+    forms = []
     for a, straight in enumerate(g.raised(F)):
         turn = times([g.symbols[k][a] for k in n], mixed)
-        found.append(plus(_by(g.d, straight), plus(turn, turned(turn))))
+        forms.append(plus(_by(g.d, straight), plus(turn, turned(turn))))
     outcomes = []
-    for total, p, others in _directions(found):
-        size = function("sqrt", _dot(p, [_dot(row, p) for row in g.W]))
-        for sign in (1, -1):
-            S = plus(_by(number(limit) * g.d * size, g.W), total, sign)
-            outcomes.append(g.definite(S, g.W, others))
-            if not outcomes[-1].holds:
-                return together(outcomes)
+    for v, others in _faces(len(n)):
+        q, size = [_form(a, v) for a in forms], _form(g.W, v)
+        rest = number(limit**2) * g.d * g.d * g.d * size * size - _form(g.dM, q)
+        outcomes.append(g.nonnegative(rest, others))
+        if not outcomes[-1].holds:
+            break
     return together(outcomes)
 
 
@@ -211,10 +214,10 @@ def _input_slope(g: _Geometry, limit: Fraction) -> Outcome:
         return stated(True, "")
     slopes = [g.derivative([[e] for e in b]) for b in turned(place.system.B)]
     n, m = range(len(g.W)), range(len(slopes))
-    by_direction = [[[slopes[j][k][a] for k in n] for j in m] for a in n]
     outcomes = []
-    for C, p, others in _directions(by_direction):
-        square = number(limit**2) * g.d * g.d * _dot(p, [_dot(row, p) for row in g.W])
+    for p, others in _faces(len(n)):
+        C = [[_dot(p, [slopes[j][k][a] for a in n]) for k in n] for j in m]
+        square = number(limit**2) * g.d * g.d * _form(g.W, p)
         corner = [[square if i == j else NOUGHT for j in m] for i in m]
         S = place.on_plan(bordered(g.W, turned(C), corner))
         unit = place.on_plan(bordered(g.W, [[NOUGHT for _ in m] for _ in n], corner))
@@ -234,8 +237,7 @@ def _drift_metric(g: _Geometry, limit: Fraction) -> Outcome:
     X = g.drift
     if all_zero(X):
         return stated(True, "")
-    corner = [[number(limit**2)]]
-    return g.definite(bordered(g.W, X, corner), bordered(g.W, scaled(0, X), corner))
+    return g.nonnegative(number(limit**2) * g.d - _form(g.dM, [e for (e,) in X]))
 
 
 def _curvature(g: _Geometry, limit: Fraction) -> Outcome:
