@@ -32,6 +32,7 @@ from tubecert.verdict import Verdict
 Box = Sequence[tuple[Fraction, Fraction]]
 _FINEST = 1e-10  # relative to the rate
 _HALF = 0.5
+_KEPT = 64  # proofs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +109,23 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
     if isfinite(above) and Fraction(above) < model.rate:
         return replace(proof, verdict=Verdict.REFUTED, failed=slow, at=place(found.at))
     return replace(proof, verdict=Verdict.UNDECIDED, failed=slow)
+
+
+class Proofs:
+    """Metrics that `verify_metric` has decided: what was asked in the same words gets the same answer at once."""
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[tuple[float, float, int, int], MetricProof]] = []
+
+    def of(self, model: ControlAffineModel, safe_set: Box, effort: Effort) -> MetricProof:
+        """What `verify_metric` finds, with an effort of this size."""
+        size = effort.gap, effort.absolute, effort.budget, effort.cheap
+        for own, proof in self._kept:
+            if own == size and proof.is_about(model, safe_set):
+                return proof
+        proof = verify_metric(model, safe_set, effort)
+        self._kept = [*self._kept[1 - _KEPT :], (size, proof)]
+        return proof
 
 
 def supported_rate(model: ControlAffineModel, safe_set: Box, effort: Effort) -> Constant:

@@ -29,6 +29,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.executor import Executor
 from tubecert.findings import Severity
+from tubecert.metric.verify import Proofs
 from tubecert.model import domain_findings
 from tubecert.pipeline.advice import Ledger, advised
 from tubecert.pipeline.certification import answer, result
@@ -89,7 +90,14 @@ def _end(question: Question, deadline: Deadline | None) -> Stage | Stopped:
     spec = question.spec
     if spec.metric is not None or spec.synthesis is None:
         return answer(counted(question))
-    found = synthesise(spec, spec.synthesis, question.options, question.progress, deadline=deadline)
+    found = synthesise(
+        spec,
+        spec.synthesis,
+        question.options,
+        question.progress,
+        deadline=deadline,
+        proofs=question.memory.proofs,
+    )
     if found.cut == "interrupted":
         raise KeyboardInterrupt
     question = replace(question, spec=found.spec or spec, synthesis=found.data())
@@ -125,11 +133,12 @@ def synthesise(
     table: bool = False,
     deadline: Deadline | None = None,
     told: Callable[[Synthesised], None] | None = None,
+    proofs: Proofs | None = None,
 ) -> Synthesised:
     """A proven metric for a specification, or why there is none; with `table` others over a range of rates beside it.
 
     `told` hears why there is none before advice is looked for. At the `deadline`, and at an interruption, the best that
-    was proven by then is what comes out (`Synthesised.cut`).
+    was proven by then is what comes out (`Synthesised.cut`). `proofs` of metrics are taken from there, and kept there.
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
     from tubecert.pipeline.synthesis import SynthesisRun  # solvers, only where they are needed
@@ -142,5 +151,7 @@ def synthesise(
     findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
-    run = SynthesisRun(spec, wanted, options, question_of, progress, deadline=deadline, told=told)
+    run = SynthesisRun(
+        spec, wanted, options, question_of, progress, deadline=deadline, told=told, proofs=proofs
+    )
     return run.run(table=table)

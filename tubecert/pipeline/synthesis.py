@@ -40,7 +40,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.letters import HARDWARE
-from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
 from tubecert.pipeline.checks import missing_radii
@@ -90,12 +90,13 @@ class SynthesisRun:
         *,
         deadline: Deadline | None = None,
         told: Told | None = None,
+        proofs: Proofs | None = None,
     ) -> None:
         self.spec, self.wanted, self.options, self.ask = spec, wanted, options, ask
         self.model = build(replace(spec, metric=None))
         self.progress, self.told = progress, told
         self.deadline = deadline or Deadline()
-        self.memory = Memory()
+        self.memory = Memory(proofs=proofs or Proofs())
         whole_way = wanted.objective in ("adaptation", "tube")
         budget = min(options.budget, _BOXES) if whole_way and wanted.rate is None else options.budget
         self.effort = Effort(
@@ -114,6 +115,7 @@ class SynthesisRun:
                 coordinates=wanted.coordinates,
                 half_widths=half_widths(spec),
                 effort=self.effort,
+                proofs=self.memory.proofs,
                 pace=pace(slow_scale(self.model, spec)),
                 progress=self._tell,
             )
@@ -194,7 +196,7 @@ class SynthesisRun:
 
     def _verified(self, metric: VerifiedMetric, rate: Fraction) -> MetricProof:
         model = replace(self.model, W=metric.dual_metric, rate=rate)
-        return verify_metric(model, self.spec.safe_set, self.effort)
+        return self.memory.proofs.of(model, self.spec.safe_set, self.effort)
 
     def _allowed(self, metric: VerifiedMetric) -> bool:
         return self.limit is None or metric.condition_number.above <= self.limit
@@ -285,8 +287,7 @@ class SynthesisRun:
         except SpecError as error:
             return self._failed(NotWritable(code=error.findings[0].code), shorter(metric))
         model = build(spec)
-        same = metric.proof.is_about(model, spec.safe_set)
-        proof = metric.proof if same else verify_metric(model, spec.safe_set, self.effort)
+        proof = self.memory.proofs.of(model, spec.safe_set, self.effort)
         if proof.failed is not None:
             return self._failed(NotProvenAsWritten(condition=proof.failed), RaiseBudget())
         return Synthesised(

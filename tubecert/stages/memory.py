@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from tubecert.certificate.file import digest
+from tubecert.metric.verify import Proofs
 from tubecert.records import Json
 
 T = TypeVar("T")
@@ -19,12 +20,13 @@ T = TypeVar("T")
 class Memory:
     """Values by what was computed and from what; `computed` counts what was not found, by name.
 
-    With `most`, so many are kept: those that were computed last.
+    With `most`, so many are kept: those that were computed last. `proofs` of metrics are kept for whoever asks.
     """
 
     kept: dict[tuple[str, str], Any] = field(default_factory=dict)
     computed: dict[str, int] = field(default_factory=dict)
     most: int | None = None
+    proofs: Proofs = field(default_factory=Proofs)
 
     def knows(self, name: str, depends_on: Json) -> bool:
         """Whether a value is kept."""

@@ -11,7 +11,7 @@ from tubecert.claims.family import Relax
 from tubecert.claims.metric import MetricBound, MetricContraction, MetricKilling, RankOfB
 from tubecert.enclosure.branch_and_bound import Decision
 from tubecert.enclosure.constant import Constant, Witness
-from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.metric.verify import MetricProof
 from tubecert.model import rank_decision
 from tubecert.records import Json
 from tubecert.spec import canonical
@@ -43,7 +43,9 @@ def prove_metric(question: Question) -> ProvenMetric | Stopped:
     if rank.verdict is not Verdict.CERTIFIED:
         return _rank_lost(question, rank)
     proof = question.memory.recall(
-        "metric", _on(question), lambda: verify_metric(model, spec.safe_set, question.effort_of("metric"))
+        "metric",
+        _on(question),
+        lambda: question.memory.proofs.of(model, spec.safe_set, question.effort_of("metric")),
     )
     if proof.failed is not None:
         at = proof.at if proof.verdict is Verdict.REFUTED else None

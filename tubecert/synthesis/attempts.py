@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from tubecert.claims.outcomes import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.metric.verify import Proofs
 from tubecert.model import ControlAffineModel
 from tubecert.progress import Progress
 from tubecert.synthesis.coordinates import Choice
@@ -41,6 +42,7 @@ class Request:
     thorough: bool = True
     rounds: int | None = None
     effort: Effort = field(default_factory=Effort)
+    proofs: Proofs = field(default_factory=Proofs)
     pace: Fraction = Fraction(1)
     progress: Progress | None = None
 

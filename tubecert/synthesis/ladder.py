@@ -184,7 +184,7 @@ class Ladder:
             self.rounds += proposal.rounds
             if not proposal.kappa < _POLISHES * kappa(best):
                 break
-            outcome = shortest_proven(problem, proposal, best.rate, effort)
+            outcome = shortest_proven(problem, proposal, best.rate, effort, self.request.proofs)
             self._note(attempted(problem, best.rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, Rejected):
                 break
@@ -228,7 +228,7 @@ class Ladder:
             started = time.perf_counter()
             proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
-            outcome = shortest_proven(problem, proposal, rate, self.request.effort)
+            outcome = shortest_proven(problem, proposal, rate, self.request.effort, self.request.proofs)
             self._note(attempted(problem, rate, proposal, outcome, time.perf_counter() - started))
             if isinstance(outcome, VerifiedMetric):
                 if retreated and self.request.coordinates == "auto":

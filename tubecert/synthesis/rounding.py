@@ -6,6 +6,7 @@ returned. The proof is `tubecert.metric.verify`'s.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor, isfinite, log10
@@ -17,7 +18,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.expression.matrix import Matrix
-from tubecert.metric.verify import MetricProof, verify_metric
+from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.attack import Attack, Attacker
 from tubecert.synthesis.coordinates import Choice
@@ -62,7 +63,11 @@ class Rejected:
 
 
 def shortest_proven(
-    problem: SynthesisProblem, proposal: Proposal, rate: Fraction, effort: Effort
+    problem: SynthesisProblem,
+    proposal: Proposal,
+    rate: Fraction,
+    effort: Effort,
+    proofs: Proofs | None = None,
 ) -> VerifiedMetric | Rejected:
     """The proposal with few digits, proven at `rate`, of nearly the same condition number; or why it is not proven."""
     values = proposal.coefficients
@@ -72,11 +77,16 @@ def shortest_proven(
     if values.shape != (len(problem.family.functions), n, n):
         return Rejected(outcome=WrongShape(route=proposal.route))
     first, *rest = _worth_proving(problem, values, rate)
-    outcome = _proven(problem, proposal, first, rate, effort)
+    known = proofs or Proofs()
+
+    def prove(dual: Matrix) -> MetricProof:
+        return known.of(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+
+    outcome = _proven(problem, proposal, first, rate, prove)
     for digits in rest:
         if isinstance(outcome, VerifiedMetric):
             break
-        outcome = _proven(problem, proposal, digits, rate, effort)
+        outcome = _proven(problem, proposal, digits, rate, prove)
     return outcome
 
 
@@ -126,11 +136,15 @@ def rounded(values: Array, digits: int, sizes: Array | None = None) -> Coefficie
 
 
 def _proven(
-    problem: SynthesisProblem, proposal: Proposal, digits: int, rate: Fraction, effort: Effort
+    problem: SynthesisProblem,
+    proposal: Proposal,
+    digits: int,
+    rate: Fraction,
+    prove: Callable[[Matrix], MetricProof],
 ) -> VerifiedMetric | Rejected:
     assert proposal.coefficients is not None
     dual = problem.family.dual_metric(rounded(proposal.coefficients, digits, problem.scaled.entries))
-    proof = verify_metric(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+    proof = prove(dual)
     if proof.failed is not None:
         failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
         return Rejected(outcome=failed, undecided=failed.verdict is Verdict.UNDECIDED)
