@@ -315,6 +315,7 @@ def test_the_initial_distance_is_the_length_of_the_segment(three):
     assert length * (1 - 1e-7) <= constants.initial_distance.above <= length * 1.001
 
 
+@pytest.mark.slow
 def test_half_widths_are_the_roots_of_the_diagonal(three):
     suprema = three[0]
     widths = suprema.half_widths()
@@ -475,6 +476,7 @@ def test_the_drift_is_bounded_in_ball_arithmetic_too(three):
     prove([(-half, half)] * 3, settled, 20_000)
 
 
+@pytest.mark.slow
 def test_the_drift_along_a_moving_plan_is_bounded_in_ball_arithmetic_too(two):
     ctx.prec = 80
     bound = arb(two.drift_on_plan.above * 1.15)

@@ -393,6 +393,7 @@ def test_sarif_of_real_files():
     assert not valid_sarif(run(spec(), "--format", "sarif").stdout)["runs"][0]["results"]
 
 
+@pytest.mark.slow
 @given(st.text(), st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1))
 def test_sarif_is_valid_whatever_the_text(message, path):
     place = Location(file=path, line=1, column=1, source=message)

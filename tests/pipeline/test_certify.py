@@ -65,6 +65,7 @@ def three():
     return run(THREE, bare=False)
 
 
+@pytest.mark.slow
 def test_three_state_is_certified_in_every_number(three):
     assert three["verdict"] == "certified"
     assert Verdict(three["verdict"]).exit_code == 0
@@ -79,6 +80,7 @@ def test_three_state_is_certified_in_every_number(three):
     seal(three, {})  # no NaN, no infinity, nothing that JSON cannot say
 
 
+@pytest.mark.slow
 def test_three_state_tube_is_the_fixed_point_of_its_own_metric_bounds(three):
     assert three["tube"]["rho"] == pytest.approx(0.03907, rel=1e-3)
     assert three["metric"]["lower"][0] == pytest.approx(4.3109, rel=1e-4)

@@ -205,6 +205,7 @@ def test_a_metric_that_is_not_proven_is_no_stage(judged):
         ProvenMetric(question=metric.question, proof=end.partial, lower=metric.lower)
 
 
+@pytest.mark.slow
 def test_a_tube_that_leaves_the_safe_set_is_no_stage(judged):
     end = answer(question_of(THREE, radii(".01", ".09")))
     assert isinstance(end, Stopped)
@@ -221,6 +222,7 @@ def test_a_tube_that_leaves_the_safe_set_is_no_stage(judged):
         )
 
 
+@pytest.mark.slow
 def test_constants_without_a_bound_are_no_stage(judged):
     enclosed = judged.bounded.enclosed
     endless = replace(enclosed.constants.h, above=float("inf"))

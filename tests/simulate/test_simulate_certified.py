@@ -139,6 +139,7 @@ def test_the_plan_is_that_of_the_certificate():
     assert np.abs(x.mid).max() < 0.05
 
 
+@pytest.mark.slow
 def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     where = setting("two_state", "0.4")
     _, result = certified("two_state", "0.4")

@@ -94,6 +94,7 @@ def test_both_forms_of_the_right_hand_sides_agree(controller):
     np.testing.assert_allclose(found, L @ y + E @ h, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", [name for name in CONTROLLERS if DESIGNS[name].terms.filters])
 def test_right_hand_sides_are_those_of_the_theory(controller):
     """(0.6) less (0.1), (0.7), (0.8) and (4.5), written out a second time."""
