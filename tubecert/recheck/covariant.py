@@ -1,7 +1,8 @@
 """Constants of certificate H that are measured by a metric which is not constant, each as a claim over the tube.
 
 Written from their definitions (theory 8), with every index raised by W, so that the metric M = adj(W)/d, d = det W,
-occurs once at most; each claim is multiplied by d. With D^a = sum_i W_ai d/dx_i and covectors p, |p|^2 = p'W p,
+occurs once at most; each claim is multiplied by d, which is positive by C1, a claim of its own.
+With D^a = sum_i W_ai d/dx_i and covectors p, |p|^2 = p'W p,
     G^kab = (-(D^a W)_kb - (D^b W)_ka + (D^k W)_ab)/2,    (D^b X)_k = (X_x W)_kb + G^kbc (M X)_c,
     D_nX: [t W, D X; (D X)', t W] >= 0;   beta_O: t^2 W >= B B';   phi_M: X' M X <= t^2;
     D_nF: |p_a (D^a F)| <= t |p| W, (D^a F)_kl = (D^a F_kl) + G^kac (M F)_cl + G^lac (M F)_ck:

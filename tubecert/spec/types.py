@@ -143,6 +143,11 @@ class Trajectory:
         """Whether x* and u* are written down as expressions, and neither data nor still to be found."""
         return bool(self.x)
 
+    @property
+    def moves(self) -> bool:
+        """Whether it is one plan along which x* may move: no point that is held, and no family."""
+        return self.kind not in ("equilibrium", "any")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:

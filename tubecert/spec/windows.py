@@ -134,7 +134,7 @@ def pad_of(machine: Hardware) -> Fraction:
 def more_windows(spec: Spec) -> int | None:
     """How many windows H might be tried in: 20, or twice as many as there are; None where there can be no more."""
     machine, plan, tube, wind = spec.hardware, spec.trajectory, spec.tube, spec.disturbance
-    if machine is None or plan.horizon is None or plan.kind in ("equilibrium", "any") or tube.auto:
+    if machine is None or plan.horizon is None or not plan.moves or tube.auto:
         return None
     if machine.largest is not None or machine.geodesic is not None:
         return None

@@ -79,8 +79,8 @@ class Question:
         if self.options.by_effect is not None:
             return self.options.by_effect
         spec = self.spec
-        moving = spec.trajectory.kind in ("expressions", "csv", "ilqr")
-        return spec.tube.gap == "auto" or (moving and bool(spec.tube.half_widths) and spec.hardware is None)
+        wide = bool(spec.tube.half_widths) and spec.trajectory.moves and spec.hardware is None
+        return spec.tube.gap == "auto" or wide
 
     @cached_property
     def model(self) -> ControlAffineModel:
