@@ -8,27 +8,27 @@ Programs are translated operation by operation; of what surrounds them there is 
 from __future__ import annotations
 
 import ast
-import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from tubecert.recheck.code.python_loop import IMPORTED, TESTED, Loop, Pair, functions, methods, table
+from tubecert.recheck.code.python_trees import (
+    bare,
+    constant,
+    names,
+    program,
+    refused,
+    string,
+    table_of,
+    whole,
+)
 from tubecert.recheck.code.reader import Code, Table, function_of
-from tubecert.recheck.code.seen import FUNCTIONS
 from tubecert.recheck.code.tree import (
-    Assign,
-    Binary,
-    Call,
-    Choice,
-    Declare,
-    Entry,
     Expr,
     Function,
     Name,
     Number,
-    Statement,
-    Unary,
 )
 from tubecert.recheck.code.words import UnreadError
 
@@ -52,9 +52,6 @@ _REALS = ("SAMPLE_TIME", "DELAY", "LEVEL", "REACH", "HORIZON")
 _COUNTS = ("MEETS", "EVERY", "PANELS", "SWEEPS")
 _TABLES = ("START", "X", "U")
 _TESTS = ("MEASURED", "EXPECTED", "TOLERANCE")
-_OPERATORS: Mapping[type[ast.AST], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-_LOCAL = re.compile(r"r\d+")
-_GIVEN = re.compile(r"[a-z]+(_[a-z]+)?")
 
 
 def read_python(text: str) -> Code:
@@ -63,7 +60,7 @@ def read_python(text: str) -> Code:
         raise UnreadError("the file does not begin as a controller does")
     try:
         tree = ast.parse(text)
-        return _Module(_bare(tree.body)).code()
+        return _Module(bare(tree.body)).code()
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise error if isinstance(error, UnreadError) else UnreadError(f"it is no Python: {error}") from error
 
@@ -90,7 +87,7 @@ class _Module:
         return Code(
             name=_NAME,
             real="double",
-            hash=_string(self._value("CERTIFICATE")),
+            hash=string(self._value("CERTIFICATE")),
             macros=self._macros(loop),
             tables=self._tables(),
             members=_members(loop),
@@ -103,7 +100,7 @@ class _Module:
             case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.values:
                 known = {*_REALS, *_COUNTS, *_TABLES, *_TESTS, "CERTIFICATE", "STATES", "INPUTS", "ADDS_PLAN"}
                 if name not in known and not re.fullmatch(r"(AT|CUBIC)_\w+", name):
-                    raise _refused(own, f"{name} is no constant that is known")
+                    raise refused(own, f"{name} is no constant that is known")
                 self.values[name] = value
             case ast.FunctionDef(name=name) if name not in self.functions:
                 self.functions[name] = own
@@ -112,7 +109,7 @@ class _Module:
             case ast.If():
                 self.rest.append(own)
             case _:
-                raise _refused(own, "this does not belong here")
+                raise refused(own, "this does not belong here")
 
     # -- numbers
 
@@ -125,14 +122,14 @@ class _Module:
         """Which loop it says that it is."""
         adds_plan = self._value("ADDS_PLAN")
         if not (isinstance(adds_plan, ast.Constant) and isinstance(adds_plan.value, bool)):
-            raise _refused(adds_plan, "ADDS_PLAN is no truth")
+            raise refused(adds_plan, "ADDS_PLAN is no truth")
         for name in _TESTS:
-            _table(self._value(name))
+            table_of(self._value(name))
         if ("START" in self.values) != ("plan" not in self.functions):
             raise UnreadError("the plan is given twice, or not at all")
         return Loop(
-            inputs=len(_names(self._value("INPUTS"))),
-            states=len(_names(self._value("STATES"))),
+            inputs=len(names(self._value("INPUTS"))),
+            states=len(names(self._value("STATES"))),
             adds_plan=adds_plan.value,
             ends=not self._endless,
             seldom="EVERY" in self.values,
@@ -152,16 +149,16 @@ class _Module:
         return False
 
     def _count(self, name: str) -> int:
-        return int(_whole(self._value(name))) if name in self.values else 0
+        return int(whole(self._value(name))) if name in self.values else 0
 
     def _size(self, name: str) -> int:
-        return len(_table(self._value(name))) if name in self.values else 0
+        return len(table_of(self._value(name))) if name in self.values else 0
 
     def _macros(self, loop: Loop) -> dict[str, Expr]:
         found: dict[str, Expr] = {"N": Number(str(loop.states)), "M": Number(str(loop.inputs))}
         for name in _REALS:
             if name != "HORIZON" or loop.ends:
-                found[f"{_NAME.upper()}_{name}"] = _constant(self._value(name))
+                found[f"{_NAME.upper()}_{name}"] = constant(self._value(name))
         if loop.seldom:
             found[f"{_NAME.upper()}_EVERY"] = Number(str(self._count("EVERY")))
         if loop.pieces:
@@ -169,10 +166,12 @@ class _Module:
         return found
 
     def _tables(self) -> dict[str, Table]:
-        found: dict[str, Table] = {name: _table(self.values[name]) for name in _TABLES if name in self.values}
+        found: dict[str, Table] = {
+            name: table_of(self.values[name]) for name in _TABLES if name in self.values
+        }
         for own in self._looked:
             for kind in ("AT", "CUBIC"):
-                found[f"{kind.lower()}_{own}"] = _table(self._value(f"{kind}_{own}"))
+                found[f"{kind.lower()}_{own}"] = table_of(self._value(f"{kind}_{own}"))
         return found
 
     @property
@@ -199,17 +198,17 @@ class _Module:
         yield from self._methods(loop)
         for name, own in left.items():
             if name not in _PROGRAMS:
-                raise _refused(own, f"{name} is no function that is known")
-            yield _program(own, _PROGRAMS[name])
+                raise refused(own, f"{name} is no function that is known")
+            yield program(own, _PROGRAMS[name])
 
     def _methods(self, loop: Loop) -> Iterator[Function]:
         if len(self.classes) != 1:
             raise UnreadError("there has to be one class")
         (own,) = self.classes
-        body, wanted = _bare(own.body), methods(loop)
+        body, wanted = bare(own.body), methods(loop)
         more: list[object] = [own.bases, own.keywords, own.decorator_list, getattr(own, "type_params", ())]
         if own.name != "Controller" or any(more) or len(body) != len(wanted):
-            raise _refused(own, "the class is not the loop that it has to be")
+            raise refused(own, "the class is not the loop that it has to be")
         for pair, each in zip(wanted, body, strict=True):
             if pair.c:
                 yield _paired(pair, each)
@@ -252,169 +251,24 @@ def _alike(wanted: object, found: object, numbers: dict[str, str], near: ast.AST
     """Node by node; first strings of functions are not looked at."""
     if isinstance(wanted, ast.Name) and wanted.id.startswith("NUMBER_"):
         if not isinstance(found, ast.expr):
-            raise _refused(near, "a number has to stand here")
-        match _constant(found):
+            raise refused(near, "a number has to stand here")
+        match constant(found):
             case Number(text):
                 numbers[wanted.id] = text
                 return
-        raise _refused(near, "a positive number has to stand here")
+        raise refused(near, "a positive number has to stand here")
     if type(wanted) is not type(found):
-        raise _refused(near, "this is not the loop that it has to be")
+        raise refused(near, "this is not the loop that it has to be")
     if isinstance(wanted, list) and isinstance(found, list):
         if len(wanted) != len(found):
-            raise _refused(near, "this is not the loop that it has to be")
+            raise refused(near, "this is not the loop that it has to be")
         for a, b in zip(wanted, found, strict=True):
             _alike(a, b, numbers, b if isinstance(b, ast.stmt | ast.expr) else near)
     elif isinstance(wanted, ast.AST) and isinstance(found, ast.AST):
         for name in wanted._fields:
             a, b = getattr(wanted, name, None), getattr(found, name, None)
             if name == "body" and isinstance(found, ast.FunctionDef):
-                a, b = _bare(a or []), _bare(b or [])
+                a, b = bare(a or []), bare(b or [])
             _alike(a, b, numbers, near)
     elif wanted != found:
-        raise _refused(near, f"{found!r} has to be {wanted!r} here")
-
-
-def _bare(body: list[ast.stmt]) -> list[ast.stmt]:
-    """Without the string that says what it is."""
-    match body:
-        case [ast.Expr(value=ast.Constant(value=str())), *rest]:
-            return rest
-    return body
-
-
-# -- programs
-
-
-def _program(own: ast.FunctionDef, count: int) -> Function:
-    """A function without branches that gives so many vectors."""
-    given = _arguments(own)
-    done, sizes = list[Statement](), dict[str, int]()
-    known = set[str]()
-    *body, last = _bare(own.body)
-    for each in body:
-        match each:
-            case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in known | sizes.keys():
-                if _LOCAL.fullmatch(name):
-                    done.append(Declare("real", name, (), _expression(value, known, given)))
-                    known.add(name)
-                elif name.startswith("out_") and isinstance(value, ast.Tuple) and value.elts:
-                    entries = [_expression(entry, known, given) for entry in value.elts]
-                    done += [Assign(Entry(Name(name), Number(str(i))), e) for i, e in enumerate(entries)]
-                    sizes[name] = len(entries)
-                else:
-                    raise _refused(each, f"{name} is no result that is known")
-            case _:
-                raise _refused(each, "a program has no such statement")
-    match last:
-        case ast.Return(value=ast.Name(id=only)) if count == 1:
-            outs = [only]
-        case ast.Return(value=ast.Tuple(elts=elements)) if len(elements) == count > 1:
-            outs = [each.id if isinstance(each, ast.Name) else "" for each in elements]
-        case _:
-            raise _refused(last, f"{own.name} gives something else")
-    if len(set(outs)) != len(outs) or set(outs) != sizes.keys():
-        raise _refused(last, f"{own.name} gives something else")
-    return Function(name=own.name, given=(*given, *outs), body=tuple(done))
-
-
-def _arguments(own: ast.FunctionDef) -> tuple[str, ...]:
-    """Names of what a program is given: vectors."""
-    a = own.args
-    given = tuple(each.arg for each in a.args)
-    more: list[object] = [a.posonlyargs, a.vararg, a.kwonlyargs, a.kw_defaults, a.kwarg, a.defaults]
-    more += [own.decorator_list, own.returns, getattr(own, "type_params", ())]
-    if any(more) or any(each.annotation for each in a.args):
-        raise _refused(own, "a program is given vectors by their names")
-    for name in given:
-        hides = name == "math" or _LOCAL.fullmatch(name) or name.startswith(("out_", "table_"))
-        if hides or not _GIVEN.fullmatch(name) or given.count(name) > 1:
-            raise _refused(own, f"{name} is no name of a vector")
-    return given
-
-
-def _expression(tree: ast.expr, known: set[str], given: Sequence[str]) -> Expr:
-    """What may stand in a program."""
-
-    def of(own: ast.expr) -> Expr:
-        return _expression(own, known, given)
-
-    match tree:
-        case ast.Constant():
-            return _constant(tree)
-        case ast.Name(id=name) if name in known:
-            return Name(name)
-        case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant() as place) if name in given:
-            return Entry(Name(name), Number(_whole(place)))
-        case ast.UnaryOp(op=ast.USub(), operand=arg):
-            return Unary("-", of(arg))
-        case ast.BinOp(op=op, left=left, right=right) if type(op) in _OPERATORS:
-            return Binary(_OPERATORS[type(op)], of(left), of(right))
-        case ast.Call(func=ast.Attribute(value=ast.Name(id="math"), attr=name), args=[arg], keywords=[]):
-            if name in FUNCTIONS:
-                return Call(name, (of(arg),))
-        case ast.Call(func=ast.Name(id=name), args=[arg], keywords=[]) if name.startswith("table_"):
-            return Call(name, (of(arg),))
-        case ast.IfExp(test=test, body=yes, orelse=no):
-            return Choice(_test(test, known, given), of(yes), of(no))
-    raise _refused(tree, "a program has no such expression")
-
-
-def _test(tree: ast.expr, known: set[str], given: Sequence[str]) -> Expr:
-    match tree:
-        case ast.BoolOp(op=ast.And(), values=[first, second]):
-            return Binary("&&", _test(first, known, given), _test(second, known, given))
-        case ast.Compare(left=left, ops=[ast.Lt() | ast.Gt() as op], comparators=[right]):
-            sign = "<" if isinstance(op, ast.Lt) else ">"
-            return Binary(sign, _expression(left, known, given), _expression(right, known, given))
-    raise _refused(tree, "a program has no such test")
-
-
-# -- constants
-
-
-def _constant(tree: ast.expr) -> Expr:
-    """A number of the type; what is negative is written with its sign in front."""
-    match tree:
-        case ast.Constant(value=value) if type(value) is float and math.isfinite(value):
-            return Number(repr(value))
-        case ast.UnaryOp(op=ast.USub(), operand=arg):
-            return Unary("-", _constant(arg))
-    raise _refused(tree, "a finite number of the type has to stand here")
-
-
-def _whole(tree: ast.expr) -> str:
-    match tree:
-        case ast.Constant(value=value) if type(value) is int:
-            return str(value)
-    raise _refused(tree, "a whole number has to stand here")
-
-
-def _string(tree: ast.expr) -> str:
-    match tree:
-        case ast.Constant(value=str() as value):
-            return value
-    raise _refused(tree, "a string has to stand here")
-
-
-def _names(tree: ast.expr) -> list[str]:
-    match tree:
-        case ast.Tuple(elts=elements):
-            return [_string(each) for each in elements]
-    raise _refused(tree, "names have to stand here")
-
-
-def _table(tree: ast.expr) -> Table:
-    """Numbers, in brackets in brackets."""
-    if isinstance(tree, ast.Tuple):
-        return tuple(_table(each) for each in tree.elts)
-    match _constant(tree):
-        case Number(text):
-            return text
-        case Unary("-", Number(text)):
-            return f"-{text}"
-    raise _refused(tree, "a number has to stand here")
-
-
-def _refused(near: ast.AST, what: str) -> UnreadError:
-    return UnreadError(f"line {getattr(near, 'lineno', 0)}: {what}")
+        raise refused(near, f"{found!r} has to be {wanted!r} here")
