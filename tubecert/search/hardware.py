@@ -6,7 +6,7 @@ monotone in Ts. Implements: theory section 8.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -25,8 +25,11 @@ from tubecert.search.scan import largest, serves
 
 DIGITS = 4
 _UNALIKE = 0.7  # of the inflation: for a Y that S is a multiple of
+_LEAST_ROOM = 1e-7
 _ROOM = 9  # digits of what only the proof needs
+_ROOMS = (_LEAST_ROOM, 1e-5, 1e-4, 1e-3, None)
 _CURVE_POINTS = 13
+_ROUNDS = 7  # to 2e-9: four digits of it are printed
 _ASIDE = 1e-9  # of the largest level: n_M in floats is not n_M
 
 
@@ -85,11 +88,16 @@ def recipe_at(search: Search, setting: Setting) -> HardwareRecipe | None:
     return proof_at(search, setting, replace(own, level=allowed), 1e-6)
 
 
-def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe | None:
-    """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried."""
+def served(
+    search: Search, setting: Setting, choice: Choice, first: Choice | None = None
+) -> HardwareRecipe | None:
+    """A choice as decimals that prove something, with a level as low as they allow; else the last that was tried.
+
+    `first`: what is free at the level with the least room, where that is known.
+    """
     recipe: HardwareRecipe | None = None
     for share in (1.0, _UNALIKE):
-        for own in _near(search, setting, choice):
+        for own in _near(search, setting, choice, first):
             for inflation in (1e-9, 1e-6):
                 recipe = proof_at(search, setting, own, inflation, share)
                 if recipe is not None and serves(search.problem, recipe):
@@ -97,15 +105,17 @@ def served(search: Search, setting: Setting, choice: Choice) -> HardwareRecipe |
     return recipe
 
 
-def _near(search: Search, setting: Setting, choice: Choice) -> Iterator[Printed]:
+def _near(search: Search, setting: Setting, choice: Choice, first: Choice | None = None) -> Iterator[Printed]:
     """The choice with more and more room, what is free chosen again for each level; then what has the most of it.
 
     Each is looked for only if none before it serves: nearly always the first does.
     """
-    at, tried = setting.lanes(), []
-    for room in (1e-7, 1e-5, 1e-4, 1e-3, None):
+    at = setting.lanes()
+    tried: list[Choice] = []
+    for room in _ROOMS:
         level = None if room is None else np.array([float(printed(setting, choice, room).level)])
-        tried.append(search.least(at, level)[1])
+        known = first if first is not None and not tried else None
+        tried.append(known or search.least(at, level)[1])
         yield printed(setting, tried[-1], 0.0)
     # without a filter the theorem knows of no horizon, and a short one may be what is needed
     yield from (printed(setting, each, 0.0, filtered=True) for each in tried)
@@ -183,7 +193,7 @@ def largest_value(search: Search) -> float:
             return replace(base, tau=x)
         return sampled_at(search.machine, base, x)
 
-    return _largest(search, at, _ends(search), points=60)
+    return _largest(search, at, _ends(search), points=60, rounds=_ROUNDS)
 
 
 def repeated(lane: Lanes, count: int) -> Lanes:
@@ -199,12 +209,14 @@ def sampled_at(machine: Machine, base: Lanes, Ts: Array) -> Lanes:
     )
 
 
-def _largest(search: Search, at: Callable[[Array], Lanes], ends: tuple[float, float], points: int) -> float:
+def _largest(
+    search: Search, at: Callable[[Array], Lanes], ends: tuple[float, float], points: int, rounds: int
+) -> float:
     def test(x: Array) -> Mask:
-        best, _ = search.least(at(x.ravel()))
-        return np.asarray(best < 1).reshape(x.shape)
+        return search.holds(at(x.ravel())).reshape(x.shape)
 
-    return float(largest(test, np.array([ends[0]]), np.array([ends[1]]), points=points)[0])
+    low, high = (np.array([end]) for end in ends)
+    return float(largest(test, low, high, points=points, rounds=rounds)[0])
 
 
 def _ends(search: Search) -> tuple[float, float]:
@@ -242,7 +254,7 @@ def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
     else:
         ends = (0.5 * given, 1e2 / search.rate)
         most = max(
-            _largest(search, lambda x: sampled_at(machine, repeated(base, len(x)), x), ends, 40),
+            _largest(search, lambda x: sampled_at(machine, repeated(base, len(x)), x), ends, 40, rounds=6),
             given,
         )
     least = given / 16 if machine.asked.one_sample else max(given / 16, float(setting.delay), 1e-9 * most)
@@ -263,13 +275,19 @@ def _curve(search: Search, setting: Setting) -> tuple[HardwareRecipe, ...]:
         machine, repeated(base, len(settings)), np.array([float(x.sample_time) for x in settings])
     )
     choices = search.levels(lanes, rounds=3)
-    found = []
+    there = np.flatnonzero(np.isfinite(choices.dhat))
+    found = _all_served(search, [settings[i] for i in there], choices[there], lanes[there])
+    return tuple(recipe for recipe in found if recipe is not None)
+
+
+def _all_served(
+    search: Search, settings: Sequence[Setting], choices: Choice, lanes: Lanes
+) -> Iterator[HardwareRecipe | None]:
+    """Choices of several machines as decimals; what is free at the first levels to be tried is chosen side by side."""
+    tried = [printed(each, choices[[i]], _LEAST_ROOM).level for i, each in enumerate(settings)]
+    _, first = search.least(lanes, np.array([float(level) for level in tried]))
     for i, each in enumerate(settings):
-        own = Choice(dhat=choices.dhat[[i]], omega=choices.omega[[i]], f0=choices.f0[[i]])
-        recipe = served(search, each, own) if np.isfinite(own.dhat[0]) else None
-        if recipe is not None:
-            found.append(recipe)
-    return tuple(found)
+        yield served(search, each, choices[[i]], first[[i]])
 
 
 def propose_hardware(problem: TubeProblem, asked: Asked) -> Proposal[HardwareRecipe]:

@@ -27,6 +27,8 @@ _LEVELS = 24
 _ZOOMS = 26
 _HAIR = 1 + 1e-12
 _TIE = 1e-7
+_STEEP = 200.0  # more than logarithms of what is needed change along the unit cube
+_FINE = 1e-3  # steps after which nothing finite will be found
 LEAST = 1e-15  # of what is 0 but for rounding
 _NOTHING_LOST = Rounding(
     feedback=Fraction(0), input=Fraction(0), estimate=Fraction(0), prediction=Fraction(0)
@@ -59,26 +61,30 @@ class Choice:
     omega: Array
     f0: Array
 
+    def __getitem__(self, index: object) -> Choice:
+        """Those of some of the lanes."""
+        return Choice(**{name: getattr(self, name)[index] for name in Choice.__slots__})
+
 
 def in_lanes(at: Lanes, dhat: Array, *, predicts: bool, rounding: tuple[Rounding, ...] = ()) -> Loop[Array]:
     """The loops of machines at levels, with nothing proven of Y, S, N and np, and the level for a floor."""
     zero = np.zeros(np.broadcast_shapes(at.Ts.shape, dhat.shape))
     ratio = np.maximum(at.Ts, at.Tf) / np.minimum(at.Ts, at.Tf)
     return Loop(
-        Ts=at.Ts + zero,
-        tau=at.tau + zero,
-        Tf=at.Tf + zero,
-        omega=at.omega + zero,
-        nu=at.nu + zero,
-        wbar=at.wbar + zero,
+        Ts=at.Ts,
+        tau=at.tau,
+        Tf=at.Tf,
+        omega=at.omega,
+        nu=at.nu,
+        wbar=at.wbar,
         dhat=dhat + zero,
         f0=dhat + zero,
         Y=zero,
         S=zero,
         N=zero,
         np=zero if predicts else None,
-        late=np.where(at.Tf > at.Ts, 1.0, 0.0) + zero,
-        off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0) + zero,
+        late=np.where(at.Tf > at.Ts, 1.0, 0.0),
+        off=np.where(np.abs(ratio - np.round(ratio)) > 1e-9, 1.0, 0.0),
         lost=lost_of(rounding, lambda q: np.asarray(float(q))),
     )
 
@@ -118,7 +124,7 @@ class Search:
             predicts=self.machine.asked.predict,
             rounding=self.rounding,
         )
-        loop = replace(loop, f0=chosen.f0 + 0 * loop.Ts)
+        loop = replace(loop, f0=chosen.f0)
         for _ in range(1 if loop.np is None else _PREDICTIONS):
             Y = self._least_speed(loop)
             loop = self._filtered(replace(loop, Y=Y))
@@ -171,40 +177,53 @@ class Search:
 
     def least(self, at: Lanes, dhat: Array | None = None) -> tuple[Array, Choice]:
         """The least `needed` per lane with a choice that has it; at a given dhat, or over dhat too."""
-        top = np.maximum(self.dbar - at.nu * float(self.plant.m.n_M), 1e-9 * self.dbar)
-        free = dhat is None
-
-        def chosen(point: Array) -> Choice:
-            level = (
-                top[:, None] * np.exp(-9 * point[0])
-                if dhat is None
-                else np.broadcast_to(dhat[:, None], point[0].shape)
-            )
-            return Choice(
-                dhat=level, omega=self._omegas(at[:, None], point[1]), f0=level * np.exp(-14 * point[2])
-            )
-
-        counts = (7 if free else 1, 13, 9)
-        axes = [(np.arange(k) + 0.5) / k if k > 1 else np.array([0.0]) for k in counts]
-        axes[1][-1] = 1.0
-        axes[0] = axes[0] - axes[0][0]
-        start = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])
-        lanes = np.arange(len(at.Ts))
-        points = np.repeat(start[:, None, :], len(lanes), axis=1)
-        steps = np.repeat(np.array([[0.5 / k] for k in counts]), len(lanes), axis=1)
-        best: Array = np.full(len(lanes), np.inf)
-        place = np.zeros((3, len(lanes)))
-        around = _AROUND_3 if free else _AROUND_2
-        for _ in range(_ZOOMS):
-            values = self.needed(at[:, None], chosen(points))
-            index = np.argmin(values, axis=1)
-            better = values[lanes, index] < best
-            best = np.where(better, values[lanes, index], best)
-            place = np.where(better, points[:, lanes, index], place)
-            steps = np.where(better, steps, 0.5 * steps)
-            points = np.clip(place[:, :, None] + steps[:, :, None] * around[:, None, :], 0.0, 1.0)
-        found = chosen(place[:, :, None])
+        best, place = self._zoomed(at, dhat, decides=False)
+        found = self._chosen(at, dhat, place[:, :, None])
         return best, Choice(dhat=found.dhat[:, 0], omega=found.omega[:, 0], f0=found.f0[:, 0])
+
+    def holds(self, at: Lanes, dhat: Array | None = None) -> Mask:
+        """Whether the least `needed` is below 1, per lane: no closer than that takes."""
+        return np.asarray(self._zoomed(at, dhat, decides=True)[0] < 1)
+
+    def _chosen(self, at: Lanes, dhat: Array | None, point: Array) -> Choice:
+        """Points of the unit cube (3, lanes, points) as choices (lanes, points)."""
+        top = np.maximum(self.dbar - at.nu * float(self.plant.m.n_M), 1e-9 * self.dbar)
+        level = (
+            top[:, None] * np.exp(-9 * point[0])
+            if dhat is None
+            else np.broadcast_to(dhat[:, None], point[0].shape)
+        )
+        return Choice(
+            dhat=level, omega=self._omegas(at[:, None], point[1]), f0=level * np.exp(-14 * point[2])
+        )
+
+    def _zoomed(self, at: Lanes, dhat: Array | None, *, decides: bool) -> tuple[Array, Array]:
+        """The least `needed` that is found and its place in the unit cube (3, lanes).
+
+        `decides`: a lane is left as soon as it is below 1, or so far above that smaller steps do not lead there.
+        """
+        count = len(at.Ts)
+        start, sizes = _grid(free=dhat is None)
+        around = _AROUND_3 if dhat is None else _AROUND_2
+        points = np.repeat(start[:, None, :], count, axis=1)
+        steps = np.repeat(sizes, count, axis=1)
+        best, place = np.full(count, np.inf), np.zeros((3, count))
+        left = np.arange(count)
+        for _ in range(_ZOOMS):
+            own, level, rows = at[left], None if dhat is None else dhat[left], np.arange(len(left))
+            values = self.needed(own[:, None], self._chosen(own, level, points))
+            index = np.argmin(values, axis=1)
+            least = values[rows, index]
+            better = least < best[left]
+            best[left] = np.where(better, least, best[left])
+            place[:, left] = np.where(better, points[:, rows, index], place[:, left])
+            steps[:, left] = np.where(better, steps[:, left], 0.5 * steps[:, left])
+            if decides:
+                left = left[_open(best[left], steps[:, left].max(axis=0))]
+                if not len(left):
+                    break
+            points = np.clip(place[:, left, None] + steps[:, left, None] * around[:, None, :], 0.0, 1.0)
+        return best, place
 
     def levels(self, at: Lanes, rounds: int = 4) -> Choice:
         """The least levels that are found, with their choices; NaN where there is none."""
@@ -229,8 +248,23 @@ class Search:
     def _holds(self, at: Lanes, dhat: Array) -> Mask:
         """Whether the theorem holds at levels, shape `(points, lanes)`."""
         repeated = at[np.tile(np.arange(dhat.shape[1]), dhat.shape[0])]
-        best, _ = self.least(repeated, dhat.ravel())
-        return np.asarray(best < 1).reshape(dhat.shape)
+        return self.holds(repeated, dhat.ravel()).reshape(dhat.shape)
+
+
+def _grid(*, free: bool) -> tuple[Array, Array]:
+    """Where zooms start, (3, points) of the unit cube, and their steps (3, 1); `free`: over levels, too."""
+    counts = (7 if free else 1, 13, 9)
+    axes = [(np.arange(k) + 0.5) / k if k > 1 else np.array([0.0]) for k in counts]
+    axes[1][-1] = 1.0
+    axes[0] = axes[0] - axes[0][0]
+    start = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])
+    return start, np.array([[0.5 / k] for k in counts])
+
+
+def _open(best: Array, step: Array) -> Mask:
+    """Where smaller steps may still tell whether the least value is below 1."""
+    far = np.where(np.isfinite(best), best * np.exp(-_STEEP * step) >= 1, step < _FINE)
+    return np.asarray(~((best < 1) | far))
 
 
 def _around(free: tuple[bool, ...]) -> Array:

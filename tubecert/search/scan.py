@@ -50,13 +50,15 @@ def smallest(test: Callable[[Array], Mask], low: float, high: float, points: int
     return float(boundary_log(test, grid[[first + 1]], grid[[first]])[0])
 
 
-def largest(test: Callable[[Array], Mask], low: Array, high: Array, points: int = 120) -> Array:
+def largest(
+    test: Callable[[Array], Mask], low: Array, high: Array, points: int = 120, rounds: int = 13
+) -> Array:
     """The largest x in [low, high] that passes, per lane; 0 where none does."""
     grid = np.geomspace(low, high, points)
     holds = test(grid)
     lanes = np.arange(grid.shape[1])
     last = points - 1 - np.argmax(holds[::-1], axis=0)
-    found = boundary_log(test, grid[last, lanes], grid[np.minimum(last + 1, points - 1), lanes])
+    found = boundary_log(test, grid[last, lanes], grid[np.minimum(last + 1, points - 1), lanes], rounds)
     return np.where(holds.any(axis=0), found, 0.0)
 
 
