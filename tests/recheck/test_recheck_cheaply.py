@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from flint import arb
 from rechecked import certified, examine, failing, sealed, terms
 from systems import SMALL
 
 from tubecert.errors import TubecertError
-from tubecert.recheck import relative
-from tubecert.recheck.curve import expressed
+from tubecert.recheck import constants, relative
+from tubecert.recheck.curve import CLOCK, Curve, Part, expressed
 from tubecert.recheck.place import Place
 from tubecert.recheck.relative import drift_difference, drift_difference_metric
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import number, replaced
+from tubecert.recheck.terms import number, replaced, variable
 from tubecert.recheck.turning import feedback_curvature
 
 # f_x = [[y, x], [x, -y]] - diag(1, 2): for W = I, T_v = 2 [[v_y, v_x], [v_x, -v_y]], |T_v| = 2 |v|
@@ -135,3 +137,22 @@ def test_a_start_on_a_plan_with_roots_is_on_it_exactly():
     (start,) = replaced([slant], {"t": number(Fraction(0))})
     assert start is number(Fraction(3, 10))
     assert replaced([slant], {"t": number(Fraction(1))})[0] is not number(Fraction(3, 10))
+
+
+@pytest.mark.parametrize("coarse", [0, 300])
+@pytest.mark.parametrize(("share", "holds"), [(1.01, True), (0.99, False)])
+def test_the_drift_along_knots_is_bounded_part_by_part(coarse, share, holds, monkeypatch):
+    """|f(x*(t) + z) + B u*(t)| over |z| <= 1/2, x* = (s, 0) and u* = s in the second part, which decides."""
+    monkeypatch.setattr(constants, "_SOME", coarse)
+    clock, slope = variable(CLOCK), variable("slope")
+    values = [{"slope": arb(0)}, {"slope": arb(1)}]
+    parts = tuple(Part(arb(i), arb(1), own) for i, own in enumerate(values))
+    moving = Curve((clock * slope, number(0)), (clock * slope,), parts, Fraction(2), (number(0), number(0)))
+    angle, s = np.meshgrid(np.linspace(0, 2 * np.pi, 721), np.linspace(0, 1, 101))
+    largest = 0.0
+    for radius in np.linspace(0, 0.5, 51):
+        x, y = s + radius * np.cos(angle), radius * np.sin(angle)
+        length = np.hypot(-x + x * y, -2 * y + (x**2 - y**2) / 2 + s)
+        largest = max(largest, float(length.max()))
+    where = replace(place(UNIT, 300), curve=moving)
+    assert constants.bounded(where, "drift_on_plan", Fraction(largest * share), None).holds == holds

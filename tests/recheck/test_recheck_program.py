@@ -1,8 +1,11 @@
 """What is not a number stays so through every operation of the checker: flint's own asin of it is a thin ball."""
 
+from fractions import Fraction
+
 import pytest
 from flint import arb
 
+from tubecert.recheck.balls import exact, power, square
 from tubecert.recheck.program import _KERNELS
 
 NOTHING = arb("nan")
@@ -23,3 +26,23 @@ def test_what_is_not_a_number_stays_so(name):
 def test_a_direction_lies_between_minus_one_and_one_whatever_is_known():
     found = _KERNELS["direction"]([NOTHING, arb(1)], 0)
     assert found.is_nan() or (found.contains(-1) and found.contains(1))
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, -1, -3])
+def test_a_power_of_a_wide_positive_ball_is_positive_and_reaches_from_end_to_end(n):
+    wide = arb(1).union(arb(50))  # a product of such balls reaches below 0
+    found = power(wide, n)
+    low, high = sorted((Fraction(1) ** n, Fraction(50) ** n))
+    assert found > 0
+    assert float(found.lower()) <= low <= low + Fraction(1, 1000) * high
+    assert high <= float(found.upper()) <= high * Fraction(1001, 1000)
+    for q in (Fraction(1), Fraction(3, 2), Fraction(7), Fraction(99, 2), Fraction(50)):
+        assert found.contains(exact(q**n))
+
+
+def test_a_square_is_positive_on_either_side_of_nought():
+    for sign in (1, -1):
+        wide = arb(sign).union(arb(50 * sign))
+        assert 0.99 < float(square(wide).lower()) <= 1
+        assert 2500 <= float(square(wide).upper()) < 2501
+    assert square(arb(-1).union(arb(50))).contains(0)

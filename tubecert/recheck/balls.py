@@ -52,20 +52,25 @@ def square(x: arb) -> arb:
     if x.contains(0):
         top = magnitude(x)
         return between(0, top * top)
-    return x * x
+    found = x * x
+    if found.contains(0):  # of a wide ball: a product of balls loses what is known of its sign
+        return between((x.abs_lower() * x.abs_lower()).lower(), (x.abs_upper() * x.abs_upper()).upper())
+    return found
 
 
 def power(x: arb, n: int) -> arb:
     """x^n for an integer n by multiplication (flint's own power of a ball around 0 is not a number)."""
     if n < 0:
         return arb(1) / power(x, -n)
-    result, factor = arb(1), x
-    while n:
-        if n & 1:
+    result, factor, left = arb(1), x, n
+    while left:
+        if left & 1:
             result = result * factor
-        n >>= 1
-        if n:
+        left >>= 1
+        if left:
             factor = square(factor)
+    if x > 0 and result.contains(0) and x.lower() < x.upper():  # the same: x^n increases there
+        return between(power(x.lower(), n).lower(), power(x.upper(), n).upper())
     return result
 
 

@@ -55,6 +55,7 @@ _ROUND_UP = 1 + Fraction(
     1, 10**15
 )  # the end of a ball as the float next to it: off by 2^-53 of itself at most
 _FIRST = 500  # boxes before another way is tried
+_SOME = 2_000  # before the tube is examined part by part of the plan
 _FEW = 4  # variables in which boxes are poor
 
 
@@ -163,8 +164,12 @@ def _drift(place: Place, limit: Fraction) -> Outcome:
     """phi, (2.4)."""
     s, curve = place.system, place.curve
     drift = place.fields.drift
-    if curve.moves and len(curve.parts) == 1:
-        return prove(NormsBelow([place.around_plan(drift)], limit, place.numbers), place.ball(), place.budget)
+    if curve.moves and not curve.ranges:
+        many = len(curve.parts) > 1
+        found = prove(norms_below([drift], limit), place.tube(), min(place.budget, _SOME)) if many else None
+        return (
+            found if found is not None and found.verdict != "undecided" else place.beside_plan(drift, limit)
+        )
     if not curve.moves:
         drift = matrix_replaced(drift, dict(zip(s.inputs, curve.u, strict=True)))
     return _norms(place, [drift], limit)

@@ -13,7 +13,7 @@ from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.coordinates import Coordinates, Fields
 from tubecert.recheck.cover import Boxed, Outcome, prove
-from tubecert.recheck.curve import CLOCK, SINCE, SKIPPED, Curve, expressed
+from tubecert.recheck.curve import CLOCK, SINCE, SKIPPED, Curve, Part, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
@@ -87,15 +87,29 @@ class Place:
         return {TIME: variable(CLOCK) + number(begin)}
 
     def around_plan(self, rows: Rows) -> Matrix:
-        """A matrix in s and in x - x*, for a plan of one part: the tube stays there, whatever the plan does."""
+        """A matrix in s and in x - x*, for every part of a plan: the tube stays there, whatever the plan does."""
         offsets = [variable(name) + x for name, x in zip(self._offsets, self.curve.x, strict=True)]
         s = self.system
         values = dict(zip((*s.states, *s.inputs), (*offsets, *self.curve.u), strict=True))
         return matrix_replaced(rows, values | self._clock)
 
+    def beside_plan(self, rows: Rows, limit: Fraction) -> Outcome:
+        """|G| <= limit in s and in x - x*, on every part of the plan."""
+        whole = NormsBelow([self.around_plan(rows)], limit, self.numbers)
+        outcomes: list[Outcome] = []
+        for part in self.curve.parts:
+            outcomes.append(prove(whole.with_values(part.values), self._ball_of(part), self.budget))
+            if not outcomes[-1].holds:
+                break
+        return together(outcomes)
+
     def ball(self) -> Tube:
-        """The tube in s and in x - x*."""
+        """The tube in s and in x - x*, of a plan of one part."""
         (part,) = self.curve.parts
+        return self._ball_of(part)
+
+    def _ball_of(self, part: Part) -> Tube:
+        """The tube around one part, in its s and in x - x*."""
         nothing = [number(0)] * len(self.system.states)
         return Tube(
             expressed(nothing, (), TIME, None),
