@@ -23,63 +23,65 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.options import DefaultOptions
 
 from tubecert.progress import Phase, Progress, Step
+from tubecert.simulate.parts import EntryCompiler, PartCompiler
 from tubecert.simulate.sealed import SealedFile
 
 Kernel: TypeAlias = Callable[..., Any]  # a function of whatever numba compiles it for
+_njit: Any = numba.njit
 _NAMES: list[str] = []  # of all kernels
 # Kernels make no arrays, and their callers hold those that they work on: without counting references, which numba does
 # atomically for every member of every tuple, the loops are twice as fast.
-_UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+_COMMON: dict[str, object] = {
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+    **({"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}),
+}
 KERNELS = (
     "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "machine",
-    "stepping", "walking", "compiled",
+    "stepping", "walking", "compiled", "parts", "pointed",
 )  # fmt: skip
 
 
 def compiled(function: Kernel) -> Kernel:
-    """The function compiled when another kernel first needs it; it cannot be called from Python.
-
-    Without the wrappers that a call from Python needs, half of the compilation is saved.
-    """
-    return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """The function as a part of what other kernels call; it cannot be called from Python."""
+    return _part(function)
 
 
 def folded(function: Kernel) -> Kernel:
-    """The same, made a part of each kernel that calls it, which should be one or two.
-
-    A call passes every member of every tuple, hundreds of words, which costs more than most of these functions do.
-    """
-    return _kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+    """The same, made a part of each kernel that calls it, which should be one or two."""
+    return _part(function, forceinline=True)
 
 
 def entry(function: Kernel) -> Kernel:
-    """The function compiled when first called from Python; it runs without the GIL."""
-    return _kernel(function, nogil=True, no_cfunc_wrapper=True)
+    """The function compiled when first called from Python, with all that it calls; it runs without the GIL.
 
-
-def inlined(function: Kernel) -> Kernel:
-    """The function, written out wherever a kernel calls it."""
-    compiler: Any = numba.njit
-    return compiler(inline="always")(function)  # type: ignore[no-any-return]
-
-
-def _kernel(function: Kernel, **options: bool) -> Kernel:
-    """Numba finds a folder for the machine code: beside the package, or in the user's cache.
+    Numba finds a folder for the machine code: beside the package, or in the user's cache.
 
     It would trust every file there that is not older than the function's own source. Kernels call each other across
     files, so what counts here is the content of all of them, and the seal.
     """
     _NAMES.append(function.__name__)
-    compiler: Any = numba.njit
+    options = {**_COMMON, "pipeline_class": EntryCompiler, "nogil": True}
     try:
-        kernel: Any = compiler(cache=True, error_model="numpy", **_UNCOUNTED, **options)(function)
+        kernel: Any = _njit(cache=True, **options)(function)
         folder, name = kernel._cache.cache_path, kernel._cache._impl.filename_base
         if not isinstance(kernel._cache._cache_file, IndexDataCacheFile):
             raise TypeError("this numba keeps its files in another way")
         kernel._cache._cache_file = SealedFile(Path(folder) / f"{name}.kernel", _stamp())
     except (RuntimeError, AttributeError, TypeError):  # nowhere to write: compile in every process
-        kernel = compiler(error_model="numpy", **_UNCOUNTED, **options)(function)
+        kernel = _njit(**options)(function)
     return kernel  # type: ignore[no-any-return]
+
+
+def inlined(function: Kernel) -> Kernel:
+    """The function, written out wherever a kernel calls it."""
+    return _njit(inline="always")(function)  # type: ignore[no-any-return]
+
+
+def _part(function: Kernel, **options: bool) -> Kernel:
+    _NAMES.append(function.__name__)
+    part = {**_COMMON, "pipeline_class": PartCompiler, "no_cpython_wrapper": True}
+    return _njit(**part, **options)(function)  # type: ignore[no-any-return]
 
 
 @contextmanager
@@ -92,7 +94,7 @@ def told(report: Progress | None) -> Iterator[None]:
 
     tell, done = report, set()
 
-    class Listener(event.Listener):
+    class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
             function = event.data["dispatcher"].py_func
             if function.__module__.startswith(__package__):

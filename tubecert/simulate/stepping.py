@@ -20,6 +20,7 @@ from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, e
 from tubecert.simulate.geodesic import FOUND, copied, forget
 from tubecert.simulate.layout import Layout, blocks
 from tubecert.simulate.machine import SAMPLE, Machine, Notes, attend, begin, carry, notes
+from tubecert.simulate.pointed import pointed
 from tubecert.simulate.program import Index
 from tubecert.simulate.small import copy, dot
 
@@ -123,6 +124,7 @@ def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
     """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
     at, forces = fast.at, fast.forces
     n, m, Y = at.n, at.m, at.size
+    sizes = n, m, shared.E.shape[1]
     return Work(
         x=np.zeros(n),
         state=np.zeros(n),
@@ -134,12 +136,7 @@ def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
         stages=Stages(np.zeros((4, forces)), np.zeros((4, n, m)), np.zeros((4, n))),
         kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
         notes=notes(n, m, waiting),
-        point=point(
-            shared.memory.copy(),
-            copied(shared.curve),
-            (n, m, shared.E.shape[1]),
-            uncertain=shared.gain.shape[0] > 0,
-        ),
+        point=point(shared.memory.copy(), copied(shared.curve), sizes, uncertain=shared.gain.shape[0] > 0),
         inner=inner(at, forces),
     )
 
@@ -170,6 +167,12 @@ def output(lanes: int, K: int, at: Layout) -> Output:
 @entry
 def run(first: int, last: int, own: Lane, starts: Array, work: Work, out: Output) -> None:
     """Runs the lanes first..last-1 from `starts` (N, n)."""
+    _run(first, last, pointed(own), starts, pointed(work), pointed(out))
+
+
+@compiled
+def _run(first: int, last: int, own: Lane, starts: Array, work: Work, out: Output) -> None:
+    """The same for what is pointed to."""
     for lane in range(first, last):
         copy(work.x, starts[lane])
         work.y[:] = 0.0
