@@ -11,6 +11,7 @@ import rechecked
 from tubecert.recheck import constants
 from tubecert.recheck.blocks import blocks
 from tubecert.recheck.curve import expressed
+from tubecert.recheck.norms import norms
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import NOUGHT, number
 
@@ -49,5 +50,5 @@ def test_a_slope_that_is_largest_on_a_plane(above):
 
 def test_the_largest_part_decides():
     matrix = [[*terms("cos(x)/2"), NOUGHT, NOUGHT], [NOUGHT, *terms("2*cos(y)", "sin(y)")]]
-    assert constants._norms(place(), [matrix], Fraction(201, 100)).verdict == "confirmed"
-    assert constants._norms(place(), [matrix], Fraction(199, 100)).verdict == "contradicted"
+    assert norms(place(), [matrix], Fraction(201, 100)).verdict == "confirmed"
+    assert norms(place(), [matrix], Fraction(199, 100)).verdict == "contradicted"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from tubecert.recheck.branches import norms_below
-from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated, together
+from tubecert.recheck.norms import norms
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import (
     number,
@@ -37,7 +37,7 @@ def clips(place: Place, box: Sequence[tuple[Fraction, Fraction]], bound: Fractio
         shifted = [[[own - number((low + high) / 2)]]]
         if more is not None:
             shifted.append([more[i]])
-        outcomes.append(prove(norms_below(shifted, (high - low) / 2), place.tube(), place.budget))
+        outcomes.append(norms(place, shifted, (high - low) / 2))
         if not outcomes[-1].holds:
             break
     return together(outcomes)

@@ -18,7 +18,6 @@ from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Boxed, Outcome, prove
 from tubecert.recheck.family import Everyone
 from tubecert.recheck.identity import vanish
-from tubecert.recheck.linear import straight_below
 from tubecert.recheck.lipschitz import LipschitzBelow
 from tubecert.recheck.metric import (
     adjugate,
@@ -28,7 +27,7 @@ from tubecert.recheck.metric import (
     together,
     upper_bound,
 )
-from tubecert.recheck.multiplier import column_below
+from tubecert.recheck.norms import norms
 from tubecert.recheck.pencils import GainBelow, LeastGain, SlopesBelow
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
@@ -36,7 +35,6 @@ from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinit
 from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,
-    Rows,
     Term,
     all_zero,
     in_order,
@@ -54,9 +52,7 @@ from tubecert.recheck.wind import added_to, least_sum
 _ROUND_UP = 1 + Fraction(
     1, 10**15
 )  # the end of a ball as the float next to it: off by 2^-53 of itself at most
-_FIRST = 500  # boxes before another way is tried
 _SOME = 2_000  # before the tube is examined part by part of the plan
-_FEW = 4  # variables in which boxes are poor
 
 
 def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) -> Outcome:
@@ -75,28 +71,6 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
             return Outcome(verdict="undecided", why="|B| or the metric has no bound")
         return feedback_gain(place, limit, largest)
     return _CLAIMS[name](place, limit)
-
-
-def _norms(place: Place, matrices: Sequence[Rows], limit: Fraction) -> Outcome:
-    parts = blocks(matrices[0]) if len(matrices) == 1 else []
-    if len(parts) > 1:
-        return together([_norms(place, [part], limit) for part in parts])
-    test = norms_below(matrices, limit)
-    found = prove(test, place.tube(), min(place.budget, _FIRST))
-    if found.verdict != "undecided" or place.budget <= _FIRST:
-        return found
-    if len(matrices) == 1 and len(matrices[0][0]) == 1 and not place.curve.moves and not place.curve.ranges:
-        straight = (
-            straight_below(place, [row[0] for row in matrices[0]], limit)
-            if len(test.variables) >= _FEW
-            else None
-        )
-        if straight is not None:
-            return straight
-        eased = column_below(place, [row[0] for row in matrices[0]], limit)
-        if eased is not None and eased.holds:
-            return eased
-    return prove(test, place.tube(), place.budget)
 
 
 def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
@@ -172,7 +146,7 @@ def _drift(place: Place, limit: Fraction) -> Outcome:
         )
     if not curve.moves:
         drift = matrix_replaced(drift, dict(zip(s.inputs, curve.u, strict=True)))
-    return _norms(place, [drift], limit)
+    return norms(place, [drift], limit)
 
 
 def _metric_input_gain(place: Place, limit: Fraction) -> Outcome:
@@ -261,7 +235,7 @@ def _with_known(place: Place, room: Fraction, name: str, entries: Matrix, added:
     if room < 0:
         return stated(False, "it is below what is declared")
     if name == "h":
-        return prove(norms_below([entries, *added], room), place.tube(), place.budget)
+        return norms(place, [entries, *added], room)
     if name == "h_t":
         return prove(slopes_below(entries, TIME, room, added), place.tube(), place.budget)
     most = least_sum(added, place, room) if added else Fraction(0)
@@ -291,7 +265,7 @@ def _adapted(place: Place, limit: Fraction, name: str) -> Outcome:
         return _own_uncertainty(place, limit, name)
     if s.h is not None and name not in s.declared and name != "h_x":
         if name == "h":
-            return _norms(place, [s.h, *added], limit)
+            return norms(place, [s.h, *added], limit)
         return prove(slopes_below(s.h, TIME, limit, added), place.tube(), place.budget)
     most = least_sum(added, place, limit)
     if most is None:
@@ -311,7 +285,7 @@ def _own_uncertainty(place: Place, limit: Fraction, name: str) -> Outcome:
         return _lipschitz(place, [row[0] for row in s.h], limit)
     if name == "h_t":
         return prove(slopes_below(s.h, TIME, limit), place.tube(), place.budget)
-    return _norms(place, [s.h], limit)
+    return norms(place, [s.h], limit)
 
 
 def _lipschitz(place: Place, h: Sequence[Term], limit: Fraction) -> Outcome:
@@ -333,13 +307,13 @@ def _covers(limit: Fraction, place: Place, name: str) -> bool:
 
 
 _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {
-    "f": lambda p, t: _norms(p, [p.fields.f], t),
-    "f_x": lambda p, t: _norms(p, [p.fields.f_x], t),
-    "B": lambda p, t: _norms(p, [p.fields.B], t),
-    "B_x": lambda p, t: _norms(p, p.fields.slopes(p.fields.B), t),
-    "b_x": lambda p, t: _norms(p, p.fields.b_x, t),
+    "f": lambda p, t: norms(p, [p.fields.f], t),
+    "f_x": lambda p, t: norms(p, [p.fields.f_x], t),
+    "B": lambda p, t: norms(p, [p.fields.B], t),
+    "B_x": lambda p, t: norms(p, p.fields.slopes(p.fields.B), t),
+    "b_x": lambda p, t: norms(p, p.fields.b_x, t),
     "B_pinv": _left_inverse,
-    "B_pinv_x": lambda p, t: _norms(p, _left_inverse_slopes(p.fields), t),
+    "B_pinv_x": lambda p, t: norms(p, _left_inverse_slopes(p.fields), t),
     "M_x": _metric_slope,
     "u_star": _input_on_plan,
     "h": lambda p, t: _uncertainty(p, t, "h"),

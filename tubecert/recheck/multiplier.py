@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import product
 
 from flint import arb
 
@@ -23,21 +24,28 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.terms import NOUGHT, Term, in_order, names, number, slopes, variable
 
 _ASCENTS = 60
+_BESIDE = 16  # points of what the constraint does not contain, less one
 
 
-def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outcome | None:
-    """|G| <= limit over the tube of a plan that stays where it is; None if there is no multiplier that helps."""
+def column_below(place: Place, column: Sequence[Term], limit: Fraction, budget: int) -> Outcome | None:
+    """|G| <= limit over the tube of a plan that stays where it is; None if there is no multiplier that helps.
+
+    G may also depend on t and on what is known by ranges, which the constraint of the tube does not contain.
+    """
     if any(e.op in ("norm", "direction", "table") for e in in_order(column)):
         return None  # no curvature
     square = sum((e * e for e in column), start=NOUGHT)
-    variables = tuple(sorted(names([square])))
     centre = dict(zip(place.system.states, place.curve.start, strict=True))
-    if not variables or not set(variables) <= set(centre):
+    found = sorted(names([square]))
+    variables = tuple(v for v in found if v in centre)
+    beside = tuple(v for v in found if v not in centre)
+    if not variables or set(beside) & set(place.system.inputs):
         return None
     own = [centre[v] for v in variables]
     which = [place.system.states.index(v) for v in variables]
     middle = [float(x.mid()) for x in Program(own, ()).run(())]
-    share = _multiplier(square, variables, middle, place.around.directions(which), float(place.rho))
+    values = _Square(square, variables, beside, middle, place.around.directions(which))
+    share = _multiplier(values, float(place.rho), _samples(place, beside))
     if share is None:
         return None
     offsets = [variable(v) - x for v, x in zip(variables, own, strict=True)]
@@ -49,33 +57,66 @@ def column_below(place: Place, column: Sequence[Term], limit: Fraction) -> Outco
     )
     inside = number(place.rho**2) - sum(products, start=NOUGHT)
     test = QuadraticNotNegative(number(limit**2) - square - number(share) * inside)
-    return prove(test, place.tube(), place.budget)
+    return prove(test, place.tube(), budget)
 
 
-def _multiplier(
-    square: Term, variables: tuple[str, ...], centre: list[float], C: list[list[float]], rho: float
-) -> Fraction | None:
+class _Square:
+    """|G|^2 and its slopes along d at x = x* + C d, in floats; `beside` are what else it depends on."""
+
+    def __init__(
+        self,
+        square: Term,
+        variables: tuple[str, ...],
+        beside: tuple[str, ...],
+        centre: list[float],
+        C: list[list[float]],
+    ) -> None:
+        self.count = len(variables)
+        self._centre, self._C = centre, C
+        self._program = Program([square, *(slopes([square], v)[0] for v in variables)], (*variables, *beside))
+
+    def at(self, d: list[float], beside: tuple[float, ...]) -> tuple[float, list[float]]:
+        """The value and the slopes."""
+        offset = [sum(c * x for c, x in zip(row, d, strict=True)) for row in self._C]
+        at = [*(c + x for c, x in zip(self._centre, offset, strict=True)), *beside]
+        value, *slope = (float(y.mid()) for y in self._program.run([arb(x) for x in at]))
+        return value, [
+            sum(row[j] * g for row, g in zip(self._C, slope, strict=True)) for j in range(self.count)
+        ]
+
+
+def _samples(place: Place, beside: tuple[str, ...]) -> list[tuple[float, ...]]:
+    """Points of what the constraint does not contain, on one diagonal of its box: a proposal."""
+    if not beside:
+        return [()]
+    ((box, _),) = place.tube().start(beside)
+    return [tuple(lo + (hi - lo) * k / _BESIDE for lo, hi in box) for k in range(_BESIDE + 1)]
+
+
+def _multiplier(square: _Square, rho: float, samples: list[tuple[float, ...]]) -> Fraction | None:
     """L with grad |G|^2 = 2 L Q (x - x*) at the largest |G|^2 that is found on x - x* = C d, |d| = rho."""
-    program = Program([square, *(slopes([square], v)[0] for v in variables)], variables)
+    starts = []
+    for start in range(2 * square.count):
+        d = [0.1 * rho] * square.count
+        d[start // 2] = rho if start % 2 else -rho
+        starts.append(d)
+    beside = samples[0]
+    if len(samples) > 1:  # the ascent leaves them as they are
+        largest = max(product(starts, samples), key=lambda pair: square.at(*pair)[0])
+        starts, beside = [largest[0]], largest[1]
     best = -math.inf
     share = 0.0
-    for start in range(2 * len(variables)):
-        d = [0.1 * rho] * len(variables)
-        d[start // 2] = rho if start % 2 else -rho
-        value, product = -math.inf, 0.0
+    for first in starts:
+        d, value, along = first, -math.inf, 0.0
         for _ in range(_ASCENTS):
-            offset = [sum(c * x for c, x in zip(row, d, strict=True)) for row in C]
-            value, *slope = (
-                float(y.mid()) for y in program.run([arb(c + x) for c, x in zip(centre, offset, strict=True)])
-            )
-            slope = [sum(row[j] * g for row, g in zip(C, slope, strict=True)) for j in range(len(d))]
+            value, slope = square.at(d, beside)
             size = math.hypot(*slope)
             if not 0 < size < math.inf:
                 break
-            product = sum(g * x for g, x in zip(slope, d, strict=True))
+            along = sum(g * x for g, x in zip(slope, d, strict=True))
             d = [rho * g / size for g in slope]
         if value > best:
-            best, share = value, product / (2 * rho * rho)
+            best, share = value, along / (2 * rho * rho)
     return Fraction(share) if 0 < share < math.inf else None
 
 

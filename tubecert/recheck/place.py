@@ -51,6 +51,11 @@ class Place:
         return Fields(self.system, self.coordinates)
 
     @cached_property
+    def known(self) -> dict[object, tuple[Fraction, Outcome]]:
+        """What was confirmed over this tube: terms, the least limit so far, and its outcome (`norms`)."""
+        return {}
+
+    @cached_property
     def around(self) -> Round | Ellipsoid:
         """The tube around one point of the plan."""
         if self.coordinates is None or self.sides is None:
