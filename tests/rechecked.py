@@ -84,10 +84,15 @@ def failing(found: Recheck) -> list[tuple[str, str]]:
     return [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds]
 
 
+def doubted(document: Document) -> bool:
+    """Whether a claim of a certificate does not hold; the rest is not examined."""
+    return bool(failing(examine(document, to_first_failure=True)))
+
+
 def unconfirmed(document: Document) -> bool:
     """Whether a forged certificate, sealed again, is not confirmed: not of the form, or a claim that does not hold."""
     try:
-        return bool(failing(examine(sealed(document), to_first_failure=True)))
+        return doubted(sealed(document))
     except TubecertError:
         return True
 

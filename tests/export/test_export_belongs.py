@@ -225,7 +225,7 @@ def test_a_constant_that_is_no_float_is_refused_in_single_precision():
 @pytest.mark.slow
 def test_windows_along_a_plan_of_the_planner(tmp_path):
     """Of the windows in its tube the code needs to know nothing: the loop is the same in all of them."""
-    data = proven.shipped("two_state_windows")
+    data = proven.shipped("two_state_windows", bare=True)
     own = certification_of(data).certificate
     controller = controller_of(own)
     assert f"{float(controller.level):.9g}" == f"{float(data['result']['hardware']['level']):.9g}"

@@ -141,7 +141,7 @@ def test_simulation_compares_with_the_level_of_each_time():
 
 @pytest.mark.slow
 def test_the_fast_transfer_at_500_hz():
-    own = proven.shipped("two_state_windows")["result"]["hardware"]
+    own = proven.shipped("two_state_windows", bare=True)["result"]["hardware"]
     assert own["verdict"] == "certified"
     assert own["radius"] < 0.056  # without windows .372; ten of equal length: .070
     assert own["windows"][-1]["radius"] < 0.032

@@ -13,7 +13,8 @@ from fractions import Fraction
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from rechecked import certified, examine, failing, respecified, sealed
+from rechecked import OUTCOMES, certified, examine, failing, respecified, sealed
+from shared import once
 from systems import SMALL
 
 from tubecert import certificate, pipeline, spec
@@ -40,8 +41,10 @@ def plans(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plans")
     (folder / "plan.csv").write_text(ROWS, encoding="utf-8")
     path = folder / "small.yaml"
-    path.write_text(SMALL.replace(PLAN, "trajectory: {kind: csv, file: plan.csv}"), encoding="utf-8")
-    result = pipeline.certify(spec.load(path), pipeline.Options(conditions="distance")).to_json()
+    text = SMALL.replace(PLAN, "trajectory: {kind: csv, file: plan.csv}")
+    path.write_text(text, encoding="utf-8")
+    options = pipeline.Options(conditions="distance")
+    result = once(lambda: pipeline.certify(spec.load(path), options).to_json(), text, ROWS, options)
     moving = SMALL.replace(PLAN, MOVING).replace(START, "initial_state: {at: [0.05, 0.1]}")
     return {
         "expressions": certified(moving, conditions="distance"),
@@ -294,14 +297,29 @@ HARMLESS = (
 )
 
 
+# what a kind of plan may read in a way of its own; all else is taken out of the first certificate that has it
+OF_THE_PLAN = tuple(
+    f"result.{section}" for section in ("assumptions", "claim", "plan", "spec.effective.trajectory")
+)
+MISSING = ["expressions", "csv", "ilqr", "small"]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["expressions", "csv", "ilqr", "small"])
+@pytest.mark.parametrize("kind", MISSING)
 def test_a_member_that_is_missing_is_refused(plans, kind):
     """No key has a default that could help a claim."""
     document, memory = copy.deepcopy(examples(plans)[kind]), {}
+    before = {
+        path
+        for other in MISSING[: MISSING.index(kind)]
+        for path, _, _ in removable(examples(plans)[other])
+        if not path.startswith(OF_THE_PLAN)
+    }
     examine(document, 2_000, memory)
     accepted, seen, codes = [], 0, set()
     for path, holder, key in list(removable(document)):
+        if path in before:
+            continue
         value = holder.pop(key)
         seen += 1
         try:
@@ -314,8 +332,9 @@ def test_a_member_that_is_missing_is_refused(plans, kind):
             codes.add(error.findings[0].code)
         holder[key] = value
     assert [path for path in accepted if not path.endswith((".at", ".t"))] == []
-    assert codes == {"TC601", "TC603"}
-    assert seen > 250
+    assert "TC603" in codes
+    assert ("TC601" in codes) == (not before)  # what makes it a certificate at all
+    assert seen > (20 if before else 250)
 
 
 # -- numbers -------------------------------------------------------------------------------------------------------
@@ -370,9 +389,9 @@ PLACES = [
 @pytest.mark.parametrize("place", PLACES, ids=".".join)
 def test_a_number_that_is_none_is_refused_at_once(place):
     """R9: 1e-999999999 hung, integers of 4000 digits and 1e308 were internal errors."""
-    document, memory = certified(SMALL), {}
-    examine(document, 500, memory)
-    holder = document["result"]
+    document = certified(SMALL)
+    examine(document, 500)
+    holder, memory = document["result"], OUTCOMES[500]
     for key in place[:-1]:
         holder = holder[key]
     if isinstance(holder[place[-1]], list):

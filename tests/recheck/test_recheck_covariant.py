@@ -115,7 +115,7 @@ MACHINE = "\nhardware: {rate: 1000, delay: 0.0002, noise: 0.0001}\n"
 
 @pytest.fixture(scope="module")
 def honest():
-    document = certified(MOVING + MACHINE, conditions="hardware")
+    document = certified(MOVING + MACHINE, conditions="hardware", gap=Fraction(1, 5))
     assert document["result"]["verdict"] == "certified", document["result"]["reasons"]
     return document, {}
 

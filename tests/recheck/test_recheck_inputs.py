@@ -27,13 +27,12 @@ metric: {dual_metric: [[1]], rate: 0.9}
 """
 LIMITS = "limits: {u: [-2, 2.5]}\n"
 KINDS = ("no_adaptation", "conditions_26", "distance", "sampled")
-MEMORY = {}
 
 
 def refused(document):
     """Whether a forged certificate, sealed again, is not confirmed."""
     try:
-        return bool(failing(examine(sealed(document), memory=MEMORY, to_first_failure=True)))
+        return bool(failing(examine(sealed(document), to_first_failure=True)))
     except TubecertError:
         return True
 
@@ -50,7 +49,7 @@ def test_every_kind_is_confirmed_with_its_bounds(made):
     (own,) = result["inputs"]
     assert (own["input"], own["limits"], own["verdict"]) == ("u", [-2.0, 2.5], "certified")
     assert set(own["bounds"]) == set(KINDS)
-    assert not failing(examine(made, memory=MEMORY))
+    assert not failing(examine(made))
     for key, bound in own["bounds"].items():
         added = bound["feedback"] + bound["adaptation"]
         assert bound["least"] == pytest.approx(own["plan"]["least"][0] - added, abs=1e-8)
@@ -174,7 +173,7 @@ def test_a_kind_that_does_not_decide_may_miss_the_limits(made):
     bounds = alone["result"]["inputs"][0]["bounds"]
     assert bounds["no_adaptation"]["greatest"] < 0.35 < bounds["distance"]["greatest"]
     assert alone["result"]["verdict"] == "certified"
-    assert not failing(examine(alone, memory=MEMORY))
+    assert not failing(examine(alone))
     result = certified(text, conditions="distance")["result"]
     assert result["verdict"] == "undecided"
     (reason,) = (r for r in result["reasons"] if r["claim"] == "input_within_limits")
@@ -271,7 +270,7 @@ def test_the_range_that_H_proves_is_what_its_limits_are_compared_with(machine):
     own = bound(result, "hardware")
     assert [own["least"], own["greatest"]] == result["hardware"]["inputs"]["u"]
     assert 0.1 < own["greatest"] < 0.2 < bound(result, "distance")["greatest"]
-    assert not failing(examine(machine, memory=MEMORY))
+    assert not failing(examine(machine))
     narrower = certified(SMALL + MACHINE.replace("0.2]", "0.15]"), conditions="hardware")["result"]
     assert narrower["hardware"]["verdict"] == "certified"
     assert narrower["verdict"] == "undecided"
@@ -292,7 +291,7 @@ def test_wind_is_a_part_of_the_distance_that_the_feedback_answers():
         certified(SMALL + extra + "limits: {u: [-4, 4]}\n", conditions="0")
         for extra in ("", 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n')
     )
-    assert not failing(examine(windy, memory=MEMORY))
+    assert not failing(examine(windy))
     own, other = (bound(made["result"], "no_adaptation")["feedback"] for made in (calm, windy))
     assert other > own * 1.01
     forged = copy.deepcopy(windy)

@@ -6,7 +6,7 @@ import copy
 
 import pytest
 from flint import arb
-from rechecked import certified, examine, failing, respecified, sealed, terms
+from rechecked import certified, doubted, examine, failing, respecified, sealed, terms
 from systems import SMALL
 
 from tubecert.enclosure.tape import Tape
@@ -51,7 +51,7 @@ def test_another_function_is_not_confirmed(old, new):
         f, h = effective["system"]["f"], effective["uncertainty"]["h"]
         f[1], h[0] = f[1].replace(old, new), h[0].replace(old, new)
 
-    assert failing(examine(respecified(document, changed)))
+    assert doubted(respecified(document, changed))
 
 
 BOX = SMALL.replace("{at: [0.05, 0]}", "{box: {x: [-0.03, 0.05], y: [-1 deg, 1 deg]}}")
