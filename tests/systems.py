@@ -176,6 +176,13 @@ hardware: {rate: 200, noise: 0.001}
 conditions: {decides: H}
 """
 
+# a machine with noise of each state, in a wind
+BLOWN = (
+    SMALL
+    + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
+    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
+)
+
 # any plan of the two-state system in a box
 FAMILY_TWO = """
 tubecert: 1

@@ -146,10 +146,10 @@ def test_a_change_without_the_hash_is_contradicted(shipped):
 )
 def test_what_is_certified_shows_no_point_and_advises_nothing_that_would_serve(shipped, member):
     """A report would print it beside the verdict, and nobody has examined it."""
-    document, memory = copy.deepcopy(shipped(THREE)), {}
-    assert examine(sealed(document), 2_000, memory).exit_code == ExitCode.CERTIFIED
+    document = copy.deepcopy(shipped(THREE))
+    assert examine(sealed(document)).exit_code == ExitCode.CERTIFIED
     document["result"]["reasons"][0] |= member
-    found = examine(sealed(document), 2_000, memory)
+    found = examine(sealed(document))
     assert found.exit_code == ExitCode.NOT_CERTIFIED
     assert found.failing.name == "the verdict follows from the sections"
 
@@ -221,7 +221,7 @@ BUGS = {
 def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
     place, name, broken, claims = BUGS[bug]
     system = spec.load_text(SMALL)
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, proven.barely():
         patch.setattr(place, name, broken)
         result = pipeline.certify(system, pipeline.Options(conditions="all")).to_json()
     assert result["verdict"] == "certified", "the bug must pass the producer to be of interest"
@@ -295,7 +295,7 @@ def other_metric(effective):
     ids=["uncertainty", "dynamics", "start", "metric"],
 )
 def test_a_certificate_forged_for_another_system_fails_by_name(shipped, change, claim):
-    found = examine(respecified(shipped(THREE), change), 5_000)
+    found = examine(respecified(shipped(THREE), change), 5_000, to_first_failure=True)
     assert found.exit_code == ExitCode.NOT_CERTIFIED
     assert claim in found.failing.name
 
@@ -324,8 +324,8 @@ def test_a_refuted_metric_is_confirmed_at_its_witness():
 
 @pytest.mark.slow
 def test_as_printed_formulas_never_certify():
-    options = pipeline.Options(formulas="as-printed")
-    result = pipeline.certify(spec.load(THREE), options).to_json()
+    with proven.barely():
+        result = pipeline.certify(spec.load(THREE), pipeline.Options(formulas="as-printed")).to_json()
     assert examine(written(result)).exit_code == ExitCode.UNDECIDED
     result["verdict"] = "certified"
     assert examine(written(result), 2_000).exit_code == ExitCode.NOT_CERTIFIED

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 import tampers
 from rechecked import CONFIGS, case_of, certified, examine, failing, sealed, unconfirmed
-from systems import SCALAR, SMALL
+from systems import BLOWN, SCALAR, SMALL
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.claims import of_certified
@@ -20,7 +20,7 @@ TURNING = (CONFIGS / "state_dependent_input.yaml").read_text("utf-8")
 GAIN = SMALL.replace("  f: [", "  parameters: {m: [0.97, 1.03]}\n  f: [").replace("[1]]", '["1/m"]]', 1)
 KINDS = {
     "a clean machine": SMALL + "hardware: {rate: 500}\n",
-    "noise per state and wind": SMALL + MACHINE + WIND,
+    "noise per state and wind": BLOWN,
     "prediction, noise that drifts": SMALL
     + "hardware: {rate: 500, delay: one sample, noise: 0.001, noise_rate: 0.1, predict: true}\n",
     "the largest sample time, wind that is adapted to": SMALL
@@ -43,18 +43,31 @@ KINDS = {
 }
 
 
-WITH_CURVE = ("noise per state and wind", "prediction, noise that drifts")
+WITH_CURVE = "noise per state and wind"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_honest_certificates_are_confirmed(kind):
-    document = certified(KINDS[kind], conditions="hardware", bare=kind not in WITH_CURVE)
+    document = certified(KINDS[kind], conditions="hardware", bare=kind != WITH_CURVE)
     assert document["result"]["verdict"] == "certified", document["result"]["reasons"]
     found = examine(document)
     assert failing(found) == []
     assert found.exit_code == ExitCode.CERTIFIED
     assert any(item.name.startswith("H: d < ") for item in found.claims)
+
+
+@pytest.mark.slow
+def test_a_curve_of_a_machine_that_predicts_is_examined():
+    """Each point has a recipe with a prediction of its own; a level that is too small has none."""
+    document = certified(KINDS["prediction, noise that drifts"], conditions="hardware")
+    section = document["result"]["hardware"]
+    assert section["predict"]
+    for share, level, confirmed in ((0.9, 1.05, True), (1.2, 1.5, True), (1, 0.99, False), (0.9, 0.7, False)):
+        point = {"sample_time": section["sample_time"] * share, "level": section["level"] * level}
+        section["curve"] = [point]
+        wrong = [name for name, _ in failing(examine(sealed(document)))]
+        assert wrong == ([] if confirmed else ["H: the curve is feasible"])
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +109,7 @@ def test_no_constant_may_be_half_of_what_it_is(honest, name):
     document, memory = copy.deepcopy(honest[0]), honest[1]
     constant = document["result"]["constants"][name]
     constant |= {"above": constant["above"] / 2, "below": 0.0}
-    found = examine(sealed(document), memory=memory)
+    found = examine(sealed(document), memory=memory, to_first_failure=True)
     assert any(found_name.startswith(f"{name} <=") for found_name, _ in failing(found))
 
 
