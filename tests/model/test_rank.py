@@ -16,7 +16,7 @@ from tubecert.spec import load_text
 
 STATES = ("x", "y", "z")
 SYMBOLS = {name: symbol(name) for name in STATES}
-EFFORT = Effort(budget=3_000)
+EFFORT = Effort(budget=500)
 
 
 def model(B: list[list[str]]) -> ControlAffineModel:

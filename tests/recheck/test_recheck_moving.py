@@ -36,7 +36,7 @@ SPEC = (Path(__file__).parents[1] / "specs/ok/moving.yaml").read_text(encoding="
 
 
 def made():
-    return copy.deepcopy(certified(SPEC, conditions="distance"))
+    return copy.deepcopy(certified(SPEC, conditions="distance", gap=Fraction(1, 5)))
 
 
 def value(document, name):
@@ -326,7 +326,7 @@ DECLARED = UNKNOWN.replace('h: ["0.1*sin(3*t)"]', "bounds: {h: 0.1, h_x: 0, h_t:
 
 
 def unknown(text=UNKNOWN):
-    return copy.deepcopy(certified(text, conditions="distance"))
+    return copy.deepcopy(certified(text, conditions="distance", gap=Fraction(1, 5)))
 
 
 @pytest.mark.slow
