@@ -12,6 +12,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
+import proven
 import pytest
 import rechecked
 from flint import arb
@@ -232,9 +233,10 @@ def test_a_constant_without_a_bound_is_not_examined(name, monkeypatch):
         ),
     )
     options = pipeline.Options(conditions="distance")
-    document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), options).to_json())
+    with proven.barely():
+        document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), options).to_json())
     assert document["result"]["verdict"] == "certified"
-    found = recheck(json.dumps(document), "certificate", 20_000)
+    found = rechecked.examine(document)
     assert [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds] == []
     assert found.exit_code == ExitCode.CERTIFIED
 
