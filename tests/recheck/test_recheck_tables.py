@@ -51,7 +51,7 @@ def test_a_table_is_certified_and_confirmed():
     assert document["result"]["verdict"] == "certified"
     effective = document["result"]["spec"]["effective"]
     assert [row[:2] for row in points(effective)][1:3] == [["-1", "-0.6"], ["0.3", "0.1"]]
-    assert doubted(document) == []
+    assert failing(examine(document)) == []
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ hardware: {rate: 500}
     document = certified(text, conditions="hardware")
     curvature = document["result"]["constants"]["feedback_curvature"]
     assert curvature["below"] <= 0.675711096 * 2.195228609334393 <= curvature["above"]
-    assert doubted(document) == []
+    assert failing(examine(document)) == []
 
 
 def test_one_side_of_a_knot_is_the_piece_on_that_side():

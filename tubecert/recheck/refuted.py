@@ -40,7 +40,14 @@ def of_others(case: Case) -> Iterator[Claim]:
     for reason in reasons:
         yield Claim(
             f"refuted: {reason.claim}",
-            (*case.whole, case.knots, repr(reason), repr(case.result.tube), repr(case.result.sections)),
+            (
+                *case.whole,
+                case.knots,
+                repr(reason),
+                repr(case.result.tube),
+                repr(case.result.sections),
+                repr(case.result.specification.limits),  # no part of `whole`
+            ),
             lambda reason=reason: _refutation(case, reason),  # type: ignore[misc]
         )
 
