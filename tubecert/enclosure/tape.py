@@ -68,19 +68,23 @@ class Tape:
 
     def run_floats(self, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
         """Float values of the outputs, shape (outputs, *shape); rounded, hence for proposals only."""
+        with np.errstate(all="ignore"):
+            return self.run_floats_silenced(values, shape)
+
+    def run_floats_silenced(self, values: Sequence[Array], shape: tuple[int, ...]) -> Array:
+        """The same for whoever has silenced numpy for many runs."""
         memory = self._floats.copy()
         for target, index in self._symbols:
             memory[target] = values[index]
-        with np.errstate(all="ignore"):
-            for op, target, arguments, exponent in self._steps:
-                if op == "mul":  # nearly all steps are of these two: without a list and a call
-                    memory[target] = memory[arguments[0]] * memory[arguments[1]]
-                elif op == "add":
-                    memory[target] = memory[arguments[0]] + memory[arguments[1]]
-                elif op == "table":
-                    memory[target] = lookup.values(self._tables[exponent], memory[arguments[0]])
-                else:
-                    memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
+        for op, target, arguments, exponent in self._steps:
+            if op == "mul":  # nearly all steps are of these two: without a list and a call
+                memory[target] = memory[arguments[0]] * memory[arguments[1]]
+            elif op == "add":
+                memory[target] = memory[arguments[0]] + memory[arguments[1]]
+            elif op == "table":
+                memory[target] = lookup.values(self._tables[exponent], memory[arguments[0]])
+            else:
+                memory[target] = _FLOATS[op]([memory[i] for i in arguments], exponent)
         result = np.empty((len(self._outputs), *shape))
         for row, index in enumerate(self._outputs):
             result[row] = memory[index]

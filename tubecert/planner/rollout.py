@@ -6,6 +6,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
+from tubecert.expression import free_symbols
 from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME, ControlAffineModel
 
@@ -16,6 +17,7 @@ _STAGES = (
     (1.0, 1.0),
 )  # RK4: time of the stage, share of the slope before
 _WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+_ANY = np.zeros(())
 
 
 class Dynamics:
@@ -28,23 +30,32 @@ class Dynamics:
         self._rate = Tape(drift, names)
         slopes = jacobian(drift, moved)
         self._slopes = Tape([e for row in slopes for e in row], names)
+        self._moves = TIME in free_symbols(drift)
 
+    @np.errstate(all="ignore")
     def rate(self, t: Array | float, x: Array, u: Array) -> Array:
         """f + B u, (n, N)."""
-        return self._rate.run_floats([*x, *u, np.broadcast_to(t, x.shape[1:])], x.shape[1:])
+        return self._rate_at(t, x, u)
 
+    def _rate_at(self, t: Array | float, x: Array, u: Array) -> Array:
+        now = np.broadcast_to(t, x.shape[1:]) if self._moves else _ANY
+        return self._rate.run_floats_silenced([*x, *u, now], x.shape[1:])
+
+    @np.errstate(all="ignore")
     def step(self, t: Array | float, x: Array, left: Array, right: Array, dt: float, *, count: int) -> Array:
         """The states a time dt after t, in `count` equal steps; u runs linearly from `left` to `right`."""
         h = dt / count
         for i in range(count):
-            total, k = np.zeros_like(x), np.zeros_like(x)
+            total, k = _ANY, _ANY
             for (c, a), weight in zip(_STAGES, _WEIGHTS, strict=True):
                 share = (i + c) / count
-                k = self.rate(t + share * dt, x + a * h * k, (1 - share) * left + share * right)
+                at = x + a * h * k if a else x
+                k = self._rate_at(t + share * dt, at, (1 - share) * left + share * right)
                 total = total + weight * k
             x = x + h * total
         return x
 
+    @np.errstate(all="ignore")
     def step_slopes(self, t: Array, x: Array, left: Array, right: Array, dt: float, *, count: int) -> Array:
         """The derivatives of `step` by x, left and right: (N, n, n + 2 m)."""
         n, m = self.n, self.m
@@ -59,8 +70,8 @@ class Dynamics:
                 share = (i + c) / count
                 at, u = x + a * h * k, (1 - share) * left + share * right
                 now = np.broadcast_to(t + share * dt, (N,))
-                both = self._slopes.run_floats([*at, *u, now], (N,)).T.reshape(N, n, n + m)
-                k = self.rate(now, at, u)
+                both = self._slopes.run_floats_silenced([*at, *u, now], (N,)).T.reshape(N, n, n + m)
+                k = self._rate_at(now, at, u)
                 k_d = both[:, :, :n] @ (D + a * h * k_d)
                 k_d[:, :, n : n + m] += (1 - share) * both[:, :, n:]
                 k_d[:, :, n + m :] += share * both[:, :, n:]
