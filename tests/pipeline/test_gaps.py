@@ -33,7 +33,6 @@ def tube_of(name: str, kind: str, **options):
     [
         ("three_state", "A"),
         ("two_state", "C"),
-        ("state_dependent_input", "A"),
         ("state_dependent_input", "B"),
     ],
 )

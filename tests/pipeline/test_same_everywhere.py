@@ -18,7 +18,10 @@ from proven import result
 from tubecert import certificate
 
 ROOT = Path(__file__).parents[2]
-CONFIGS = ("three_state", "two_state", "two_state_orbit", "state_dependent_input")
+CONFIGS = {  # each on one other processor; all of them on several are what `.ci/run` is for
+    "Haswell": ("three_state", "two_state_orbit"),
+    "oldest": ("two_state", "state_dependent_input"),
+}
 
 _RUN = """
 import ctypes, hashlib, json, sys
@@ -79,13 +82,14 @@ def certified_on(processor, folder, configs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("processor", [name for name in PROCESSORS if name != "this one"])
+@pytest.mark.parametrize("processor", CONFIGS)
 def test_results_are_the_same_on_every_processor(processor, tmp_path):
     """As on this one, where other tests of this run may have made them."""
-    kernel, hashes = certified_on(processor, tmp_path, CONFIGS)
-    texts = {name: (ROOT / "configs" / f"{name}.yaml").read_text("utf-8") for name in CONFIGS}
+    configs = CONFIGS[processor]
+    kernel, hashes = certified_on(processor, tmp_path, configs)
+    texts = {name: (ROOT / "configs" / f"{name}.yaml").read_text("utf-8") for name in configs}
     here = {name: digest(result(text)) for name, text in texts.items()}
-    assert dict(zip(CONFIGS, hashes, strict=True)) == here
+    assert dict(zip(configs, hashes, strict=True)) == here
     if platform.machine() == "x86_64" and kernel is not None and processor == "oldest":
         assert kernel != certified_on("this one", tmp_path, ())[0], "the processor was not played"
 

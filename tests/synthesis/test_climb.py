@@ -43,7 +43,7 @@ def run(*arguments):
 
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["pendulum", "car", "flexible_joint"])
+@pytest.mark.parametrize("name", ["pendulum", "car"])
 def test_a_metric_for_nothing_but_the_equations_certifies(name):
     """Without a rate, `synth` used to write a metric of the largest one, which nothing certifies."""
     found = pipeline.synthesise(robot(name), BARE, BY_B)
