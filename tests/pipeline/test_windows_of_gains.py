@@ -115,7 +115,7 @@ def test_they_are_told_and_drawn(tmp_path):
     for letter in ("B", "C"):
         assert re.search(rf"The tube along the plan with [^\n]*\b{letter}\b", told) or letter in told
     assert "from 0.3 to 0.9 s" in told
-    result = proven.result(GAINS_IN_WINDOWS, **ROUGHLY)
+    result = proven.result(GAINS_IN_WINDOWS, bare=True, **ROUGHLY)
     lines = list(input_lines(result, result.inputs[0]))
     assert any(
         re.fullmatch(r"u by window: most from [\d.]+ to [\d.]+ s \([\d.]+ %\), least .*", e) for e in lines
