@@ -23,8 +23,8 @@ def samples(result):
     t = np.array(knots["t"], dtype=float)
     x = np.array(knots["x"], dtype=float)
     u = np.array(knots["u"], dtype=float)[:, 0]
-    angle = np.linspace(0, 2 * np.pi, 361)
-    radius = np.linspace(0, RHO, 11)[:, None]
+    angle = np.linspace(0, 2 * np.pi, 121)
+    radius = np.linspace(0, RHO, 3)[:, None]
     ball = np.stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()], axis=-1)
     p = x[:, None, :] + ball[None]
     x1, x2 = p[..., 0], p[..., 1]
