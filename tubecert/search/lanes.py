@@ -139,21 +139,18 @@ class Search:
         return replace(loop, S=gains.settled(self.plant, e.bias, e.ripple), N=e.ripple)
 
     def _least_speed(self, loop: Loop[Array]) -> Array:
-        """The least Y: every term of the minimum and maximum in X is affine in Y."""
+        """The least Y: every term of the minimum and maximum in X is affine in Y, and known from Y = 0 and 1."""
         n, DB = self.plant.n, gains.acting(self.plant, self.plant.n.DB)
-        still, moving = (theorem_h.estimate(self.plant, replace(loop, Y=loop.Y * 0 + y)) for y in (0.0, 1.0))
+        e = theorem_h.estimate(self.plant, replace(loop, Y=np.stack([0 * loop.Y, 0 * loop.Y + 1])))
         wait = loop.Ts + loop.tau
-        drift = n.phi + DB * (still.kb + still.ups) + self.plant.D_E * loop.wbar
+        drift = n.phi + DB * (e.kb + e.ups) + self.plant.D_E * loop.wbar
 
-        def least(*parts: tuple[Array, Array]) -> Array:
-            first = sum((x for x, _ in parts), still.s1 * wait)
-            second = sum((y for _, y in parts), moving.s1 * wait)
+        def least(*parts: Array) -> Array:
+            first, second = sum(parts, start=e.s1 * wait)
             return least_solution(drift + DB * first, DB * (second - first))
 
-        ripple = still.ripple, moving.ripple
-        bias = tuple(gains.settled(self.plant, e.bias, e.ripple) for e in (still, moving))
-        settled = least((bias[0], bias[1]), ripple)
-        return np.minimum(drift + DB * (n.Dh + n.R), np.maximum(settled, least((n.H0, n.H0), ripple)))
+        settled = least(gains.settled(self.plant, e.bias, e.ripple), e.ripple)
+        return np.minimum(drift + DB * (n.Dh + n.R), np.maximum(settled, least(n.H0, e.ripple)))
 
     @quiet
     def needed(self, at: Lanes, chosen: Choice) -> Array:
