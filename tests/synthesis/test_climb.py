@@ -1,5 +1,6 @@
 """Metrics without a rate: from slow to fast, by what a certification with them comes to, or nothing is written."""
 
+import io
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rich.console import Console
 from typer.testing import CliRunner
 
 from tubecert import pipeline
+from tubecert.certificate.searched import MetricRow, SynthesisData
 from tubecert.claims.advice import ConstantInputs, LessenCause
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
@@ -21,6 +24,7 @@ from tubecert.model import build
 from tubecert.pipeline import Deadline, Options, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.report.synthesis import report
 from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 
@@ -189,6 +193,39 @@ def test_a_narrower_tube_has_to_be_worth_a_slower_rate():
     climb.run(Fraction(1))
     assert 0.02 < climb.best.rate < 0.2
     assert climb.limits() is None
+
+
+def test_a_higher_degree_has_to_be_worth_a_longer_metric():
+    """Of the boat a metric of degree 2 took the place of a constant one for .5 % of Gamma."""
+    for share, degree in ((0.95, 0), (0.8, 2)):
+
+        class Longer(Valley):
+            def __call__(self, rate, floor, full):
+                row = super().__call__(rate, floor, full)
+                return replace(row, degree=2, demand=share * row.demand) if row and full else row  # noqa: B023
+
+        climb = Climb(Longer(0, 5), "adaptation")
+        climb.run(Fraction(1))
+        assert climb.best.degree == degree
+
+
+def test_metrics_of_one_rate_are_told_apart_by_their_degree():
+    """Two rows had the same rate and the same label."""
+    row = MetricRow(rate=Fraction(1), floor="identity", degree=0, condition_number=2.0)
+    said = []
+    for degree in (0, 2):
+        found = SynthesisData(
+            asked=None,
+            objective="adaptation",
+            verdict=Verdict.UNDECIDED,
+            attempts=(),
+            table=(row, replace(row, degree=degree)),
+        )
+        out = io.StringIO()
+        Console(file=out, width=100).print(*report(found, None, robot("pendulum"), "m.json"))
+        said.append([line.split()[:3] for line in out.getvalue().splitlines()])
+    assert [words for words in said[0] if words[:1] == ["1"]] == [["1", "condition", "2"]] * 2
+    assert [w for w in said[1] if w[:1] == ["1"]] == [["1", "0", "condition"], ["1", "2", "condition"]]
 
 
 def test_what_is_refuted_is_never_the_best():
@@ -372,8 +409,9 @@ def test_for_a_machine_metrics_are_ranked_by_the_tube_that_is_proven_with_them()
 
 
 @pytest.mark.slow
-def test_where_no_metric_serves_a_machine_what_fills_the_loop_that_comes_nearest_is_said():
+def test_where_no_metric_serves_a_machine_what_fills_the_loop_that_comes_nearest_is_said(monkeypatch):
     """Only margins were told: of -1e-6, where the loop needed ten times its room."""
+    monkeypatch.setattr("tubecert.pipeline.climb.FLOORS", ("identity",))  # that of least input gain serves B
     told = []
     spec = load_text(CART.replace("rate: 200", "rate: 2").replace("z: 0.3", "z: 0.01"))
     found = pipeline.synthesise(

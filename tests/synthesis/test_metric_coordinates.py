@@ -19,7 +19,7 @@ from tubecert.synthesis.coordinates import coordinates
 from tubecert.synthesis.family import metric_family
 from tubecert.synthesis.ladder import Ladder
 from tubecert.synthesis.problem import FLOORS
-from tubecert.synthesis.rounding import rounded
+from tubecert.synthesis.rounding import distance, rounded
 from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
@@ -154,15 +154,35 @@ def test_the_default_is_free_of_units():
     assert synthesis_data(Synthesis(coordinates="identity"))["coordinates"] == "identity"
 
 
-@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.integers(2, 7), st.integers(-5, 5))
+@given(
+    st.lists(st.floats(-1, 1), min_size=3, max_size=3),
+    st.integers(2, 7),
+    st.lists(st.sampled_from([1e-3, 1.0, 57.3, 1e6]), min_size=3, max_size=3),
+)
 @settings(deadline=None)
-def test_digits_are_those_of_the_entry(entries, digits, power):
-    """An entry of a small unit is not rounded away beside one of a large unit."""
-    size = np.array([[1.0, 10.0**power], [10.0**power, 10.0 ** (2 * power)]])
+def test_rounding_changes_a_metric_as_little_in_all_units(entries, digits, units):
+    """W = V_0 + V_1 psi: psi in degrees has a small coefficient, and no entry is rounded away beside a large one."""
     a, b, c = entries
-    values = np.array([[[4, b], [b, c]]]) + a * 0
-    found = np.array(rounded(values * size, digits, size), dtype=float)[0] / size
-    assert np.abs(found - values[0]).max() <= 0.5 * 10.0 ** (1 - digits) * (1 + 1e-9)
+    values = np.array([[[4, b], [b, 1 + c * c]], [[a, 0.1], [0.1, -c / 2]]])
+    states, psi = np.array(units[:2]), units[2]
+    size = np.outer(states, states) / np.array([1, psi])[:, None, None]
+    functions = np.array([[1.0, x] for x in np.linspace(-0.35, 0.35, 9)]) * [1, psi]
+    found = np.array(rounded(values * size, digits, functions), dtype=float)
+    largest = np.sqrt(
+        np.abs(functions[:, :, None] * [np.diag(v) for v in values * size]).sum(axis=1).max(axis=0)
+    )
+    wrong = np.einsum("pk,kij->pij", functions, found - values * size) / np.outer(largest, largest)
+    assert np.abs(wrong).max() <= 2 * 0.5 * 10.0 ** (1 - digits) * (1 + 1e-9)
+
+
+def test_the_distance_of_metrics_is_that_of_the_worst_direction():
+    """A thousandth of an entry is as much as the whole metric in the direction in which it is small."""
+    values = np.array([[[1.0, 0.999], [0.999, 1.0]]])
+    other = values + np.array([[0, -0.001], [-0.001, 0]])
+    units = np.outer([1.0, 1e5], [1.0, 1e5])
+    assert distance(values, other, np.ones((1, 1))) == pytest.approx(1, rel=1e-9)
+    assert distance(values * units, other * units, np.ones((1, 1))) == pytest.approx(1, rel=1e-9)
+    assert distance(-values, other, np.ones((1, 1))) == np.inf
 
 
 # -- units of inputs and of time

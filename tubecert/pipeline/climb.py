@@ -9,7 +9,7 @@ Untrusted: it chooses among metrics that are proven.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf, log2, sqrt
 
@@ -28,6 +28,7 @@ _DOUBLINGS, _HALVINGS = 12, 10
 _WORSE = 2  # rates in a row that are worse than the best end the climb
 _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
+_LONGER = 1.1  # times the gain is what a metric of a lower degree may ask for
 _ROUNDER = 0.95  # of the condition number
 _UP = 1 + 1e-9  # so that rounding down starts from what the last digits of a mode do not change
 _UNUSUAL = 64  # such a slow scale, or its inverse, is one of another unit of time
@@ -128,9 +129,14 @@ class Climb:
     def _try(self, rate: Fraction, floor: Floor = "identity", *, full: bool = False) -> Row | None:
         row = self.compare(rate, floor, full)
         known = self.tried.get(rate)
-        if known is None or (row is not None and self._score(row) < self._score(known)):
+        if known is None or (row is not None and self._better(row, known)):
             self.tried[rate] = row
         return row
+
+    def _better(self, row: Row, known: Row) -> bool:
+        """Whether a metric takes the place of another; one of a higher degree is longer, and has to be worth it."""
+        harder = replace(row, demand=_LONGER * row.demand) if row.degree > known.degree else row
+        return self._score(harder) < self._score(known)
 
     def _around(self, best: Fraction) -> list[Fraction]:
         """Rates halfway, in their logarithms, to the neighbours that were tried."""

@@ -115,12 +115,13 @@ def _limits(limits: RateLimits) -> list[Text]:
 
 
 def _compared(rows: Sequence[MetricRow]) -> RenderableType:
-    shown = plain_table(
-        ">rate", "least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "verdict"
-    )
+    heads = ["least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "verdict"]
+    degrees = len({row.degree for row in rows}) > 1  # else all rows of a rate differ by what is least
+    shown = plain_table(">rate", *([">degree"] if degrees else []), *heads)
     for row in rows:
         shown.add_row(
             exact(row.rate),
+            *([str(row.degree)] if degrees else []),
             FLOORS[row.floor],
             up(row.condition_number),
             _number(row.input_gain),

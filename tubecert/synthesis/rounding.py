@@ -6,10 +6,9 @@ returned. The proof is `tubecert.metric.verify`'s.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 
 import numpy as np
 
@@ -17,6 +16,8 @@ from tubecert.claims.outcomes import ConditionUnbounded, NoProposal, NotProven, 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.linalg import whitening
+from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import ControlAffineModel
@@ -25,10 +26,13 @@ from tubecert.synthesis.coordinates import Choice
 from tubecert.synthesis.family import MetricFamily
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
+from tubecert.synthesis.sampling import floats
 from tubecert.verdict import Verdict
 
 _DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
 _WORTH, _SHARP = 1.005, 1.0002  # a shorter metric may have a condition number larger by this factor
+_ALIKE = 2e-3  # and differs by this share in any direction
+_POINTS = 256  # at which it is compared
 
 Coefficients = tuple[tuple[tuple[Fraction, ...], ...], ...]
 
@@ -76,92 +80,120 @@ def shortest_proven(
     n = len(problem.model.states)
     if values.shape != (len(problem.family.functions), n, n):
         return Rejected(outcome=WrongShape(route=proposal.route))
-    first, *rest = _worth_proving(problem, values, rate)
+    functions = _at_points(problem)
+    first, *rest = _worth_proving(problem, values, rate, functions)
     known = proofs or Proofs()
 
-    def prove(dual: Matrix) -> MetricProof:
-        return known.of(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+    def proven(digits: int) -> VerifiedMetric | Rejected:
+        dual = problem.family.dual_metric(rounded(values, digits, functions))
+        proof = known.of(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+        return _failure(proposal, proof) or VerifiedMetric(
+            rate=rate,
+            floor=problem.floor,
+            coordinates=problem.coordinates,
+            dual_metric=dual,
+            proof=proof,
+            condition_number=condition_number(proof),
+            digits=digits,
+            family=problem.family,
+            proposal=proposal,
+        )
 
-    outcome = _proven(problem, proposal, first, rate, prove)
+    outcome = proven(first)
     for digits in rest:
         if isinstance(outcome, VerifiedMetric):
             break
-        outcome = _proven(problem, proposal, digits, rate, prove)
+        outcome = proven(digits)
     return outcome
 
 
-def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction) -> list[int]:
+def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction, functions: Array) -> list[int]:
     """Numbers of digits in the order in which a proof is tried: the fewest that look as good as all, then all.
 
-    As good: by sampling in floats, rounding costs next to nothing of kappa, and at most half of what C2 has to spare.
+    As good: by sampling in floats, W is the same to a share in every direction, which does not depend on units, and
+    rounding costs next to nothing of kappa, and at most half of what C2 has to spare.
     """
     forms = FormsTape(problem.model, problem.family, problem.scaled)
-    scaled = problem.scaled
     nothing = np.ones((1, len(problem.model.states)))
     attacker = Attacker.of(replace(problem, rate=float(rate)), forms, nothing, np.random.default_rng(5))
 
-    def sampled(digits: int) -> Attack:
-        short = np.array(rounded(values, digits, scaled.entries), dtype=float)
+    def sampled(short: Array) -> Attack:
         return attacker.attack(forms.inner(short), np.inf)
 
     most = _DIGITS[-1]
     worth = _SHARP if problem.sharp else _WORTH
     with np.errstate(all="ignore"):
-        full = sampled(most)
+        full = sampled(np.array(rounded(values, most, functions), dtype=float))
         for digits in _DIGITS[:-1]:
-            found = sampled(digits)
+            short = np.array(rounded(values, digits, functions), dtype=float)
+            if not distance(values, short, functions) <= _ALIKE:
+                continue
+            found = sampled(short)
             if found.kappa <= worth * full.kappa and found.shortfall <= 0.5 * min(full.shortfall, 0.0):
                 return [digits, most]
     return [most]
 
 
-def rounded(values: Array, digits: int, sizes: Array | None = None) -> Coefficients:
-    """Symmetric rational matrices with `digits` digits for the largest entry.
+def _at_points(problem: SynthesisProblem) -> Array:
+    """The functions g_k at random points of the safe set, (P, K)."""
+    lo, hi = floats(problem.safe_set)
+    points = np.random.default_rng(7).uniform(lo, hi, (_POINTS, len(lo)))
+    family = problem.family
+    with np.errstate(all="ignore"):
+        values = Tape(family.functions, family.states).run_floats(list(points.T), (_POINTS,)).T
+    return np.asarray(values[np.isfinite(values).all(axis=1)])
 
-    Every entry is a multiple of one power of ten; with `sizes` (n, n), of what entries are measured in, of its own.
+
+def distance(values: Array, other: Array, functions: Array) -> float:
+    """max |v'(W - W')v|/(v'Wv) over directions v, at points where the g_k are `functions` (P, K); inf if W is not > 0.
+
+    `values`, `other`: V_k (K, n, n). The frame drops out, and so do all units.
+    """
+    here, there = (np.einsum("pk,kij->pij", functions, v) for v in (values, other))
+    size = np.sqrt(np.abs(np.einsum("pii->pi", here)).max(axis=0))
+    here, there = here / np.outer(size, size), there / np.outer(size, size)
+    if not (np.isfinite(here).all() and np.linalg.eigvalsh(here).min() > 0):
+        return inf
+    t = whitening(here)
+    return float(np.abs(np.linalg.eigvalsh(t @ (there - here) @ np.swapaxes(t, -1, -2))).max())
+
+
+def rounded(values: Array, digits: int, functions: Array | None = None) -> Coefficients:
+    """Symmetric rational matrices; entry i, j is rounded to `digits` digits of sqrt(W_ii W_jj), in any units.
+
+    `functions` (P, K) are values of the g_k, by the largest of which a coefficient counts; without any g_k is 1. Every
+    entry is a multiple of a power of ten of its own.
     """
     symmetric = 0.5 * (values + np.swapaxes(values, -1, -2))
-    scale = np.ones(symmetric.shape[1:]) if sizes is None else sizes
-    largest = float(np.abs(symmetric / scale).max())
-    units = [
-        [Fraction(10) ** (floor(log10(largest * s)) - digits + 1) for s in row] for row in scale.tolist()
-    ]
+    known = np.ones((1, len(symmetric))) if functions is None or not len(functions) else functions
+    own = np.einsum("kii->ki", symmetric)
+    square = np.abs(known @ own).max(axis=0)
+    size = np.sqrt(np.where(square > 0, square, np.abs(symmetric).max()))
+    spans = np.abs(known).max(axis=0)
+    spans = np.where(spans > 0, spans, 1.0)
+    scales = size[:, None] * size / spans[:, None, None]
     return tuple(
         tuple(
-            tuple(round(Fraction(float(v)) / unit) * unit for v, unit in zip(row, own, strict=True))
-            for row, own in zip(block, units, strict=True)
+            tuple(_decimal(float(v), float(s), digits) for v, s in zip(row, own, strict=True))
+            for row, own in zip(block, sizes, strict=True)
         )
-        for block in symmetric
+        for block, sizes in zip(symmetric, scales, strict=True)
     )
 
 
-def _proven(
-    problem: SynthesisProblem,
-    proposal: Proposal,
-    digits: int,
-    rate: Fraction,
-    prove: Callable[[Matrix], MetricProof],
-) -> VerifiedMetric | Rejected:
-    assert proposal.coefficients is not None
-    dual = problem.family.dual_metric(rounded(proposal.coefficients, digits, problem.scaled.entries))
-    proof = prove(dual)
+def _decimal(value: float, scale: float, digits: int) -> Fraction:
+    unit = Fraction(10) ** (floor(log10(scale)) - digits + 1)
+    return round(Fraction(value) / unit) * unit
+
+
+def _failure(proposal: Proposal, proof: MetricProof) -> Rejected | None:
+    """Why a metric is not proven, or of no use; None if it is."""
     if proof.failed is not None:
         failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
         return Rejected(outcome=failed, undecided=failed.verdict is Verdict.UNDECIDED)
-    condition = condition_number(proof)
-    if not isfinite(condition.above):
+    if not isfinite(condition_number(proof).above):
         return Rejected(outcome=ConditionUnbounded(route=proposal.route))
-    return VerifiedMetric(
-        rate=rate,
-        floor=problem.floor,
-        coordinates=problem.coordinates,
-        dual_metric=dual,
-        proof=proof,
-        condition_number=condition,
-        digits=digits,
-        family=problem.family,
-        proposal=proposal,
-    )
+    return None
 
 
 def with_metric(model: ControlAffineModel, dual: Matrix, rate: Fraction) -> ControlAffineModel:
