@@ -49,6 +49,7 @@ class Step:
     examined, in `unit`s; its value is proven to lie between `below` and `above`. `done` of `of` pieces of the whole
     phase are finished; None if nobody knows how many there are. `seconds` since the call began; `left`: an estimate of
     the seconds until the phase is done, if those to come are like those before; None where there is nothing to go by.
+    `least`: it is without the piece that is worked on, which takes longer than those before it.
     """
 
     phase: Phase
@@ -61,6 +62,7 @@ class Step:
     of: int | None = None
     seconds: float = 0.0
     left: float | None = None
+    least: bool = False
 
 
 Progress = Callable[[Step], None]

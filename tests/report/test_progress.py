@@ -58,6 +58,17 @@ def test_a_log_has_a_line_every_ten_seconds_and_the_time_left():
     ]
 
 
+def test_one_piece_that_is_hard_does_not_make_all_others_hard():
+    """20 pieces in 20 s, and one that takes a minute: the 19 after it take 19 s, and it is not known when it ends."""
+    slow = [(20.0 + i, points(40)) for i in range(61)]
+    found = lines([*((float(i), points(20 + i)) for i in range(21)), *slow])
+    assert found[1] == "40 of 60 points done; 20 s so far, about 20 s left; certifying points"
+    assert found[2] == "40 of 60 points done; 30 s so far, at least 19 s left; certifying points"
+    assert found[7] == "40 of 60 points done; 80 s so far, at least 19 s left; certifying points"
+    last = lines([(0.0, points(58)), (1.0, points(59)), *((10.0 + i, points(59)) for i in range(10))])
+    assert last[0] == "59 of 60 points done; 10 s so far; certifying points"
+
+
 def test_a_run_that_ends_earlier_leaves_nothing_in_a_log():
     assert lines([(i / 2, points(20 + i)) for i in range(20)]) == []
     clock = Clock()

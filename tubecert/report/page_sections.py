@@ -188,6 +188,7 @@ def _gains(result: Result) -> Iterator[Block]:
         NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
     ]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
+    yield from (Words(text=line) for line in sections.less_by_distance(result))
     yield from (Words(text=line) for line in sections.beyond_its_theorem(result))
     yield from (Words(text=line) for line in sections.without_adaptation(result))
     if (limit := sections.sample_time_limit(result)) is not None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tubecert.report.terminal import Terminal
 
 EVERY: Final = 10.0  # s between lines of a log
+_HARD: Final = 3.0  # times the mean: a piece that takes longer is not like those before it
 _UNLIKE: Final = (Phase.GAINS,)  # these take longer than what was counted before them
 Clock = Callable[[], float]
 
@@ -25,7 +26,8 @@ Clock = Callable[[], float]
 class Timed:
     """Adds to every step the seconds since it was made, and how long what is left will take.
 
-    The estimate is for the phase: the pieces that are left take as long as those that were finished since it began.
+    The estimate is for the phase: the pieces that are left take as long as those that were finished since it began. Of
+    one that takes much longer nothing is known but that the others come after it.
     """
 
     shown: Progress
@@ -34,20 +36,26 @@ class Timed:
     whole: int | None = None
     before: int = 0
     since: float = field(init=False)
+    finished: float = field(init=False)
+    last: int = 0
 
     def __post_init__(self) -> None:
-        self.began = self.since = self.clock()
+        self.began = self.since = self.finished = self.clock()
 
     def __call__(self, step: Step) -> None:
         """A step, with its times."""
         now = self.clock()
         if step.of != self.whole or step.done < self.before:
             self.whole, self.before, self.since = step.of, step.done, now
-        fresh, left = step.done - self.before, None
+        if step.done != self.last:
+            self.last, self.finished = step.done, now
+        fresh, left, hard = step.done - self.before, None, False
         alike = step.phase not in _UNLIKE
         if step.of is not None and fresh > 0 and step.done < step.of and alike:
-            left = (now - self.since) / fresh * (step.of - step.done)
-        self.shown(replace(step, seconds=now - self.began, left=left))
+            mean, others = (self.finished - self.since) / fresh, step.of - step.done - 1
+            hard = now - self.finished > max(_HARD * mean, EVERY / 2)
+            left = (mean * others or None) if hard else (now - self.since) / fresh * (step.of - step.done)
+        self.shown(replace(step, seconds=now - self.began, left=left, least=hard and left is not None))
 
 
 @dataclass(slots=True)
@@ -136,7 +144,8 @@ class Log:
             if not self.heard or now - self.written < EVERY:
                 return
             self.written = now
-            left = None if self.last.left is None else self.last.left - (now - self.told)
+            passed = 0.0 if self.last.least else now - self.told
+            left = None if self.last.left is None else self.last.left - passed
             still = None if left is None or left < 0 else left  # an estimate that was wrong is not repeated
             words = described(replace(self.last, seconds=now - self.began, left=still))
         self.terminal.show(cropped(visible(words), self.terminal.width))

@@ -16,7 +16,7 @@ from tubecert.certificate.result import Bound, MetricData, Result, TubeData
 from tubecert.claims.assumptions import MachineAsGiven
 from tubecert.claims.family import Assumption, Reason
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
-from tubecert.kinds import ALONE, HARDWARE, RATES, SAMPLED
+from tubecert.kinds import ALONE, DISTANCE, HARDWARE, RATES, SAMPLED
 from tubecert.kinds.alone import AloneData
 from tubecert.kinds.sampled import SampledData
 from tubecert.report.claimed import point
@@ -114,8 +114,33 @@ def _gains(result: Result) -> list[RenderableType]:
         NAMES[key] for key in NAMES if key in result.sections and all(row.section != key for row in found)
     ]
     body += [Text(f"{title}: no gains were found") for title in missing]
-    body += [Text(line) for line in (*beyond_its_theorem(result), *without_adaptation(result))]
+    lines = (*less_by_distance(result), *beyond_its_theorem(result), *without_adaptation(result))
+    body += [Text(line) for line in lines]
     return body + _limit(result)
+
+
+def less_by_distance(result: Result) -> Iterator[str]:
+    """That A decides where nothing else is asked for, though B is certified with smaller gains: which, and the key."""
+    chosen = result.spec.effective.part("conditions").get("decides")
+    if chosen is not None or result.decided_by != (RATES.key,):
+        return
+    found = [
+        row for row in rows(result) if row.pair.adaptation_rate is not None and row.pair.bandwidth is not None
+    ]
+    own = [row for row in found if row.decides]
+    others = [row for row in found if row.section == DISTANCE.key and row.verdict is Verdict.CERTIFIED]
+    if not own or not others:
+        return
+    best = min(others, key=_adaptation)
+    if 2 * _adaptation(best) <= _adaptation(own[0]) or own[0].verdict is not Verdict.CERTIFIED:
+        yield (
+            f"A decides because nothing else is asked for. B holds the same tube with {best.text()}: "
+            "conditions: {decides: B} in the specification, or --conditions B, takes it."
+        )
+
+
+def _adaptation(row: Gains) -> Fraction:
+    return row.pair.adaptation_rate or Fraction(0)
 
 
 def beyond_its_theorem(result: Result) -> Iterator[str]:

@@ -69,7 +69,7 @@ def _done(step: Step) -> str:
 
 def _time(step: Step) -> str:
     gone = f"{duration(step.seconds)} so far" if step.seconds else ""
-    left = "" if step.left is None else f"about {duration(step.left)} left"
+    left = "" if step.left is None else f"{'at least' if step.least else 'about'} {duration(step.left)} left"
     return ", ".join(part for part in (gone, left) if part)
 
 
