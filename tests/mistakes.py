@@ -764,5 +764,16 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
         10,
         "input F is 0, beyond its limits: [1, 8]",
     ),
-    ("at: [0.01, 0]", "at: [1 cm, 0]", "TC108", 18, 24, "in the units of the other numbers"),
+    ("at: [0.01, 0]", "at: [1 cm, 0]", "TC108", 18, 24, "1 cm is 0.01 m: write 0.01 if"),
+    ("at: [0.01, 0]", "at: [0, 2 mm/s]", "TC108", 18, 27, "2 mm/s is 0.002 m/s: write 0.002 if"),
+    (
+        "rate: 500",
+        "rate: 500, bandwidth: 10 Hz",
+        "TC108",
+        26,
+        37,
+        "of a bandwidth, in rad/s: 2*pi times that",
+    ),
+    ("rate: 500", "rate: largest", "TC112", 26, 18, "write sample_time: largest"),
+    ("delay: 0.001", "delay: half a sample", "TC112", 26, 30, "`one sample`, or largest"),
 ]

@@ -6,7 +6,9 @@ import pytest
 from proven import proven
 
 from tubecert.certificate.result import Certificate
-from tubecert.report.sections import beyond_its_theorem
+from tubecert.digits import exact
+from tubecert.report.gains import rows
+from tubecert.report.sections import beyond_its_theorem, less_by_distance
 from tubecert.report.shares import filled
 
 WINDY = """
@@ -54,3 +56,14 @@ def test_a_certificate_that_is_not_stated_for_wind_says_so():
     )
     calm = replace(windy, claim=replace(windy.claim, wind=None))
     assert not list(beyond_its_theorem(calm))
+
+
+@pytest.mark.slow
+def test_where_a_decides_unasked_it_is_said_what_b_asks_for():
+    calm = WINDY.replace("disturbance: {E: [[1]], bound: 0.05}\n", "")
+    unasked = Certificate.from_json(proven(calm.replace("conditions: {decides: B}\n", ""))).result
+    [line] = less_by_distance(unasked)
+    least = min(row.pair.adaptation_rate for row in rows(unasked) if row.section == "distance")
+    assert f"Gamma = {exact(least)}: conditions: {{decides: B}}" in line
+    assert not list(less_by_distance(Certificate.from_json(proven(calm)).result))
+    assert not list(less_by_distance(replace(unasked, decided_by=("distance",))))

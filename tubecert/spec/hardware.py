@@ -125,7 +125,9 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
         )
     sample_time = _sample_time(field, entries, names)
     one_sample = _is(entries.get("delay"), ONE_SAMPLE)
-    delay = None if one_sample else _size(entries, "delay", names, default=Fraction(0))
+    delay = (
+        None if one_sample or _is_of_samples(entries) else _size(entries, "delay", names, default=Fraction(0))
+    )
     if delay is not None and sample_time is not None and delay > sample_time:
         entries["delay"].fail(
             codes.RANGE,
@@ -167,6 +169,19 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     )
 
 
+def _is_of_samples(entries: Mapping[str, Field]) -> bool:
+    """Reports a delay that is told in samples, but for one sample."""
+    field = entries.get("delay")
+    if field is None or not isinstance(field.node, Scalar) or "sample" not in field.node.text:
+        return False
+    field.fail(
+        codes.RANGE,
+        f"{field.path} is {field.node.text[:40]!r}, not a time in seconds",
+        f"write a number of seconds (half of the sample time at 500 Hz: 0.001), `{ONE_SAMPLE}`, or {LARGEST}",
+    )
+    return True
+
+
 def limits_of(limits: Field | None, hardware: Field | None) -> Field | None:
     """Where the limits of the inputs stand: in a section of their own, or in that of the hardware."""
     own = _within(hardware, "limits")
@@ -189,6 +204,13 @@ def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fr
     if "rate" in entries and "sample_time" in entries:
         entries["sample_time"].fail(
             codes.RANGE, "hardware has a rate and a sample time", "give one of the two"
+        )
+        return None
+    if _is(entries.get("rate"), LARGEST):
+        entries["rate"].fail(
+            codes.RANGE,
+            "hardware.rate is searched for by its sample time",
+            f"write sample_time: {LARGEST}: it finds the slowest computer that serves",
         )
         return None
     if "rate" in entries:

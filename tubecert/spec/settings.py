@@ -49,7 +49,7 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
     widths = _read_half_widths(entries.get("half_widths"), names)
     chosen = entries["coordinates"].word(("identity", "auto")) if "coordinates" in entries else None
     refined = entries.get("gap")
-    gap = None if refined is None else refined.word(("auto",))
+    gap = None if refined is None else _read_gap(refined)
     if None in radii.values() or widths is None or (chosen is None and "coordinates" in entries):
         return None
     if gap is None and refined is not None:
@@ -183,6 +183,19 @@ def _read_projection(field: Field | None, names: Names) -> tuple[Fraction | None
         entries["smooth"].number(names.values, above=0, most=1) if entries and "smooth" in entries else None
     )
     return smooth, smooth is not None
+
+
+def _read_gap(field: Field) -> str | None:
+    """`auto`; a number is an option of the command."""
+    text = field.node.text if isinstance(field.node, Scalar) else ""
+    if re.fullmatch(r"[0-9./eE%+-]+", text) is None:
+        return field.word(("auto",))
+    field.fail(
+        codes.RANGE,
+        f"{field.path} is {text[:20]}",
+        f"write auto here; a number is an option: --gap {text[:20]}",
+    )
+    return None
 
 
 def read_decides(field: Field | None) -> str | None:
