@@ -141,6 +141,11 @@ class Effective:
         """A section as it stands, to be shown; empty if there is none."""
         return _mapping(self.data.get(name))
 
+    @property
+    def says_what_decides(self) -> bool:
+        """Whether the specification names the certificate that decides."""
+        return "decides" in self.part("conditions")
+
     def parts(self, name: str) -> list[Mapping[str, Tree]]:
         """The entries of a list of sections, to be shown."""
         found = self.data.get(name)

@@ -121,8 +121,7 @@ def _gains(result: Result) -> list[RenderableType]:
 
 def less_by_distance(result: Result) -> Iterator[str]:
     """That A decides where nothing else is asked for, though B is certified with smaller gains: which, and the key."""
-    chosen = result.spec.effective.part("conditions").get("decides")
-    if chosen is not None or result.decided_by != (RATES.key,):
+    if result.spec.effective.says_what_decides or result.decided_by != (RATES.key,):
         return
     found = [
         row for row in rows(result) if row.pair.adaptation_rate is not None and row.pair.bandwidth is not None
