@@ -462,6 +462,7 @@ def test_the_spelling_is_the_one_that_is_written(value):
     assert Node(number_text(value), "place").exact() == value
 
 
+@pytest.mark.slow
 @given(st.from_regex(_SHORT, fullmatch=True))
 def test_a_text_that_is_not_spelled_again_is_the_one_spelling(text):
     assert spelled(Fraction(text)) == text

@@ -80,7 +80,10 @@ def outside():
     return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
 
 
-@pytest.fixture(params=["orbit", "regulated", "outside", *MADE])
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("regulated", "outside")]
+
+
+@pytest.fixture(params=["orbit", *SLOW, *MADE])
 def any_certificate(request):
     return sealed(MADE[request.param]()) if request.param in MADE else request.getfixturevalue(request.param)
 
@@ -132,6 +135,7 @@ def test_nothing_is_loaded_and_nothing_runs(any_certificate):
     assert "default-src 'none'" in source
 
 
+@pytest.mark.slow
 def test_every_style_of_a_mark_is_in_the_style_sheet(orbit, outside, regulated):
     for each in (orbit, outside, regulated):
         page = parsed(each)
@@ -217,6 +221,7 @@ def test_scripts_in_texts_are_shown_as_texts():
 # -- what it says
 
 
+@pytest.mark.slow
 def test_verdict_gains_margins(regulated):
     page = parsed(regulated)
     rates = regulated["result"]["conditions_26"]
@@ -288,6 +293,7 @@ def test_printed_formulas_prove_nothing_about_the_gains():
     assert page.tiles == ()
 
 
+@pytest.mark.slow
 def test_what_is_not_certified_has_no_numbers_to_rely_on_and_shows_its_witness(outside):
     page = page_of(told(outside))
     assert page.verdict == "refuted"
@@ -330,6 +336,7 @@ def figure(page_certificate, key):
     return found[0] if found else None
 
 
+@pytest.mark.slow
 def test_which_figures_there_are(orbit, regulated, outside):
     def keys(page_certificate):
         return {
@@ -414,6 +421,7 @@ def test_an_obstacle_lies_where_it_is_whatever_the_order_of_its_states(orbit):
     assert ("obstacle", "obstacle") in figure(orbit, "tube-0-1").legend
 
 
+@pytest.mark.slow
 def test_chosen_pairs_lie_on_their_curves(regulated):
     drawing = pages.ET.fromstring(figure(regulated, "trade-off").svg)
     curves = {
@@ -515,6 +523,7 @@ def test_samples_lie_on_the_plan(orbit):
             assert row[i] == pytest.approx(curve(t), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_margins_around_are_those_of_each_bandwidth(regulated):
     data = regulated["result"]["conditions_26"]
     around = data["margins_around"]

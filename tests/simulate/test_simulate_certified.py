@@ -76,6 +76,7 @@ def test_a_changed_certificate_is_refused(tmp_path):
     assert "was changed" in finding.message
 
 
+@pytest.mark.slow
 def test_a_certificate_of_another_system_is_refused_by_what_differs():
     _, result = certified("flat")
     spec = load(str(CONFIGS / "two_state.yaml"))
@@ -246,6 +247,7 @@ def test_a_control_period_longer_than_the_sample_time_is_located():
 # kinds of certificates
 
 
+@pytest.mark.slow
 def test_kinds_are_named_alike_everywhere():
     assert set(KINDS) == {name.option for name in NAMES} == set(PREFERRED)
     assert {item.value for item in Source} == set(words_of(ADAPTIVE))
@@ -255,6 +257,7 @@ def test_kinds_are_named_alike_everywhere():
     assert adapting - {"hardware"} == set(result.proof.of)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "wanted", "taken"),
     [

@@ -74,6 +74,7 @@ def test_decay_with_delay_waits_without_adaptation():
     np.testing.assert_allclose(decay(t), solved, atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["distance", "sampled"])
 def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
     _, result = certified("two_state", "0.4")

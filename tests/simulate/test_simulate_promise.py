@@ -23,7 +23,7 @@ T = np.linspace(0, 4, 81)
 @pytest.fixture
 def numbers():
     """A certificate by hand, whose constants are all different."""
-    own = read_numbers(certified("two_state", "0.4")[1])
+    own = read_numbers(certified("flat")[1])
     names = (
         "feedback_gain u_star h h_t h_x h_initial prediction_error initial_distance metric_input_gain B B_x B_pinv "
         "B_pinv_x plan_defect plan_defect_metric drift_on_plan M_x"
