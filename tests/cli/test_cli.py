@@ -716,7 +716,7 @@ def test_a_real_refusal(folder):
 
 
 @pytest.mark.slow
-def test_printed_formulas_prove_nothing(folder):
+def test_printed_formulas_prove_nothing(folder, barely):
     result = run("certify", SPEC, "--formulas", "as-printed", "-q")
     assert result.exit_code == 4
     assert result.stdout.startswith("undecided three_state: ")

@@ -116,8 +116,8 @@ def test_a_metric_that_is_not_positive_or_depends_on_the_wrong_state(folder):
 
 @pytest.mark.slow
 def test_a_rank_that_is_lost_is_said(folder):
-    (folder / "own.yaml").write_text((SYSTEM + OWN).replace('[["0.5"], [-2]]', '[["x1"], ["x1*x2"]]'))
-    done = run(folder / "own.yaml")
+    (folder / "own.yaml").write_text((SYSTEM + OWN).replace('[["0.5"], [-2]]', '[["x1"], [0]]'))
+    done = run(folder / "own.yaml", "--budget", "300")
     assert done.exit_code == 1
     assert "rank" in done.stdout
 

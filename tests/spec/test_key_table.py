@@ -82,8 +82,14 @@ def files() -> list[tuple[str, Any]]:
 
 def effective(data: Any, path: str) -> Any:
     """What is read, None if it is refused."""
+    return read(json.dumps(data), path)
+
+
+@cache
+def read(text: str, path: str) -> Any:
+    """The same of a text: most files do not have the key in question, and are read once."""
     try:
-        return canonical(load_text(json.dumps(data), path))
+        return canonical(load_text(text, path))
     except SpecError:
         return None
 
