@@ -16,7 +16,7 @@ import jsonschema
 import proven
 import pytest
 import yaml
-from systems import IN_WINDOWS, SCALAR
+from systems import IN_WINDOWS, SCALAR, SMALL
 
 import tubecert
 from tubecert import certificate, spec
@@ -292,11 +292,11 @@ CLOSED = jsonschema.Draft202012Validator(closed(SCHEMAS["certificate"]))
 VARIANTS = {
     "certified": (ROOT / "configs/three_state.yaml", "", "", {}),
     "everything decides": (ROOT / "configs/three_state.yaml", "", "", {"conditions": "all"}),
-    "as printed": (ROOT / "configs/three_state.yaml", "", "", {"formulas": "as-printed"}),
+    "as printed": (SMALL, "", "", {"formulas": "as-printed"}),
     "budget": (ROOT / "configs/three_state.yaml", "", "", {"budget": 10}),
-    "metric refuted": (ROOT / "configs/three_state.yaml", "rate: 0.9999", "rate: 1", {}),
-    "leaves": (ROOT / "configs/three_state.yaml", "epsilon: 0.01", "epsilon: 0.1", {}),
-    "too much": (ROOT / "configs/three_state.yaml", "0.1*sin(2*t)", "10*sin(2*t)", {}),
+    "metric refuted": (SMALL, "rate: 0.8", "rate: 3", {}),
+    "leaves": (SMALL, "epsilon: 0.2", "epsilon: 2", {}),
+    "too much": (SMALL, "0.1*sin(t)", "10*sin(t)", {}),
     "a machine": (SCALAR, "", "", {}),
     "a machine in windows": (IN_WINDOWS, "", "", {"conditions": "hardware", "bare": True}),
     "a machine that does not serve": (SCALAR, "rate: 200", "rate: 2", {}),
