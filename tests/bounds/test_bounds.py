@@ -461,6 +461,7 @@ def q(text):
     return arb(fraction.numerator) / fraction.denominator
 
 
+@pytest.mark.slow
 def test_the_drift_is_bounded_in_ball_arithmetic_too(three):
     suprema, constants, _, _ = three
     ctx.prec = 80

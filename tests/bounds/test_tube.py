@@ -123,6 +123,7 @@ def test_the_first_boxes_cover_the_tube(name, data):
     assert inside.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 @given(
     at=st.lists(st.tuples(*[st.floats(-3, 3)] * 5), min_size=1, max_size=6),

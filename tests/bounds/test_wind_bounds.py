@@ -139,6 +139,7 @@ def test_more_of_the_metric_is_less_push():
 # -- what joins the uncertainty
 
 
+@pytest.mark.slow
 def test_a_slow_wind_that_an_input_can_make_is_uncertainty():
     """h + 2 w along the input: every constant in closed form."""
     s = suprema([["-1"], ["4"]], bound="0.1", rate="3")

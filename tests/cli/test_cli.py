@@ -701,6 +701,7 @@ def test_a_real_certificate(folder):
     assert f"rho = {one['result']['tube']['rho']:.4g}"[:9] in first.stdout
 
 
+@pytest.mark.slow
 def test_a_real_refusal(folder):
     file = folder / "fast.yaml"
     file.write_text(replaced("rate: 0.9999", "rate: 1"), encoding="utf-8")

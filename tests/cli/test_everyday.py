@@ -131,6 +131,7 @@ def codes_of_the_package() -> set[str]:
     return set(re.findall(r"\bTC\d{3}\b", text))
 
 
+@pytest.mark.slow
 def test_every_code_has_a_page_and_every_page_a_code():
     assert codes_of_the_package() == set(pages.codes())
 
@@ -247,6 +248,7 @@ def test_every_command_helps_with_an_example(command):
     assert re.search(rf"Examples?:\n\s+tubecert {command}\b", shown), shown
 
 
+@pytest.mark.slow
 def test_completion_is_offered_and_works():
     shown = run("--help").stdout
     assert "--install-completion" in shown

@@ -189,6 +189,7 @@ def blind(search, at, count=60_000):
     )
 
 
+@pytest.mark.slow
 def test_a_machine_that_is_too_slow_is_told_by_how_much():
     found = judged(orbit(sample_time=F(1, 20)))
     assert found.verdict is Verdict.UNDECIDED

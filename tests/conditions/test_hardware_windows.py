@@ -216,6 +216,7 @@ def followed(problem, r: HardwareRecipe):
         D = float(path[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", [{}, {"bandwidth": F(3)}, {"feedback_time": F(3, 1000)}])
 def test_the_course_is_above_the_comparison_equation(changes):
     problem = cut(

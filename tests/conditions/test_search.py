@@ -65,6 +65,7 @@ def test_three_state_as_printed():
     assert float(wrong.pair.recipe.adaptation_rate) == pytest.approx(5.015e6, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_three_state_corrected():
     problem = three_state(A_m=THREE, drift=Drift.SUM, kernel=Kernel.PAPER)
     assert gains(judged_26(problem).pair) == pytest.approx((41.8, 1.39e7), rel=2e-3)
@@ -143,6 +144,7 @@ def test_gains_do_not_depend_on_the_scale_of_the_metric(c):
 # --- certificate A against grids
 
 
+@pytest.mark.slow
 def test_windows_against_dense_grids():
     rng = np.random.default_rng(11)
     found_window = 0
@@ -294,6 +296,7 @@ def test_least_gamma_against_brute_force(problem, g):
     assert found[0] == pytest.approx(omega, rel=0.1)
 
 
+@pytest.mark.slow
 def test_auto_takes_the_best_predictor_gain_of_b():
     problem = alive(A_m=None, values={"B_pinv_x": 300.0, "h_t": 40.0})
     low = judged_distance(problem, curve=True).curve[0].bandwidth

@@ -292,6 +292,7 @@ def test_lipschitz_constants_are_tight_where_a_norm_vanishes():
     assert found.below <= 0.1
 
 
+@pytest.mark.slow
 def test_nested_norms_have_the_product_of_their_slopes():
     from tubecert.bounds.lipschitz import lipschitz_constant as _lipschitz
 
@@ -303,6 +304,7 @@ def test_nested_norms_have_the_product_of_their_slopes():
     assert found.above <= 5.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("h", "lower", "most"),
     [

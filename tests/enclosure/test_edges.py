@@ -103,6 +103,7 @@ def test_a_quadratic_form_covers_every_corner_of_its_radius():
     assert found.hi[0] - found.lo[0] <= 2 * spread * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_a_threshold_that_is_attained_is_refuted_not_proven():
     """f < c where f reaches c: at a point that floats hold exactly it is refuted, elsewhere undecided, never proven."""
     unit = BoxDomain({"x": (Fraction(0), Fraction(1))})

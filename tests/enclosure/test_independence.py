@@ -57,6 +57,7 @@ def test_dependent_columns_are_never_proven(rows: list[list[str]]) -> None:
     assert verdict(rows) == "undecided"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lie", ["zero", "huge", "nan", "turned", "noise"])
 def test_a_lying_inverse_proves_nothing_false(lie: str, monkeypatch: pytest.MonkeyPatch) -> None:
     honest = np.linalg.pinv

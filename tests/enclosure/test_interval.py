@@ -322,6 +322,7 @@ def test_undefined_operations_say_nothing():
         assert (opened.lo, opened.hi) == (-np.inf, np.inf)
 
 
+@pytest.mark.slow
 @given(
     q=st.fractions()
     | st.builds(lambda n, e: Fraction(n) * Fraction(10) ** e, st.integers(), st.integers(-400, 400))

@@ -104,6 +104,7 @@ def test_the_budget_is_that_of_all_parts_together(short):
     assert found == ridge(None, Effort(gap=1e-9, absolute=0, budget=9_000))
 
 
+@pytest.mark.slow
 def test_progress_goes_on_and_ends_with_all_boxes(short):
     told: list[Step] = []
     found = supremum(RIDGE, CUBE, replace(EFFORT, progress=told.append, workers=Elsewhere()))

@@ -75,6 +75,7 @@ def test_expansions_contain_the_function(several, box, part):
 KINKS = ["abs(x)", "norm(x, y)", "x*norm(x, 2*y)**2", "abs(x - y) + y**2", "exp(abs(x))*norm(x, y, 1/2)"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", KINKS)
 @given(box=boxes, part=parts)
 @settings(max_examples=30, deadline=None)

@@ -71,6 +71,7 @@ def rows_of(values):
     return [[Fraction(float(q)) for q in row] for row in values]
 
 
+@pytest.mark.slow
 def test_python_computes_what_the_reference_computes(controller):
     module = module_of(in_python(controller))
     expected = run(controller, np.array(module.GIVEN))
@@ -238,6 +239,7 @@ def test_c_computes_what_the_reference_computes(controller):
     assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_the_vectors_meet_every_branch(controller):
     given, own = np.array(vectors(controller).given), Reference(controller=controller)
     clipped, acts = set(), set()

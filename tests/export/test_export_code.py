@@ -235,6 +235,7 @@ IN_PYTHON = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", sorted(IN_PYTHON))
 def test_the_self_test_in_python_meets_a_mutation(what):
     text = exported(controllers.orbit(), "python").files["hardware_orbit.py"]
@@ -246,6 +247,7 @@ def test_the_self_test_in_python_meets_a_mutation(what):
         module.self_test()
 
 
+@pytest.mark.slow
 def test_the_vectors_meet_every_branch(controller):
     reference = Reference(controller=controller)
     y = np.array(vectors(controller).y)

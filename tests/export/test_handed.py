@@ -64,6 +64,7 @@ def rows_of(own, samples):
     return [[exact(Fraction(q)) for q in row] for row in own.given[:samples]]
 
 
+@pytest.mark.slow
 def test_python_computes_what_the_reference_computes(controller):
     module, own = module_of(in_python(controller)), vectors(controller)
     assert module.self_test() <= module.TOLERANCE

@@ -78,6 +78,7 @@ def test_a_prediction_is_within_its_bound(precision, real, delay):
     assert 1e-5 * bound < found <= bound
 
 
+@pytest.mark.slow
 def test_without_what_the_rule_is_off_the_bound_is_false(monkeypatch):
     """At a long delay the integration is what counts."""
     c, _ = predicting("0.01", held=True)

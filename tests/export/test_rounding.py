@@ -271,6 +271,7 @@ def test_a_clip_a_feedback_and_a_filter_that_are_off_are_seen():
     assert share(feedback=after.feedback * np.nan) == np.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_the_mean_of_a_moving_input_is_that_of_its_integral(precision):
     """Gauss's rule in exact arithmetic against quadrature in 60 digits: less than what r_q says of it."""

@@ -48,6 +48,7 @@ def test_curves_come_near_the_geodesic_of_a_flat_metric():
     assert errors[2] < errors[1] / 8  # of second order
 
 
+@pytest.mark.slow
 def test_the_distance_is_the_length_of_the_computed_curve():
     c = with_nodes(64, 8)
     y = np.array([[0.1, 0.2], [-0.3, 0.1]])

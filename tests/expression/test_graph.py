@@ -225,6 +225,7 @@ def test_text_is_readable(text: str, shown: str) -> None:
     assert to_text(read(text)) == shown
 
 
+@pytest.mark.slow
 def test_text_does_not_depend_on_the_history_of_the_process() -> None:
     program = """
 from tubecert.expression import parse, symbol, to_text

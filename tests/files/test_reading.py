@@ -211,6 +211,7 @@ def test_long_lines_and_many_columns_cost_little():
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000  # KiB
 
 
+@pytest.mark.slow
 def test_findings_of_a_file_are_counted_beyond_the_first():
     keys = "".join(f"unknown_{k}: 1\n" for k in range(5_000))
     Path("spec.yaml").write_text(PLAN + keys)

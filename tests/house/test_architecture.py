@@ -169,6 +169,7 @@ def loaded_by(statement: str) -> set[str]:
     return {name.split(".")[0] for name in done.stdout.split()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "statement",
     [
@@ -183,6 +184,7 @@ def test_heavy_libraries_come_late(statement):
     assert not loaded_by(statement) & HEAVY
 
 
+@pytest.mark.slow
 def test_reading_a_specification_needs_no_numerics():
     statement = f"import tubecert.spec as s; s.load({str(ROOT / 'configs' / 'three_state.yaml')!r})"
     assert not loaded_by(statement) & {"numpy", "scipy", "cvxpy"}

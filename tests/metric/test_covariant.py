@@ -203,6 +203,7 @@ def test_norms_of_a_random_system_are_those_of_their_definitions():
             assert attained == pytest.approx(sampled[name], rel=2e-3), name
 
 
+@pytest.mark.slow
 def test_over_a_box_the_bound_is_above_every_point_and_close_to_the_largest():
     model = model_of(*THREE)
     rng = np.random.default_rng(2)

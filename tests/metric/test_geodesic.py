@@ -173,6 +173,7 @@ def test_bounds_lie_above_sampling(system, W, rho):
     assert found.symbols.below <= found.symbols.above
 
 
+@pytest.mark.slow
 def test_half_plane_has_its_closed_form():
     rho = 0.4
     found = bounded(HALF_PLANE, (0, 1), rho)
@@ -233,6 +234,7 @@ def test_constant_metrics_pass_trivially():
     assert found.value.above == 0
 
 
+@pytest.mark.slow
 def test_where_the_metric_degenerates_nothing_is_proven():
     singular = model([[Y, 0], [0, 1]])
     assert not bounded(singular, (0, Fraction(1, 2)), 0.6, budget=2000).holds

@@ -93,6 +93,7 @@ def assert_witness(model, proof, rate, box):
 # -- the facts -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_five_digit_three_state_metric_is_certified():
     proof = verdict_of(three_state(), BOX_THREE)
     assert proof.verdict == "certified"
@@ -103,6 +104,7 @@ def test_the_five_digit_three_state_metric_is_certified():
     assert proof.upper_on_set.above == pytest.approx(5.8403, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_at_rate_one_it_is_refuted_with_a_witness_that_holds():
     model = three_state(rate="1")
     proof = verdict_of(model, BOX_THREE)
@@ -111,6 +113,7 @@ def test_at_rate_one_it_is_refuted_with_a_witness_that_holds():
     assert proof.margin.above < 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "box", "largest"),
     [(three_state(PRINTED_THREE, rate="1"), BOX_THREE, 0.99654), (two_state(PRINTED_TWO), BOX_TWO, 1.73934)],
@@ -175,6 +178,7 @@ def q(text):
     return arb(fraction.numerator) / fraction.denominator
 
 
+@pytest.mark.slow
 def test_c2_of_the_three_state_system_holds_in_ball_arithmetic():
     def contracts(x):
         forms = three_forms([x[0], arb("nan"), x[1]], q)  # x2 does not enter
@@ -199,6 +203,7 @@ def test_c2_of_the_two_state_system_holds_in_ball_arithmetic():
     prove([BOX_TWO[1]], contracts, 3000)
 
 
+@pytest.mark.slow
 def test_eigenvalues_of_w_are_bounded_in_ball_arithmetic():
     proof = verdict_of(three_state(), BOX_THREE)
     largest, least = 1 / proof.lower_on_set.below, 1 / proof.upper_on_set.above
@@ -299,6 +304,7 @@ def test_a_metric_that_depends_on_an_actuated_state_is_refused():
     assert proof.failed.input == "u"
 
 
+@pytest.mark.slow
 def test_a_killing_defect_that_vanishes_identically_is_no_defect():
     W = polynomial_three()
     W[0][0] = "0.20365*(sin(x3)**2 + cos(x3)**2)"
@@ -333,6 +339,7 @@ def test_the_rate_is_judged_exactly():
     assert verdict_of(replace(three_state(), rate=above + gap), BOX_THREE).verdict == "refuted"
 
 
+@pytest.mark.slow
 def test_a_tiny_budget_is_undecided_never_certified():
     for budget in (1, 10, 30):
         proof = verdict_of(three_state(), BOX_THREE, Effort(budget=budget))
@@ -341,6 +348,7 @@ def test_a_tiny_budget_is_undecided_never_certified():
         assert proof.largest_rate.above >= 0.999998
 
 
+@pytest.mark.slow
 def test_a_drift_that_cannot_be_bounded_within_the_budget_is_no_crash():
     f = ("-x1/(x1**2 - x1*x2 + x2**2 + 1/10)", "-x2")
     unit = [["1", "0"], ["0", "1"]]
@@ -461,6 +469,7 @@ def test_a_lost_factor_of_two_would_be_noticed(monkeypatch):
         test_the_five_digit_two_state_metric_is_certified()
 
 
+@pytest.mark.slow
 def test_a_drift_form_without_its_first_term_would_be_noticed(monkeypatch):
     def short(self):
         product = times([list(r) for r in self.f_x], [list(r) for r in self.W])

@@ -230,6 +230,7 @@ def beside() -> dict[str, tuple[dict[str, Any], dict[str, Any], bool]]:
     return made
 
 
+@pytest.mark.slow
 def test_beside_each_that_is_refuted_stands_one_that_holds_on_its_set_at_its_rate():
     found = beside()
     assert sorted(found) == sorted(each["name"] for each in TABLE if each["verdict"] == "refuted")

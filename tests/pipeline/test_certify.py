@@ -295,6 +295,7 @@ def test_declared_bounds_are_checked_against_the_expression():
     assert wide["constants"]["h_t"]["above"] == pytest.approx(0.2, rel=0.01)
 
 
+@pytest.mark.slow
 def test_declared_metric_bounds_must_hold_on_the_safe_set():
     result = run(edited(THREE, ("  rate: 0.9999", "  bounds: {lower: 3.9, upper: 5.88}\n  rate: 0.9999")))
     assert result["verdict"] == "refuted"

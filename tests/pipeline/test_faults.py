@@ -303,6 +303,7 @@ def test_a_recipe_of_another_theorem_proves_nothing_here(kind, problem):
         assert bool(section.curve) == (stranger is kind)
 
 
+@pytest.mark.slow
 def test_a_general_predictor_cannot_be_exchanged():
     almost = ((Fraction("-3.5"), Fraction(1, 10**12)), (Fraction(0), Fraction("-3.5")))
     for kind in map(kind_of, LIES):
@@ -337,6 +338,7 @@ def test_a_proof_that_travels_is_proven_anew(travel):
     assert again.recipe == recipe
 
 
+@pytest.mark.slow
 def test_gains_that_stand_for_others_prove_nothing():
     for kind in KINDS:
         problem = alive()

@@ -160,6 +160,7 @@ def test_the_answer_is_that_of_dense_samples(a, w):
         assert IS[0] not in codes(found)
 
 
+@pytest.mark.slow
 def test_what_touches_the_end_of_a_box_is_not_said_to_leave_it():
     plan = '{kind: expressions, x: ["sin(t)", "cos(t)"], u: ["0"], horizon: 4}'
     assert all(item.code != "TC411" or item.severity is Severity.NOTE for item in member(plan))

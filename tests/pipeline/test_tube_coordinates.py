@@ -171,6 +171,7 @@ def test_half_widths_that_leave_the_safe_set_are_told_by_state():
     assert found.tube is None
 
 
+@pytest.mark.slow
 def test_a_tube_fits_into_the_safe_set_through_states_that_were_not_asked_for():
     """As wide in w as was asked for, q would leave the safe set: the tube is narrower, and not refused."""
     found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {w: 1.9}")), COARSE)

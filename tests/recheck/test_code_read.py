@@ -58,6 +58,7 @@ def turning():
     return texts(CONTROLLERS["turning"](), "double")
 
 
+@pytest.mark.slow
 def test_the_text_itself_is_read(turning):
     assert read_code(*turning).name == "turning"
 

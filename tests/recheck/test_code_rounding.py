@@ -287,6 +287,7 @@ def test_a_feedback_at_every_third_sample_loses_what_one_at_all_of_them_does():
     assert third == all_of_them
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change", [("_EVERY 3 ", "_EVERY 4 "), ("c->since = 0;\n    }", "c->since = 1;\n    }")]
 )
@@ -342,6 +343,7 @@ def test_what_is_not_understood_is_refused(change):
         bounds(c, in_recheck("orbit"), (header, changed))
 
 
+@pytest.mark.slow
 def test_a_plan_without_end_and_code_of_another_loop_are_not_followed():
     c, formulas = predicting("0.0005", held=True)
     formulas.case.curve = replace(formulas.case.curve, horizon=None)
@@ -404,6 +406,7 @@ def test_another_rule_of_integration_is_noticed(change):
     assert (share <= 1) == (change is None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [None, ("(-0.01), ", "(-0.0100000001), "), ("{0.02, ", "{0.020000001, ")])
 def test_every_number_of_a_table_is_that_of_the_certificate(change):
     header, source = texts(CONTROLLERS["turning"](), "double")

@@ -319,6 +319,7 @@ def test_shares_that_are_large_enough_must_stay_within_the_limit():
             assert test.over([(0.9, 1.0)]).proven is proven
 
 
+@pytest.mark.slow
 def test_a_slope_that_vanishes_somewhere_has_its_part_of_what_is_left(monkeypatch):
     """|x - y/3| + |2 + y| <= 5.2: at the kink, which no halving meets, its least share is 0 and grows on both sides."""
     first, second = ([[e, "0"], ["0", "0"]] for e in ("x - y/3", "2 + y"))

@@ -44,6 +44,7 @@ def terms(draw):
     return term
 
 
+@pytest.mark.slow
 @given(st.lists(terms(), min_size=1, max_size=3), st.floats(-1, 1), st.floats(-1, 1))
 def test_the_values_are_the_same(entries, x, y):
     point = [arb(x), arb(y)]

@@ -55,6 +55,7 @@ def test_kernels_compile_where_nothing_can_be_kept(monkeypatch):
     assert not kernel.stats.cache_path
 
 
+@pytest.mark.slow
 def test_compilation_is_told(monkeypatch):
     nowhere(monkeypatch)
     heard = []

@@ -80,6 +80,7 @@ def test_what_a_definition_owes_at_times_keeps_it_out_of_f() -> None:
     assert spec("{z: 0/(t - 3)}", h="z").uncertainty.h
 
 
+@pytest.mark.slow
 def test_definitions_do_not_hide_a_text_without_end() -> None:
     """Forty doublings would be 10^12 characters: refused before they are written."""
     chain = "".join(f", a{k}: sin(a{k - 1})*(1 + a{k - 1})" for k in range(1, 40))

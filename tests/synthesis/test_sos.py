@@ -452,6 +452,7 @@ def test_a_solver_that_returns_nothing_finite_proposes_nothing(monkeypatch, stat
     assert proposal.feasible is not True
 
 
+@pytest.mark.slow
 def test_three_state_at_rate_0_999_within_the_published_bounds():
     asked = problem(THREE_STATE, BOX_THREE, degree=2, rate=0.999 * (1 + 1e-5))
     proposal = propose_sos(asked)
@@ -466,6 +467,7 @@ def test_above_the_uncontrollable_mode_there_is_nothing():
     assert "infeasible" in proposal.status or "almost" in proposal.status or "insufficient" in proposal.status
 
 
+@pytest.mark.slow
 def test_an_angle_is_treated_exactly():
     """A pendulum behind an actuator: verified with the true sine."""
     asked = problem(PENDULUM, BOX_PENDULUM, degree=2, rate=0.501)

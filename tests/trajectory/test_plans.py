@@ -220,6 +220,7 @@ def test_fixed_variables_enter_with_their_whole_range():
 # -- the defect ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_the_defect_lies_between_its_bounds(interpolation):
     data = knots(interpolation)
@@ -265,6 +266,7 @@ def swing(p, q):
     return np.array([p[1], -np.sin(p[0]) - p[1] / 10 + (1 + np.cos(p[0]) ** 2) * q[0]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_the_defect_in_a_metric_that_depends_on_the_state(interpolation):
     data = knots(interpolation)
