@@ -87,9 +87,7 @@ def _tiles(result: Result) -> Iterator[Tile]:
     for row in chosen:
         who = f", {NAMES[row.section]}" if len(chosen) > 1 else ""
         if row.pair.bandwidth is not None:
-            yield Tile(
-                symbol="ω", value=exact(row.pair.bandwidth), unit="rad/s", words=f"filter bandwidth{who}"
-            )
+            yield Tile(symbol="ω", value=exact(row.pair.bandwidth), unit="rad/s", words=f"bandwidth{who}")
         if row.pair.adaptation_rate is not None:
             yield Tile(
                 symbol="Γ", value=exact(row.pair.adaptation_rate), unit="", words=f"adaptation rate{who}"
