@@ -91,6 +91,15 @@ def test_short_geodesics_are_found_with_the_order_of_their_degree():
 
 
 @pytest.mark.slow
+def test_cubic_geodesics_are_as_near_where_the_metric_varies_by_a_hundredth():
+    """As `simulate` takes them there: far below the thousandth of the tube that its runs are known to."""
+    p, q = [0.0, 1.0], [0.004, 1.005]  # M = I/y^2
+    cubic, fine = (solved(HALF_PLANE, p, q, degree) for degree in (3, 9))
+    assert cubic.energy == pytest.approx(hyperbolic(p, q) ** 2, rel=1e-9)
+    assert np.allclose(cubic.covectors, fine.covectors, rtol=1e-7)
+
+
+@pytest.mark.slow
 def test_the_first_variation_is_the_covector():
     """dE/dq = 2 M gamma_s(1), dE/dp = -2 M gamma_s(0)."""
     p, q = np.array([0.02, -0.05, 0.03]), np.array([-0.06, 0.08, 0.05])

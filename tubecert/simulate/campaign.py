@@ -34,6 +34,7 @@ from tubecert.simulate.uncertainty import usual
 from tubecert.trajectory import Plan
 
 _HERE: Final = Serial()
+_DEAR: Final = 60_000  # steps of a run
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 
@@ -176,7 +177,8 @@ def simulate(
     interrupted = False
     for loop, own in zip(loops, drawn, strict=True):
         if loop.tested and count and not interrupted and not own.comparison.unreliable:
-            attacks.append(_attack(setting, loop, count, seed, report, executor))
+            attacked = replace(setting, dear=bool(own.runs.steps.max() > _DEAR))
+            attacks.append(_attack(attacked, loop, count, seed, report, executor))
             sample = attacks[-1].sample
             interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
     first = drawn[0].runs

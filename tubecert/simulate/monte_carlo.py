@@ -28,12 +28,10 @@ from tubecert.simulate.uncertainty import Class, Member, adversary, assembled, g
 BATCH: Final = 32  # runs that are kept, and told of, when they are finished
 FIRST: Final = 8  # of them: soon enough to say how long the others will take
 TIMES: Final = 201  # output times of a run
-_POPULATION: Final = 64
-_ELITE: Final = 12
+_POPULATION, _POPULATION_IF_DEAR, _ELITE = 64, 16, 12
 _ROUNDS: Final = 4
 _FIT: Final = 10  # times the tolerance: a search only compares, what it finds is integrated again
 _HERE: Final = Serial()
-ATTACKS: Final = _ROUNDS * _POPULATION  # runs of an adversary's search
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,20 +161,21 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     problem, kind = with_times(loop.problem, 2), setting.class_of(loop)
     size = genes_of_case(setting, kind)
-    genes, worst = rng.random((_POPULATION, size)), np.full(_POPULATION, -np.inf)
+    population = _POPULATION_IF_DEAR if setting.dear else _POPULATION
+    genes, worst = rng.random((population, size)), np.full(population, -np.inf)
     kept = np.zeros((0, size))
     scores = np.zeros(0)
     for turn in range(_ROUNDS):
         if report is not None:
             name = f"{loop.controller}, adversary"
-            report(Step(phase=Phase.SIMULATION, name=name, done=turn * _POPULATION, of=ATTACKS))
+            report(Step(phase=Phase.SIMULATION, name=name, done=turn * population, of=_ROUNDS * population))
         cases = [bred(setting, kind, row) for row in genes]
         runs = _run(setting, kind, problem, cases, _FIT * setting.tolerance)
         worst = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, worst])
         order = np.argsort(-values, kind="stable")[:_ELITE]
         kept, scores = pool[order], values[order]
-        genes = children(kept, _POPULATION, 0.5 ** (turn + 1), rng)
+        genes = children(kept, population, 0.5 ** (turn + 1), rng)
     return bred(setting, kind, kept[0])
 
 

@@ -30,6 +30,7 @@ from tubecert.trajectory import Plan
 
 TIMES: Final = 501  # output times of the loops that are drawn
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
+_TOLERANCE_IF_DEAR: Final = 5e-3  # half of what would be no result
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
 
 
@@ -65,7 +66,8 @@ class Setting:
     """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
 
     `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind. `uncertainty` is the
-    class of every loop but that of a machine, whose class is `on_machine`.
+    class of every loop but that of a machine, whose class is `on_machine`. `dear`: every run takes so many steps that
+    they are attacked with runs that are less accurate, and with fewer.
     """
 
     spec: Spec
@@ -84,6 +86,7 @@ class Setting:
     rest: Matrix
     h: tuple[Expression, ...] | None
     layer: float
+    dear: bool = False
 
     @property
     def varied(self) -> bool:
@@ -129,7 +132,7 @@ class Setting:
     @property
     def tolerance(self) -> float:
         """The error of |S x| that the integrator is asked for."""
-        return _TOLERANCE * self.rho
+        return (_TOLERANCE_IF_DEAR if self.dear else _TOLERANCE) * self.rho
 
     @property
     def half_widths(self) -> Array:

@@ -22,6 +22,8 @@ from tubecert.simulate.promise import KINDS, Kind, kind_for, promise
 from tubecert.simulate.setting import Loop, Setting, inputs_at
 
 _LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
+_DEGREE: Final = 5  # of the polynomials that geodesics are
+_EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tube, cubic ones are as near
 CHOSEN: Final = "chosen, not certified"
 
 
@@ -83,11 +85,18 @@ def _problem(
         gains=gains,
         control_rate=control_rate,
         limit=_LIMIT * setting.greatest_radius,
+        degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
         P=setting.S.T @ setting.S,
         machine=machine,
         E=setting.E,
         rest=setting.rest,
     )
+
+
+def _even(setting: Setting) -> bool:
+    """Whether a S'S <= M <= A S'S with nearly the same a and A over the tube: geodesics hardly bend there."""
+    own = setting.certified
+    return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
 
 
 def _loop_on_machine(setting: Setting, choice: Choice) -> Loop:
