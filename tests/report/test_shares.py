@@ -64,6 +64,7 @@ def test_where_a_decides_unasked_it_is_said_what_b_asks_for():
     unasked = Certificate.from_json(proven(calm.replace("conditions: {decides: B}\n", ""))).result
     [line] = less_by_distance(unasked)
     least = min(row.pair.adaptation_rate for row in rows(unasked) if row.section == "distance")
+    assert line.startswith("The specification does not say what decides: A does.")
     assert f"Gamma = {exact(least)}: conditions: {{decides: B}}" in line
     assert not list(less_by_distance(Certificate.from_json(proven(calm)).result))
     assert not list(less_by_distance(replace(unasked, decided_by=("distance",))))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 
 import pytest
 from mistakes import GOOD, MISTAKES
+from systems import SCALAR
 
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
@@ -44,3 +46,10 @@ def test_a_mistake_is_located_and_what_to_write_is_said(mistake: tuple[str, str,
 
 def test_there_are_many_of_them() -> None:
     assert len({(old, new) for old, new, *_ in MISTAKES}) == len(MISTAKES) >= 300
+
+
+def test_a_delay_may_use_a_parameter_whose_name_is_about_samples() -> None:
+    text = SCALAR.replace("system: {", "system: {parameters: {sample_time: 0.001}, ")
+    spec = load_text(text.replace("rate: 200", "rate: 200, delay: sample_time/2"))
+    assert spec.hardware is not None
+    assert spec.hardware.delay == Fraction(1, 2000)

@@ -120,7 +120,7 @@ def _gains(result: Result) -> list[RenderableType]:
 
 
 def less_by_distance(result: Result) -> Iterator[str]:
-    """That A decides where nothing else is asked for, though B is certified with smaller gains: which, and the key."""
+    """That A decides unasked, though B is certified with smaller gains: which, and the key."""
     if result.spec.effective.says_what_decides or result.decided_by != (RATES.key,):
         return
     found = [
@@ -133,7 +133,7 @@ def less_by_distance(result: Result) -> Iterator[str]:
     best = min(others, key=_adaptation)
     if 2 * _adaptation(best) <= _adaptation(own[0]) or own[0].verdict is not Verdict.CERTIFIED:
         yield (
-            f"A decides because nothing else is asked for. B holds the same tube with {best.text()}: "
+            f"The specification does not say what decides: A does. B holds the same tube with {best.text()}: "
             "conditions: {decides: B} in the specification, or --conditions B, takes it."
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Final
@@ -126,7 +127,9 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     sample_time = _sample_time(field, entries, names)
     one_sample = _is(entries.get("delay"), ONE_SAMPLE)
     delay = (
-        None if one_sample or _is_of_samples(entries) else _size(entries, "delay", names, default=Fraction(0))
+        None
+        if one_sample or _is_of_samples(entries, names)
+        else _size(entries, "delay", names, default=Fraction(0))
     )
     if delay is not None and sample_time is not None and delay > sample_time:
         entries["delay"].fail(
@@ -169,10 +172,12 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
     )
 
 
-def _is_of_samples(entries: Mapping[str, Field]) -> bool:
-    """Reports a delay that is told in samples, but for one sample."""
+def _is_of_samples(entries: Mapping[str, Field], names: Names) -> bool:
+    """Reports a delay that is told in samples, but for one sample; a parameter may have that name."""
     field = entries.get("delay")
-    if field is None or not isinstance(field.node, Scalar) or "sample" not in field.node.text:
+    if field is None or not isinstance(field.node, Scalar):
+        return False
+    if not any("sample" in word and word not in names.values for word in re.findall(r"\w+", field.node.text)):
         return False
     field.fail(
         codes.RANGE,
