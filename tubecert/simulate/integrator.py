@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _MOST_HALVINGS = 14
 _CHUNK = 16  # lanes that one thread takes at once
 _AGREEING = 0.02  # of the horizon: two levels that stop a lane this near to each other are believed
+_LIVED = 16  # steps that a lane must have come: what stops it earlier may be nothing but their length
 _PATIENCE = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
 _DOUBTFUL = 7  # the level from which on a run that does not converge is given up
 _DOUBTFUL_HELD = 4  # the same where a computer holds the input: what is between its samples is smooth
@@ -135,15 +136,15 @@ class _Lanes:
                 break  # no more steps: the error estimates say how far it came
             finer = run(lane, self.ladder.point, self.starts[lanes], len(self.problem.times))
             self.disturbance.beside.decided[lanes] = lane.force.beside.decided
-            done = self._compare(lanes, finer, number, tolerance)
             self.steps[lanes] = len(lane.grid.start) - 1
+            done = self._compare(lanes, finer, number, tolerance, lane.grid.start)
             lanes = lanes[~done]
             if not len(lanes):
                 break
         return self._runs()
 
     def _compare(
-        self, lanes: NDArray[np.intp], finer: Output, number: int, tolerance: float
+        self, lanes: NDArray[np.intp], finer: Output, number: int, tolerance: float, start: Array
     ) -> NDArray[np.bool_]:
         """Takes the finer runs, estimates their errors, and says which lanes are done."""
         coarser = self.found
@@ -152,6 +153,7 @@ class _Lanes:
         change = np.where(np.isnan(change), np.inf, change)
         failed, before = finer.status != 0, coarser.status[lanes] != 0
         agree = np.abs(finer.ended - coarser.ended[lanes]) <= _AGREEING * self.problem.horizon
+        agree &= np.searchsorted(start, finer.ended) >= _LIVED
         for ours, theirs in zip(coarser, finer, strict=True):
             ours[lanes] = theirs
         self.error[lanes] = np.where(failed, np.inf, change)
