@@ -124,6 +124,8 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("c: 0.5", "c: .nan", "TC108", 7, 25, "write a finite number"),
     ("z: [-1, 1]", "z: [-.inf, .inf]", "TC108", 10, 16, "write a finite number"),
     ("z: [-1, 1]", "z: [-inf, inf]", "TC108", 10, 16, "write a finite number"),
+    ("limits:", "definitions: {a: z}\nlimits:", "TC103", 23, 1, "it belongs to system: system.definitions"),
+    ("  f: [v", "  E: [0, 1]\n  f: [v", "TC103", 8, 3, "it belongs to disturbance: disturbance.E"),
     ("safe_set:", "safeset:", "TC103", 10, 1, "did you mean safe_set? known keys:"),
     ("safe_set:", "safe-set:", "TC103", 10, 1, "did you mean safe_set? known keys:"),
     ("safe_set:", "safeSet:", "TC103", 10, 1, "did you mean safe_set? known keys:"),

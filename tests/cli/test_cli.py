@@ -245,6 +245,10 @@ def test_bad_numbers(folder, option, text):
     assert not list(folder.iterdir())
 
 
+def test_a_word_that_may_stand_for_a_number_is_told():
+    assert "only deg is one), or auto" in run("certify", SPEC, "--gap", "automatic").stderr
+
+
 def test_all_bad_numbers_at_once():
     result = run("certify", SPEC, "--rho-a", "x", "--epsilon", "-1", "--gap", "1", "--budget", "0.5")
     assert len(LOCATED.findall(result.stderr)) == 4

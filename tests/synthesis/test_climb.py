@@ -324,8 +324,8 @@ def test_a_deadline_leaves_the_best_that_was_proven():
     assert isinstance(none.reason.claim.failure, NothingFound)
 
 
-@pytest.mark.slow
-def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
+def interrupt_at_the_second_metric(monkeypatch):
+    """The metrics that were judged: one, and one that was interrupted."""
     calls = []
     whole = synthesis.SynthesisRun._row
 
@@ -336,11 +336,33 @@ def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
         return whole(self, metric, floor)
 
     monkeypatch.setattr(synthesis.SynthesisRun, "_row", interrupted)
+    return calls
+
+
+@pytest.mark.slow
+def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
+    calls = interrupt_at_the_second_metric(monkeypatch)
     target = tmp_path / "m.json"
     done = run(ROBOTS / "van_der_pol.yaml", "-o", target)
     assert done.exit_code == 130
-    assert "interrupted" in done.stdout
+    assert "interrupted: this is the best" in done.stdout
     assert json.loads(target.read_text())["rate"] == float(calls[0].rate)
+
+
+@pytest.mark.slow
+def test_an_interruption_tells_what_was_tried_where_nothing_certified(monkeypatch, tmp_path):
+    interrupt_at_the_second_metric(monkeypatch)
+    text = (ROBOTS / "van_der_pol.yaml").read_text()
+    assert "epsilon: 0.2" in text
+    hopeless, target = tmp_path / "hopeless.yaml", tmp_path / "m.json"
+    hopeless.write_text(text.replace("epsilon: 0.2", "epsilon: 5"))  # larger than the safe set
+    target.write_text("older")
+    done = run(hopeless, "-o", target)
+    assert done.exit_code == 130
+    assert "interrupted: no metric that certifies was found by then" in done.stdout
+    assert "Metrics compared" in done.stdout
+    assert "help: reduce epsilon" in done.stdout
+    assert target.read_text() == "older"
 
 
 def test_the_verdict_is_told_before_advice(monkeypatch):

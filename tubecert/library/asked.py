@@ -71,7 +71,7 @@ def certification_numbers(given: Mapping[str, str | None], named: Named) -> Cert
     radii = {name: numbers.positive(named(name), given[name]) for name in ("rho_a", "epsilon", "deadline")}
     gains = {name: numbers.gain(named(name), given[name]) for name in ("bandwidth", "adaptation_rate")}
     text = given["gap"]
-    gap = None if text == AUTO else numbers.positive(named("gap"), text, below=1)
+    gap = None if text == AUTO else numbers.positive(named("gap"), text, below=1, word=AUTO)
     budget = numbers.count(named("budget"), given["budget"])
     numbers.check()
     by_effect = None if text is None else text == AUTO

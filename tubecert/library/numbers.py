@@ -29,15 +29,17 @@ class Numbers:
         below: int | None = None,
         wanted: str = "positive",
         remedy: str = "> 0",
+        word: str = "",
     ) -> Fraction | None:
-        """The exact number, > 0 (and < `below`); None if the option is absent or wrong."""
+        """The exact number, > 0 (and < `below`); None if the option is absent or wrong. A `word` may stand for it."""
         if text is None:
             return None
         try:
             value = parse_number(text)
         except ExpressionError as error:
             place = {"offset": error.offset, "width": error.width}
-            self._fail("TC108", option, text, message=error.message, help=error.help, **place)
+            help = f"{error.help}, or {word}" if word else error.help
+            self._fail("TC108", option, text, message=error.message, help=help, **place)
             return None
         if value <= 0:
             self._range(option, text, wanted, remedy)

@@ -153,7 +153,7 @@ class SynthesisRun:
         return self._written(best)
 
     def _so_far(self, end: BaseException) -> VerifiedMetric | None:
-        """The best of what is proven when the search is cut short; an interruption goes on if there is nothing."""
+        """The best of what is proven when the search is cut short; an interruption goes on if nothing was judged."""
         self.deadline = Deadline()
         wanted, self.cut = self.wanted, "deadline" if isinstance(end, OutOfTime) else "interrupted"
         if wanted.objective in ("adaptation", "tube"):
@@ -166,7 +166,7 @@ class SynthesisRun:
                 found = found and self._at_rate(found, wanted.rate)
             else:
                 found = max(proven, key=lambda metric: metric.rate, default=None)
-        if found is None and not isinstance(end, OutOfTime):
+        if found is None and self.cut == "interrupted" and none_certified(self._table()) is None:
             raise end
         return found
 

@@ -29,10 +29,9 @@ _COLUMNS = (
     "lets inputs act over the tube (tubecert explain input_gain)."
 )
 _HARDLY = 1.05  # times as much
-_CUT = {
-    "deadline": "cut short by the deadline: this is the best of what was proven by then",
-    "interrupted": "interrupted: this is the best of what was proven by then",
-}
+_CUT = {"deadline": "cut short by the deadline", "interrupted": "interrupted"}
+_BEST = "this is the best of what was proven by then"
+_NONE = "no metric that certifies was found by then"
 _CAUSES = {
     "distance": "{more}: the distance that the uncertainty drives the state grows as 1/rate",
     "gains": "no gains suffice: the distance that the uncertainty drives the state leaves no room in the tube",
@@ -67,7 +66,7 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
     if data.limits is not None:
         parts += titled("What limits the rate", _limits(data.limits))
     if data.cut is not None:
-        parts += [Text(), Text(_CUT[data.cut], style="yellow")]
+        parts += [Text(), Text(f"{_CUT[data.cut]}: {_NONE if file is None else _BEST}", style="yellow")]
     if file is None:
         return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify {visible(system.path)} --metric {target}"

@@ -92,6 +92,7 @@ _PLACES: Final[Mapping[str, str]] = {
     ),
     "dual_metric": "metric",
     "h": "uncertainty",
+    "E": "disturbance",
     "horizon": "trajectory",
 }
 """Where keys belong that are often written elsewhere."""
@@ -156,11 +157,10 @@ def of_key(key: str, known: Sequence[str]) -> tuple[str, list[str]]:
         return "if a comma was meant as a decimal point, write the point: 0.1", []
     if (other := same_as(key, known)) is not None:
         return f"it is called {other}: {EXAMPLES.get(other, '...')}", [other]
+    if key in _PLACES:
+        meant = _MEANT.get(key, ()) if key in _KEYS else ()
+        return f"it belongs to {_PLACES[key]}: {_PLACES[key]}.{key}", list(meant)
     close = near(key, known)
-    if key in _PLACES and not close:
-        return f"it belongs to {_PLACES[key]}: {_PLACES[key]}.{key}", list(
-            _MEANT.get(key, ())
-        ) if key in _KEYS else close
     advice = _KEYS.get(key) or suggestion(key, known, what="known keys")
     return advice, list(_MEANT.get(key, ())) if key in _KEYS else close
 
