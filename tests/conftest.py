@@ -4,11 +4,14 @@ import gc
 import os
 import signal
 import sys
+from contextlib import suppress
 from functools import cache
 
 import pytest
 import shared
 from hypothesis import HealthCheck, settings
+
+from tubecert.cli import process
 
 # how long an example takes is the machine's affair, and its other users'
 settings.register_profile(
@@ -21,6 +24,8 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # as the tool has it: some test imports numba before the tool does, and a third more of compilation would be for nothing
 os.environ.setdefault("NUMBA_OPT", "1")
+with suppress(AttributeError):  # another C library
+    process.keep_memory()  # as commands do
 gc.set_threshold(
     50_000, 20, 50
 )  # little of what tests make is in cycles, and looking for it costs a twentieth

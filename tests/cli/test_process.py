@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import resource
 import signal
@@ -167,3 +168,33 @@ def test_what_was_registered_for_the_end_is_done_and_output_is_whole(folder):
     before = "import atexit; atexit.register(print, 'the end')\n" + CERTIFY.format(body="pass")
     code, output, _ = ended(started("certify", SPEC, "-q", before=before))
     assert (code, output.splitlines()[-1]) == (0, "the end")
+
+
+FAULTS = """
+import resource
+import numpy
+from tubecert.cli import process
+process.prepare()
+numpy.ones(3_000_000)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(4):
+    numpy.ones(3_000_000)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+process.leave(0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallopt"), reason="another C library")
+def test_memory_that_is_freed_is_not_fetched_again(monkeypatch):
+    """24 MB are 5859 pages, each of which was cleared by the system at every use."""
+
+    def faults():
+        done = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True)
+        return int(done.stdout)
+
+    for name in ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"):
+        monkeypatch.delenv(name, raising=False)
+    assert faults() < 1000
+    monkeypatch.setenv("MALLOC_MMAP_THRESHOLD_", "1000000")  # the user's own is respected
+    assert faults() > 4 * 5000
