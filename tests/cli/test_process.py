@@ -187,7 +187,7 @@ process.leave(0)
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallopt"), reason="another C library")
 def test_memory_that_is_freed_is_not_fetched_again(monkeypatch):
-    """24 MB are 5859 pages, each of which was cleared by the system at every use."""
+    """24 MB are thousands of pages, each of which the system cleared at every use."""
 
     def faults():
         done = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True)
@@ -195,6 +195,6 @@ def test_memory_that_is_freed_is_not_fetched_again(monkeypatch):
 
     for name in ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"):
         monkeypatch.delenv(name, raising=False)
-    assert faults() < 1000
+    kept = faults()
     monkeypatch.setenv("MALLOC_MMAP_THRESHOLD_", "1000000")  # the user's own is respected
-    assert faults() > 4 * 5000
+    assert 5 * kept < faults()
