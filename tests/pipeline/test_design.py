@@ -14,10 +14,11 @@ from systems import IN_WINDOWS, SCALAR, SMALL
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import EaseHardware, LessenCause, TakeWindows
 from tubecert.digits import exact
-from tubecert.pipeline import Options, certify, design
+from tubecert.pipeline import Deadline, Options, certify, design
 from tubecert.pipeline.design import narrowest, needed_of
+from tubecert.pipeline.trade import cheapest, front
 from tubecert.pipeline.width import Measure, size_of
-from tubecert.report.design import report
+from tubecert.report.design import as_data, report
 from tubecert.spec import load_text
 from tubecert.spec.windows import more_windows
 from tubecert.verdict import Verdict
@@ -53,6 +54,48 @@ def test_the_best_is_certified_and_no_size_beside_it_is_better():
     needed = needed_of(best.result)
     assert needed is not None
     assert needed > Fraction(99, 100), "it is narrowed to what it needs"
+
+
+@pytest.mark.usefixtures("barely")
+@pytest.mark.slow
+def test_a_deadline_leaves_the_best_that_was_tried_by_then_and_the_report_says_so():
+    """There was none: a design came to its own end, or to none."""
+    found = narrowest(scaled(), H, RADIUS, deadline=Deadline.after(0))
+    assert [each.scale for each in found.attempts] == [1], "the tube that is asked for is certified always"
+    assert found.best is not None
+    assert "cut short by the deadline: this is the best of what was proven by then" in words_of(found)
+    assert as_data(found).cut == "deadline"
+
+
+@pytest.mark.usefixtures("barely")
+@pytest.mark.slow
+def test_an_interruption_leaves_the_best_that_was_tried_by_then(monkeypatch):
+    tried = []
+
+    def attempt(*arguments, **asked):
+        if asked.get("brief"):
+            tried.append(arguments[0].tube.epsilon)
+        if len(tried) > 2:
+            tried.clear()
+            raise KeyboardInterrupt
+        return certify(*arguments, **asked)
+
+    monkeypatch.setattr(design, "certify", attempt)
+    found = narrowest(scaled(), H, RADIUS)
+    assert [each.scale for each in found.attempts] == [1, Fraction(1, 2)]
+    assert (found.cut, found.best is not None) == ("interrupted", True)
+    assert "interrupted: this is the best of what was proven by then" in words_of(found)
+
+
+@pytest.mark.usefixtures("barely")
+@pytest.mark.slow
+def test_what_a_tube_asks_of_a_machine_is_cut_short_after_its_first_certification():
+    text = SCALAR.replace("rate: 200", "sample_time: largest")
+    offers = cheapest(lambda part: load_text(text), ["sample_time", "delay"], H, deadline=Deadline.after(0))
+    assert [each.part for each in offers.offers] == ["sample_time"]
+    assert offers.cut == "deadline"
+    points = front(scaled(text), "sample_time", RADIUS, H, deadline=Deadline.after(0))
+    assert ([each.scale for each in points.points], points.cut) == ([1], "deadline")
 
 
 @pytest.mark.usefixtures("barely")

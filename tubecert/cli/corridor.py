@@ -42,21 +42,23 @@ def corridor(words: str, asked: Asked, kept: Kept, output: Output) -> ExitCode:
 
     spec, found = offered(words, asked)
     files = {}
-    for each in found:
+    for each in found.offers:
         if each.value is not None:
             files[each.part] = _named(kept.target, FILES[each.part])
             certificate.write_text(files[each.part], kept.seal(each.result))
-    data = printable_json(json.dumps(told.offers_data(found, files), indent=1, ensure_ascii=False)) + "\n"
+    data = (
+        printable_json(json.dumps(told.offers_data(found.offers, files), indent=1, ensure_ascii=False)) + "\n"
+    )
     present(
         output,
-        told.offers_summary(spec, found),
+        told.offers_summary(spec, found.offers),
         lambda: told.offers(spec, found, files),
         data if output.json else None,
     )
-    failed = next((each for each in found if each.value is None), None)
-    return (
-        ExitCode.CERTIFIED if len(files) == len(found) or failed is None else failed.result.verdict.exit_code
-    )
+    failed = next((each for each in found.offers if each.value is None), None)
+    if found.cut == "interrupted":
+        return ExitCode.INTERRUPTED
+    return ExitCode.CERTIFIED if failed is None else failed.result.verdict.exit_code
 
 
 def pareto(words: str, asked: Asked, kept: Kept, output: Output) -> ExitCode:
@@ -80,6 +82,8 @@ def pareto(words: str, asked: Asked, kept: Kept, output: Output) -> ExitCode:
         lambda: told.front(spec, found, part, files, stem),
         data if output.json else None,
     )
+    if found.cut == "interrupted":
+        return ExitCode.INTERRUPTED
     return ExitCode.CERTIFIED if files else found.points[0].offer.result.verdict.exit_code
 
 

@@ -16,7 +16,7 @@ from tubecert.cli.corridor import Kept, corridor, pareto
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
-from tubecert.cli.targets import spare
+from tubecert.cli.targets import deadline_after, spare
 from tubecert.errors import ExitCode
 from tubecert.libraries import versions
 from tubecert.library.numbers import Numbers
@@ -50,6 +50,7 @@ class Given:
     metric: str | None
     gap: str
     budget: str | None
+    deadline: str | None
     target: str | None
 
 
@@ -58,6 +59,7 @@ def run(given: Given, output: Output) -> ExitCode:
     numbers = Numbers()
     gap = numbers.positive("--gap", given.gap, below=1)
     budget = numbers.count("--budget", given.budget)
+    seconds = numbers.positive("--deadline", given.deadline)
     numbers.check()
     target = given.target or f"{Path(given.spec).stem}.design.json"
     certificate.check_target(target)
@@ -80,13 +82,14 @@ def run(given: Given, output: Output) -> ExitCode:
             named=flag,
             keep=partial(_kept_metric, target),
             progress=report,
+            deadline=deadline_after(seconds),
             as_it_is=given.corridor is not None,
         )
         if given.corridor is not None or given.pareto is not None:
             return _traded(given, asked, target, output)
         memory = pipeline.Memory()
         found = narrowed(asked, memory)
-        better = improved(found, asked, memory) if given.sensitivities else ()
+        better = improved(found, asked, memory) if given.sensitivities and found.cut is None else ()
     text = _sealed(found)
     if text is not None:
         certificate.write_text(target, text)
@@ -100,7 +103,7 @@ def run(given: Given, output: Output) -> ExitCode:
         lambda: told.report(first, found, written, better),
         data if output.json else None,
     )
-    return found.shown.result.verdict.exit_code
+    return ExitCode.INTERRUPTED if found.cut == "interrupted" else found.shown.result.verdict.exit_code
 
 
 def _kept_metric(target: str, text: str) -> str:

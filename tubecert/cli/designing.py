@@ -7,7 +7,15 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Output, Settings, SpecFile, number_option, with_output
+from tubecert.cli.options import (
+    Budget,
+    DesignDeadline,
+    Output,
+    Settings,
+    SpecFile,
+    number_option,
+    with_output,
+)
 
 _AFTER = """\b
 Examples:
@@ -23,7 +31,10 @@ decides (conditions.decides, normally H: the machine), and the narrowest one tha
 With --corridor the tube is given: what is written is the lowest rate, the largest delay, noise and wind, each alone.
 
 \b
-Exit codes: 0 a tube was found; 1 none, and a claim is refuted; 2 invalid input; 4 none.
+A deadline, Ctrl-C and SIGTERM end the search after its first size: the best that is certified by then is written.
+
+\b
+Exit codes: 0 a tube was found; 1 none, and a claim is refuted; 2 invalid input; 4 none; 130 interrupted.
 """
 
 
@@ -78,6 +89,7 @@ def design(
     ] = None,
     gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
     budget: Budget = None,
+    deadline: DesignDeadline = None,
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", metavar="FILE", help="The certificate.  [SPEC's stem.design.json]"),
@@ -99,6 +111,7 @@ def design(
             metric=metric,
             gap=gap,
             budget=budget,
+            deadline=deadline,
             target=output,
         )
         code = run(given, how)

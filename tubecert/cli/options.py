@@ -63,6 +63,11 @@ Deadline = Annotated[
     number_option("--deadline", "Seconds after which the best metric found so far is taken."),
 ]
 
+DesignDeadline = Annotated[
+    str | None,
+    number_option("--deadline", "Seconds after which the best that is certified so far is taken."),
+]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:

@@ -18,7 +18,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import number_text, suggestion
 from tubecert.findings import Finding
 from tubecert.letters import HARDWARE
-from tubecert.library.asked import Named, effort_numbers
+from tubecert.library.asked import Named, deadline_of, effort_numbers
 from tubecert.library.designs import Design, Machines, TradeOff
 from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
@@ -36,13 +36,13 @@ from tubecert.library.trading import (
     quantities,
     refused,
 )
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Deadline, Options, certify
 from tubecert.pipeline.design import Design as Attempts
 from tubecert.pipeline.design import narrowest
 from tubecert.pipeline.metric_search import Found, search
 from tubecert.pipeline.sensitivities import Sensitivity
 from tubecert.pipeline.sensitivities import sensitivities as sensitivities_of
-from tubecert.pipeline.trade import Front, Offer, cheapest, front
+from tubecert.pipeline.trade import Cheapest, Front, cheapest, front
 from tubecert.pipeline.width import Measure, measure_in, measure_of, size_of
 from tubecert.printable import visible
 from tubecert.progress import Progress
@@ -63,13 +63,15 @@ def design(
     sensitivities: bool = False,
     gap: Number | None = None,
     budget: int | None = None,
+    deadline: Number | None = None,
     progress: Progress | None = None,
 ) -> Design:
     """The narrowest certified tube for the machine of a specification: `tubecert design`.
 
     `minimise`: the states and outputs whose half-widths count, without it those of `tube.half_widths`, or the radius.
     `metric` stands in for the specification's own; `"search"` looks for one for this machine. `sensitivities`: what the
-    tube becomes with each number of the machine halved, and taken away. Raises `SpecError`.
+    tube becomes with each number of the machine halved, and taken away. `deadline`: the best that was certified so many
+    s from now, at least the tube that is asked for (a metric is looked for in full). Raises `SpecError`.
     """
     found: list[Mapping[str, object]] = []
 
@@ -78,11 +80,18 @@ def design(
         return found[-1]
 
     asked = opened(
-        spec_of(spec), _options(gap, budget), minimise, metric, named=str, keep=keep, progress=timed(progress)
+        spec_of(spec),
+        _options(gap, budget),
+        minimise,
+        metric,
+        named=str,
+        keep=keep,
+        progress=timed(progress),
+        deadline=deadline_of(deadline),
     )
     memory = Memory()
     attempts = narrowed(asked, memory)
-    better = improved(attempts, asked, memory) if sensitivities else ()
+    better = improved(attempts, asked, memory) if sensitivities and attempts.cut is None else ()
     return Design(
         spec=asked.load(()), found=attempts, sensitivities=better, metric=found[0] if found else None
     )
@@ -95,6 +104,7 @@ def machines(
     metric: MetricLike | None = None,
     gap: Number | None = None,
     budget: int | None = None,
+    deadline: Number | None = None,
     progress: Progress | None = None,
 ) -> Machines:
     """The cheapest machine for a tube: `tubecert design --corridor`. A radius, or half-widths by state."""
@@ -110,10 +120,11 @@ def machines(
         named=str,
         keep=json.loads,
         progress=timed(progress),
+        deadline=deadline_of(deadline),
         as_it_is=True,
     )
     own, found = offered(words, asked)
-    return Machines(spec=own, found=found)
+    return Machines(spec=own, found=found.offers)
 
 
 def trade_off(
@@ -124,6 +135,7 @@ def trade_off(
     metric: MetricLike | None = None,
     gap: Number | None = None,
     budget: int | None = None,
+    deadline: Number | None = None,
     progress: Progress | None = None,
 ) -> TradeOff:
     """The tube against a number of the machine: `tubecert design --pareto tube,KEY`.
@@ -138,6 +150,7 @@ def trade_off(
         named=str,
         keep=json.loads,
         progress=timed(progress),
+        deadline=deadline_of(deadline),
     )
     words = f"{TUBE},{key}"
     _, part = quantities(words, str)
@@ -157,6 +170,7 @@ def opened(
     named: Named,
     keep: Callable[[str], MetricLike],
     progress: Progress | None,
+    deadline: Deadline | None = None,
     as_it_is: bool = False,
 ) -> Asked:
     """A design of a specification; `keep` is given the text of a metric that is found, and says how it is given on.
@@ -171,6 +185,7 @@ def opened(
         measure=_minimised(spec, minimise, named),
         progress=progress,
         named=named,
+        deadline=deadline,
     )
     held = None if wanted else metric
     _check(spec if held is None else with_metric(spec, held)[0], searched=wanted)
@@ -260,7 +275,12 @@ def narrowed(asked: Asked, memory: Memory | None = None) -> Attempts:
     """Every attempt at the narrowest tube."""
     first = asked.load(())
     return narrowest(
-        lambda scale: asked.load(_scaled(first, scale)), asked.options, asked.measure, asked.progress, memory
+        lambda scale: asked.load(_scaled(first, scale)),
+        asked.options,
+        asked.measure,
+        asked.progress,
+        memory,
+        deadline=asked.deadline,
     )
 
 
@@ -275,10 +295,11 @@ def improved(found: Attempts, asked: Asked, memory: Memory) -> tuple[Sensitivity
         measure=asked.measure,
         memory=memory,
         progress=asked.progress,
+        deadline=asked.deadline,
     )
 
 
-def offered(words: str, asked: Asked) -> tuple[Spec, tuple[Offer, ...]]:
+def offered(words: str, asked: Asked) -> tuple[Spec, Cheapest]:
     """The specification with the tube that is asked for, and the cheapest machine, part by part."""
     tube = corridor_settings(words, asked)
     spec = asked.load(tube)
@@ -287,6 +308,7 @@ def offered(words: str, asked: Asked) -> tuple[Spec, tuple[Offer, ...]]:
         parts_of(spec, asked.named),
         asked.options,
         asked.progress,
+        deadline=asked.deadline,
     )
     return spec, found
 
@@ -304,6 +326,7 @@ def fronted(words: str, asked: Asked) -> tuple[Spec, Front]:
         asked.measure,
         asked.options,
         asked.progress,
+        deadline=asked.deadline,
     )
     return spec, found
 

@@ -27,7 +27,7 @@ from tubecert.spec.override import Setting
 from tubecert.spec.types import Hardware
 
 if TYPE_CHECKING:
-    from tubecert.pipeline import Options
+    from tubecert.pipeline import Deadline, Options
     from tubecert.pipeline.width import Measure
     from tubecert.progress import Progress
     from tubecert.spec import Spec
@@ -46,13 +46,17 @@ TUBE: Final = "tube"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """A design: `load` reads the specification with settings beside its own; `named` is what findings call options."""
+    """A design: `load` reads the specification with settings beside its own; `named` is what findings call options.
+
+    At the `deadline` it comes out with the best that was certified by then.
+    """
 
     load: Callable[[Sequence[Setting]], Spec]
     options: Options
     measure: Measure
     progress: Progress | None
     named: Named
+    deadline: Deadline | None = None
 
 
 def refused(option: str, message: str, help: str) -> SpecError:

@@ -8,6 +8,12 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from math import inf
+from typing import Literal
+
+from tubecert.progress import Progress, Step
+
+Cut = Literal["deadline", "interrupted"]
+"""What ended a search before its end."""
 
 
 class OutOfTime(Exception):  # noqa: N818 - an end, no error
@@ -29,3 +35,18 @@ class Deadline:
         """Raises `OutOfTime` once it has passed."""
         if time.monotonic() > self.at:
             raise OutOfTime
+
+    def watched(self, progress: Progress | None) -> Progress:
+        """The same progress, which raises `OutOfTime` at the first step after it."""
+
+        def told(step: Step) -> None:
+            self.check()
+            if progress is not None:
+                progress(step)
+
+        return told
+
+
+def cut_by(end: BaseException) -> Cut:
+    """What ended a search: a deadline, or somebody who interrupted it."""
+    return "deadline" if isinstance(end, OutOfTime) else "interrupted"

@@ -5,7 +5,8 @@ start or the machine does not fit. So sizes are tried by factors of two in both 
 is then narrowed to what it was proven to need. Where none is proven, but the loop asks for more than one size and the
 next is stopped by something else (limits, the safe set, an obstacle), sizes between these two are tried. In: a
 specification at every scale. Out: every attempt, each certified as far as it takes to compare them, and the one that is
-shown in full.
+shown in full. A deadline or an interruption ends the search after its first size: the best of what was tried by then is
+what it comes out with.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Final
 from tubecert.certificate.result import Result
 from tubecert.conditions.decimals import round_up
 from tubecert.pipeline import Options, certify
+from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
 from tubecert.pipeline.width import Measure, machine_of, size_of
 from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
@@ -55,9 +57,10 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """Every attempt in the order in which they were made."""
+    """Every attempt in the order in which they were made, and what ended the search before its end."""
 
     attempts: tuple[Attempt, ...]
+    cut: Cut | None = None
 
     @property
     def best(self) -> Attempt | None:
@@ -77,16 +80,23 @@ def narrowest(
     measure: Measure,
     progress: Progress | None = None,
     memory: Memory | None = None,
+    *,
+    deadline: Deadline | None = None,
 ) -> Design:
-    """The narrowest tube by a measure, among those of every size."""
+    """The narrowest tube by a measure, among those of every size.
+
+    At the `deadline`, and at an interruption, the narrowest of those that were tried; the first is always certified.
+    """
     memory = Memory() if memory is None else memory
     attempts: dict[Fraction, Attempt] = {}
+    cut: Cut | None = None
 
     def attempt(scale: Fraction) -> Attempt:
         if scale not in attempts:
             told = None if progress is None else partial(_told, progress, len(attempts))
             spec = at(scale)
-            result = certify(spec, options, told, memory, brief=True)
+            watched = deadline.watched(told) if deadline is not None and attempts else told
+            result = certify(spec, options, watched, memory, brief=True)
             attempts[scale] = Attempt(
                 scale=scale,
                 result=result,
@@ -96,6 +106,19 @@ def narrowest(
         return attempts[scale]
 
     first = attempt(Fraction(1))
+    try:
+        _tried(attempts, attempt, first)
+    except (OutOfTime, KeyboardInterrupt) as end:
+        cut = cut_by(end)
+    shown = Design(attempts=tuple(attempts.values())).shown
+    attempts[shown.scale] = replace(shown, result=shown.whole())
+    return Design(attempts=tuple(attempts.values()), cut=cut)
+
+
+def _tried(
+    attempts: Mapping[Fraction, Attempt], attempt: Callable[[Fraction], Attempt], first: Attempt
+) -> None:
+    """Every size, in both directions from the first and then inward from the best."""
     for factor in (Fraction(1, 2), Fraction(2)):
         scale, failed = Fraction(1), 0
         for _ in range(_FARTHEST):
@@ -114,9 +137,6 @@ def narrowest(
         if best.size is None or needed is None or needed >= _SETTLED:
             break
         best = attempt(round_up(float(best.scale * needed * _ROOM), 5))
-    shown = Design(attempts=tuple(attempts.values())).shown
-    attempts[shown.scale] = replace(shown, result=shown.whole())
-    return Design(attempts=tuple(attempts.values()))
 
 
 def _between(attempts: Mapping[Fraction, Attempt], attempt: Callable[[Fraction], Attempt]) -> Attempt | None:

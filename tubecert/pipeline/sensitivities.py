@@ -15,6 +15,7 @@ from typing import Final, Literal
 from tubecert.conditions.decimals import round_up
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
+from tubecert.pipeline.deadline import Deadline, OutOfTime
 from tubecert.pipeline.design import Design, needed_of
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.progress import Phase, Progress, Step
@@ -63,14 +64,16 @@ def sensitivities(
     measure: Measure,
     memory: Memory,
     progress: Progress | None = None,
+    deadline: Deadline | None = None,
 ) -> tuple[Sensitivity, ...]:
-    """What each machine makes of the tube; those that no specification can have are left out."""
+    """What each machine makes of the tube; left out: those that no specification can have, and those after the end."""
+    deadline = deadline or Deadline()
     kept: list[Sensitivity] = []
     for better in machines:
         told = None if progress is None else partial(_told, progress, len(kept), len(machines))
 
         def attempt(scale: Fraction, better: Better = better, told: Progress | None = told) -> _Tried:
-            result = certify(at(scale, better), options, told, memory, brief=True)
+            result = certify(at(scale, better), options, deadline.watched(told), memory, brief=True)
             certified = result.verdict is Verdict.CERTIFIED
             return _Tried(size=size_of(result, measure), needed=needed_of(result) if certified else None)
 
@@ -78,6 +81,8 @@ def sensitivities(
             kept.append(_smallest(found, better, attempt))
         except SpecError:  # a delay beyond the sample time, say
             continue
+        except (OutOfTime, KeyboardInterrupt):
+            break
     return tuple(kept)
 
 

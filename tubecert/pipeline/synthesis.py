@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
-from typing import Literal
 
 from tubecert.claims.advice import (
     AskForRateBelow,
@@ -45,7 +44,7 @@ from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
-from tubecert.pipeline.deadline import Deadline, OutOfTime
+from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.pipeline.unfound import equilibria, lacking, nearest, none_certified, remedies, tried
 from tubecert.pipeline.width import half_widths, measure_in
@@ -122,7 +121,7 @@ class SynthesisRun:
         )
         self.rows: dict[tuple[Fraction, Floor, int], Row] = {}
         self.climb = Climb(self._compare, wanted.objective)
-        self.cut: Literal["deadline", "interrupted"] | None = None
+        self.cut: Cut | None = None
         self.said = 0
 
     def run(self, *, table: bool) -> Synthesised:
@@ -155,7 +154,7 @@ class SynthesisRun:
     def _so_far(self, end: BaseException) -> VerifiedMetric | None:
         """The best of what is proven when the search is cut short; an interruption goes on if nothing was judged."""
         self.deadline = Deadline()
-        wanted, self.cut = self.wanted, "deadline" if isinstance(end, OutOfTime) else "interrupted"
+        wanted, self.cut = self.wanted, cut_by(end)
         if wanted.objective in ("adaptation", "tube"):
             found = self._chosen()
         else:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import inf, log
-from typing import Literal
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
 from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
 from tubecert.claims.family import Claim, Reason
+from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
 from tubecert.synthesis.attempts import Attempt
@@ -115,7 +115,7 @@ class Synthesised:
     rows: tuple[Row, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     limits: RateLimits | None = None
-    cut: Literal["deadline", "interrupted"] | None = None
+    cut: Cut | None = None
 
     def data(self) -> SynthesisData:
         """`result.synthesis` of a certificate: what was asked for, what was tried; no times."""

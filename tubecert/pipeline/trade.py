@@ -1,7 +1,8 @@
 """What a tube asks of a machine: the cheapest machine for one tube, and for tubes of many sizes.
 
 In: a specification in which one number of the machine is the largest, or the tube has another size. Out: full
-certifications, each with a verdict of its own; an optimum is what certificate H says of `largest`.
+certifications, each with a verdict of its own; an optimum is what certificate H says of `largest`. A deadline or an
+interruption leaves what was certified by then, at least one.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Final
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import HardwarePart
 from tubecert.pipeline import Options, certify
+from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
 from tubecert.pipeline.width import Measure, machine_of, size_of
 from tubecert.progress import Progress
 from tubecert.spec import Spec
@@ -48,10 +50,28 @@ def cheapest(
     parts: Iterable[HardwarePart],
     options: Options,
     progress: Progress | None = None,
-) -> tuple[Offer, ...]:
+    deadline: Deadline | None = None,
+) -> Cheapest:
     """The cheapest machine for the tube of a specification, part by part; `at` asks for the largest of one."""
     memory = Memory()
-    return tuple(Offer(part=part, result=certify(at(part), options, progress, memory)) for part in parts)
+    found: list[Offer] = []
+    try:
+        for part in parts:
+            watched = deadline.watched(progress) if deadline is not None and found else progress
+            found.append(Offer(part=part, result=certify(at(part), options, watched, memory)))
+    except (OutOfTime, KeyboardInterrupt) as end:
+        if not found:
+            raise
+        return Cheapest(offers=tuple(found), cut=cut_by(end))
+    return Cheapest(offers=tuple(found))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cheapest:
+    """What each part may be at most, and what ended the search before its end."""
+
+    offers: tuple[Offer, ...]
+    cut: Cut | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,9 +85,10 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Front:
-    """Every size that was tried, from narrow to wide."""
+    """Every size that was tried, from narrow to wide, and what ended the search before its end."""
 
     points: tuple[Point, ...]
+    cut: Cut | None = None
 
     @property
     def best(self) -> tuple[Point, ...]:
@@ -86,21 +107,29 @@ def front(
     measure: Measure,
     options: Options,
     progress: Progress | None = None,
+    *,
+    deadline: Deadline | None = None,
 ) -> Front:
     """The largest value of a part against the size of the tube; `at` asks for it in a tube so many times as wide.
 
     Sizes grow and shrink by fourth roots of two from the specification's, until two in a row gain nothing.
     """
     memory = Memory()
+    points: list[Point] = []
 
     def point(scale: Fraction) -> Point:
-        offer = Offer(part=part, result=certify(at(scale), options, progress, memory))
-        return Point(scale=scale, offer=offer, size=size_of(offer.result, measure))
+        watched = deadline.watched(progress) if deadline is not None and points else progress
+        offer = Offer(part=part, result=certify(at(scale), options, watched, memory))
+        points.append(Point(scale=scale, offer=offer, size=size_of(offer.result, measure)))
+        return points[-1]
 
-    first = point(Fraction(1))
-    wider = _onward(point, [_scale(k) for k in range(1, _FARTHEST + 1)], _worth, first)
-    narrower = _onward(point, [_scale(-k) for k in range(1, _FARTHEST + 1)], _narrowness, first)
-    return Front(points=(*reversed(narrower), first, *wider))
+    first, cut = point(Fraction(1)), None
+    try:
+        _onward(point, [_scale(k) for k in range(1, _FARTHEST + 1)], _worth, first)
+        _onward(point, [_scale(-k) for k in range(1, _FARTHEST + 1)], _narrowness, first)
+    except (OutOfTime, KeyboardInterrupt) as end:
+        cut = cut_by(end)
+    return Front(points=tuple(sorted(points, key=lambda each: each.scale)), cut=cut)
 
 
 def _scale(k: int) -> Fraction:
@@ -113,17 +142,15 @@ def _onward(
     scales: Sequence[Fraction],
     gain: Callable[[Point], float],
     first: Point,
-) -> list[Point]:
+) -> None:
     """Sizes in one direction, until several in a row gain nothing on the best so far."""
-    found: list[Point] = []
     best, worse = gain(first), 0
     for scale in scales:
-        found.append(point(scale))
-        worse = 0 if gain(found[-1]) > best else worse + 1
-        best = max(best, gain(found[-1]))
-        if worse == _WORSE or not found[-1].offer.result.sections:
+        found = point(scale)
+        worse = 0 if gain(found) > best else worse + 1
+        best = max(best, gain(found))
+        if worse == _WORSE or not found.offer.result.sections:
             break
-    return found
 
 
 def _worth(point: Point) -> float:

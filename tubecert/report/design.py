@@ -17,6 +17,7 @@ from tubecert.kinds.hardware import HardwareData
 from tubecert.pipeline.width import machine_of
 from tubecert.report import reach, sections
 from tubecert.report.console import verdict_line
+from tubecert.report.cut import cut_short
 from tubecert.report.gains import deciding
 from tubecert.report.layout import plain_table, titled
 from tubecert.report.machine import lines
@@ -34,6 +35,7 @@ _GAINS_ALONE: Final = (
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from tubecert.pipeline.deadline import Cut
     from tubecert.pipeline.design import Attempt, Design
     from tubecert.pipeline.sensitivities import Sensitivity
     from tubecert.spec import Spec
@@ -74,11 +76,22 @@ def report(
             _used(each),
             _stops(each),
         )
-    covered = f"{len(found.attempts)} sizes were tried, by factors of two and then between them"
-    parts += titled("Attempts", [table, Text(f"{covered}; what lies between them was not.", style="dim")])
+    parts += titled("Attempts", [table, Text(_covered(found), style="dim")])
+    if found.cut is not None:
+        parts += cut_short(found.cut)
     if target is not None:
         parts += [Text(), Text(f"certificate {target}")]
     return parts
+
+
+def _covered(found: Design) -> str:
+    """Which sizes were tried."""
+    count = len(found.attempts)
+    if count == 1:
+        return "no other size was tried."
+    return (
+        f"{count} sizes were tried, by factors of two and then between them; what lies between them was not."
+    )
 
 
 def _bought(found: Design, better: Sequence[Sensitivity]) -> list[RenderableType]:
@@ -144,6 +157,7 @@ class DesignData:
     best: str | None
     attempts: tuple[AttemptData, ...]
     sensitivities: tuple[SensitivityData, ...] = ()
+    cut: Cut | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,6 +177,7 @@ def as_data(found: Design, better: Sequence[Sensitivity] = ()) -> DesignData:
         best=None if found.best is None else str(found.best.scale),
         attempts=tuple(map(_attempt, found.attempts)),
         sensitivities=tuple(map(_sensitivity, better)),
+        cut=found.cut,
     )
 
 

@@ -10,6 +10,7 @@ from rich.text import Text
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
 from tubecert.printable import visible
 from tubecert.report.claimed import place
+from tubecert.report.cut import cut_short
 from tubecert.report.layout import indented, plain_table, titled
 from tubecert.report.sections import VERDICTS
 from tubecert.words.advice import advice
@@ -29,8 +30,6 @@ _COLUMNS = (
     "lets inputs act over the tube (tubecert explain input_gain)."
 )
 _HARDLY = 1.05  # times as much
-_CUT = {"deadline": "cut short by the deadline", "interrupted": "interrupted"}
-_BEST = "this is the best of what was proven by then"
 _NONE = "no metric that certifies was found by then"
 _CAUSES = {
     "distance": "{more}: the distance that the uncertainty drives the state grows as 1/rate",
@@ -66,7 +65,7 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
     if data.limits is not None:
         parts += titled("What limits the rate", _limits(data.limits))
     if data.cut is not None:
-        parts += [Text(), Text(f"{_CUT[data.cut]}: {_NONE if file is None else _BEST}", style="yellow")]
+        parts += cut_short(data.cut, _NONE) if file is None else cut_short(data.cut)
     if file is None:
         return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify {visible(system.path)} --metric {target}"

@@ -15,6 +15,7 @@ from tubecert.digits import down, exact, up
 from tubecert.records import Json
 from tubecert.report import reach, sections
 from tubecert.report.console import verdict_line
+from tubecert.report.cut import cut_short
 from tubecert.report.figures_axes import Axis, Chart
 from tubecert.report.figures_file import svg_file
 from tubecert.report.gains import NAMES, rows
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.certificate.result import Result
-    from tubecert.pipeline.trade import Front, Offer
+    from tubecert.pipeline.trade import Cheapest, Front, Offer
     from tubecert.spec import Spec
 
 _LABELS: Final[Mapping[HardwarePart, str]] = {
@@ -62,8 +63,9 @@ def offers_summary(spec: Spec, found: Sequence[Offer]) -> Text:
     return Text(f"{spec.name}: {values}, each alone", style="bold")
 
 
-def offers(spec: Spec, found: Sequence[Offer], files: Mapping[HardwarePart, str]) -> list[RenderableType]:
+def offers(spec: Spec, cheapest: Cheapest, files: Mapping[HardwarePart, str]) -> list[RenderableType]:
     """What each part of the machine may be at most, and the gains of every certificate in this tube."""
+    found = cheapest.offers
     parts: list[RenderableType] = [offers_summary(spec, found)]
     table = plain_table("what", ">alone", "certificate", "what stops it", wrapped=3)
     for each in found:
@@ -74,7 +76,8 @@ def offers(spec: Spec, found: Sequence[Offer], files: Mapping[HardwarePart, str]
     first = found[0].result
     if first.tube is not None:
         parts += titled("Tube", [Text(reach.extent(first))])
-    return parts + titled("Certificates in this tube", [_kinds(first)])
+    parts += titled("Certificates in this tube", [_kinds(first)])
+    return parts + ([] if cheapest.cut is None else cut_short(cheapest.cut))
 
 
 def _stops(result: Result) -> str:
@@ -144,6 +147,8 @@ def front(
         parts += titled(
             "Beside it", [Text(f"{exact(narrow.scale)} times as wide: {_stops(narrow.offer.result)}")]
         )
+    if found.cut is not None:
+        parts += cut_short(found.cut)
     return parts + ([Text(), Text(f"table {stem}.csv, figure {stem}.svg")] if files else [])
 
 
