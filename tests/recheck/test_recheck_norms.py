@@ -70,6 +70,12 @@ def test_nothing_below_what_is_reached_is_confirmed(texts):
     assert not norms(place(400), [[[e] for e in column(*texts)]], limit).holds
 
 
+def test_nothing_is_below_a_negative_limit():
+    """Its square is not."""
+    found = column_below(place(), column(*COLUMNS[0]), Fraction(-100), 400)
+    assert found is None or not found.holds
+
+
 @pytest.mark.parametrize("texts", COLUMNS, ids=", ".join)
 @pytest.mark.parametrize("share", [0.0, 0.3, 2.0])
 def test_no_multiplier_confirms_what_is_false(texts, share, monkeypatch):

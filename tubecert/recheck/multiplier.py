@@ -34,6 +34,8 @@ def column_below(place: Place, column: Sequence[Term], limit: Fraction, budget: 
     """
     if any(e.op in ("norm", "direction", "table") for e in in_order(column)):
         return None  # no curvature
+    if limit < 0:
+        return None  # |G|^2 <= limit^2 would say nothing
     square = sum((e * e for e in column), start=NOUGHT)
     centre = dict(zip(place.system.states, place.curve.start, strict=True))
     found = sorted(names([square]))
