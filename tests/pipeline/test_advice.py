@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 from proven import proven
+from systems import SMALL
 
 from tubecert import certificate, pipeline
 from tubecert.claims.advice import EnlargeSafeSet, NoKnobAlone, ReduceRadii, TurnKnob
 from tubecert.pipeline import Options, advice, certify
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import CertificateError, read
-from tubecert.spec import Setting
+from tubecert.spec import Setting, load_text
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source
 from tubecert.verdict import Verdict
@@ -84,6 +86,18 @@ def test_where_nothing_serves_alone_two_are_named_that_do():
         (both[1:], Verdict.REFUTED),
     ):
         assert certify(spec_of(*settings, *some), Options()).verdict is verdict
+
+
+@pytest.mark.slow
+def test_a_start_outside_of_the_tube_is_told_how_near_it_may_be_and_how_wide_the_tube():
+    """All the effort went into less of h and narrower tubes: `nothing that was tried serves alone`."""
+    spec = load_text(SMALL.replace("{epsilon: 0.2, rho_a: 0.1}", "{half_widths: {x: 0.06}}"))
+    far = replace(spec, x0=(Fraction(7, 100), Fraction(0)))
+    result = certify(far, Options(conditions="distance"), advise=True)
+    assert result.verdict is Verdict.REFUTED
+    knobs = {item.knob: item.value for item in result.reason.relax if isinstance(item, TurnKnob)}
+    assert list(knobs) == ["start", "half_widths"]
+    assert knobs["start"] < 1 < knobs["half_widths"]
 
 
 @pytest.mark.slow

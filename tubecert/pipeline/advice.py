@@ -184,6 +184,11 @@ class _Search:
             yield from nearer_start(spec, list(map(float, middle)))
             return
         problem = self.judged.bounded.problem
+        if _start_share(problem) >= 1:  # the start is not in the tube: neither h nor a narrower one can help
+            self.ledger.limit = self.ledger.limit and self.ledger.limit + 2 * _CHEAP  # each needs new constants
+            yield from nearer_start(spec, list(map(float, middle)))
+            yield from wider_tube(spec, split)
+            return
         if not self._is_blocked(self.judged):
             yield from less_uncertainty(spec)
         yield from smaller_tube(spec, split)
