@@ -259,3 +259,24 @@ def test_a_rho_a_that_is_cut_down_is_told():
     result["overrides"]["rho_a"] = None
     result["spec"]["effective"]["tube"] = {"rho_a": "4"}
     assert words.replace("--rho-a 5", "tube.rho_a 4") in " ".join(shown(result).split())
+
+
+def test_half_widths_narrower_than_asked_for_are_told_with_what_limits_the_tube():
+    """A magnet's gap was asked to be 1.5 mm at most and came out as .67 mm, without a word: the current had no room."""
+    result = certified()
+    states = result["spec"]["effective"]["system"]["states"]
+    first, second = states[:2]
+    low, high = map(float, map(Fraction, result["safe_set"][second]))
+    result["plan"]["samples"] = {"t": [0.0], "x": [[0.0] * len(states)]}
+    asked = result["spec"]["effective"]["tube"] = {"half_widths": {first: "0.5"}}
+    result["tube"]["half_widths"] = {first: 0.2, second: 0.97 * min(-low, high)}
+    told = " ".join(shown(result).split())
+    assert f"asked for: at most {first} 0.5" in told
+    assert f"; {second} limits the tube: it goes nearly to the edge of the safe set" in told
+    result["tube"]["half_widths"][second] = 0.5 * min(-low, high)
+    assert "limits the tube" not in shown(result)
+    asked["half_widths"][second] = str(0.5 * min(-low, high))
+    told = " ".join(shown(result).split())
+    assert f"; {second} limits the tube, with the half-width that is asked for" in told
+    result["tube"]["half_widths"][first] = 0.499
+    assert "asked for:" not in shown(result)

@@ -188,6 +188,7 @@ def test_numbers_say_their_unit():
         ("half-widths", "half-width"),
         ("margin  left", "margin"),
         ("ω", "omega"),
+        ("input gain", "input_gain (beta_O)"),
     ],
 )
 def test_spellings(asked, word):

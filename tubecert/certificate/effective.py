@@ -87,6 +87,7 @@ class TubeView:
     """What is asked of the tube, as far as reports say it again."""
 
     rho_a: Fraction | None = None
+    half_widths: Mapping[str, Fraction] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

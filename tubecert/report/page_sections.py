@@ -262,6 +262,9 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
         yield "constants bounded over", Cell(text=reach.half_widths(result, tube.half_widths or {}))
     elif known:
         yield "half-widths", Cell(text=reach.half_widths(result, known))
+        for line in reach.asked_for(result, known):
+            words, _, rest = line.partition(": ")
+            yield words, Cell(text=rest)
     for line in reach.clearances(result):
         yield "obstacles", Cell(text=line)
     yield "claimed", Cell(text=claimed.span(result))

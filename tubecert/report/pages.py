@@ -161,10 +161,11 @@ def find(topic: str) -> Page | None:
     for table in searched:
         if wanted in table:
             return table[wanted]
-    for table in searched:
-        folded = [page for key, page in table.items() if key.lower() == wanted.lower()]
-        if len(folded) == 1:
-            return folded[0]
+    for spelled in (wanted, wanted.replace(" ", "_")):  # `input gain`, as sentences have it
+        for table in searched:
+            folded = [page for key, page in table.items() if key.lower() == spelled.lower()]
+            if len(folded) == 1:
+                return folded[0]
     return None
 
 

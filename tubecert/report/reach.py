@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 
 _NOTABLE = 0.01  # of the range of the knots
+_NARROWER = 0.97  # of what was asked for
+_AT_THE_EDGE = 0.9  # of the room in the safe set
 
 
 def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
@@ -35,6 +37,7 @@ def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(f"around every plan with {family_words(result.claim.plans)}")
     if tube.half_widths:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
+        lines += asked_for(result, tube.half_widths)
     if tube.coordinates is not None:
         lines[0] += " (lengths in the coordinates of the tube)"
         lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
@@ -48,6 +51,33 @@ def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
     lines += [*windows.lines(result), *excursion(result), *clearances(result)]
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
+
+
+def asked_for(result: Result, found: Mapping[str, float]) -> Iterator[str]:
+    """Where half-widths are narrower than asked for: what was asked, and which state limits the tube."""
+    asked = {name: float(most) for name, most in result.spec.effective.tube.half_widths.items()}
+    narrower = {name: most for name, most in asked.items() if found.get(name, most) < _NARROWER * most}
+    if not narrower:
+        return
+    attained = [name for name in asked if name not in narrower and name in found]
+    why = f"; {attained[0]} limits the tube, with the half-width that is asked for" if attained else ""
+    if not attained and (stopped := _stopped(result, found)) is not None:
+        why = f"; {stopped} limits the tube: it goes nearly to the edge of the safe set"
+    yield f"asked for: at most {half_widths(result, narrower)}{why}"
+
+
+def _stopped(result: Result, found: Mapping[str, float]) -> str | None:
+    """The state that is nearest to the edge of the safe set, if it is there, by the points the plan is drawn by."""
+    drawn, names = result.plan.samples, result.spec.effective.system.states
+    if drawn is None:
+        return None
+    used = {}
+    for name, curve in zip(names, zip(*drawn.x, strict=True), strict=True):
+        low, high = map(float, result.safe_set[name])
+        room = min(min(curve) - low, high - max(curve))
+        used[name] = found[name] / room if room > 0 and name in found else 0.0
+    nearest = max(names, key=lambda name: used[name])
+    return nearest if used[nearest] > _AT_THE_EDGE else None
 
 
 def excursion(result: Result) -> Iterator[str]:
