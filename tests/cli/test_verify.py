@@ -278,6 +278,13 @@ def _text(folder, name, text):
     return folder / name
 
 
+def test_an_array_of_another_name_is_told_which_names_are_read(folder):
+    """`np.savez(file, W=W)` was sent to the documentation."""
+    done = run(folder / "system.yaml", _npz(folder, W=np.eye(2), rate=1.0))
+    assert done.exit_code == 2
+    assert "it holds `coefficients`: W itself where that is constant" in " ".join(done.stderr.split())
+
+
 @pytest.mark.slow
 def test_what_is_no_such_file_is_one_located_error(folder):
     for why, path in _bad(folder):

@@ -289,7 +289,10 @@ def _check_symmetry(path: str, matrices: Sequence[Sequence[Sequence[str]]]) -> N
 
 
 def _help() -> str:
-    return "docs/synthesis.md says what such a file holds"
+    return (
+        "it holds `coefficients`: W itself where that is constant, else K symmetric matrices with `monomials` or "
+        "`powers`; `rate` beside them; docs/synthesis.md has examples"
+    )
 
 
 def _refuse(path: str, code: str, message: str, help: str, line: int = 1) -> NoReturn:
