@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
+from systems import SMALL
 from typer.testing import CliRunner
 
 from tubecert import pipeline
@@ -40,6 +41,20 @@ def robot(name):
 
 def run(*arguments):
     return CliRunner().invoke(app, ["synth", "--no-progress", *map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.mark.slow
+def test_where_no_metric_certifies_it_is_told_what_would():
+    """`none of 13 metrics certifies`, and nothing that could be done about it."""
+    text = SMALL.split("metric:", maxsplit=1)[0].replace("[0.05, 0]", "[0.2, 0]")
+    spec = load_text(f"{text}tube: {{half_widths: {{x: 0.15}}}}")
+    asked = Synthesis(rate=None, objective="adaptation", degree=0, condition_number=Fraction(10))
+    found = pipeline.synthesise(spec, asked, BY_B)
+    assert (found.verdict, found.file) == (Verdict.UNDECIDED, None)
+    assert isinstance(found.reason.claim.failure, NoneCertified)
+    (start, wide) = found.reason.relax
+    assert (start.knob, wide.knob) == ("start", "half_widths")
+    assert start.value < 1 < wide.value
 
 
 # -- systems written from their equations

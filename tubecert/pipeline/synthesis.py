@@ -46,7 +46,16 @@ from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
 from tubecert.pipeline.synthesised import Row, Synthesised
-from tubecert.pipeline.unfound import equilibria, lacking, nearest, none_certified, remedies, tried
+from tubecert.pipeline.unfound import (
+    closest,
+    equilibria,
+    lacking,
+    nearest,
+    none_certified,
+    remedies,
+    serving,
+    tried,
+)
 from tubecert.pipeline.width import half_widths, measure_in
 from tubecert.pipeline.written import TooLongError, file_of, read_back, shorter
 from tubecert.progress import Phase, Progress, Step, Unit
@@ -341,16 +350,24 @@ class SynthesisRun:
         )
 
     def _none(self, failure: NoneCertified) -> Synthesised:
-        """Why none of the metrics certifies, first as it stands, then with what a machine would need."""
+        """Why none of the metrics certifies, first as it stands, then with what would, for the one that is nearest."""
         small = isinstance(failure.slow, TubeInSafeSet)
         found = self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
-        closest = None if self.cut is not None else nearest(self.rows.values())
-        if closest is None or found.reason is None:
+        rows = self.rows.values()
+        by_machine = nearest(rows)
+        near = None if self.cut is not None else by_machine or closest(rows)
+        if near is None or found.reason is None:
             return found
         if self.told is not None:
             self.told(found)
-        asked = self.ask(read_back(self.spec, closest.metric), self._judging(), self._watch, self.memory)
-        reason = replace(found.reason, relax=(*found.reason.relax, *lacking(asked)))
+        spec = read_back(self.spec, near.metric)
+
+        def asked(progress: Progress) -> Question:
+            return self.ask(spec, self._judging(), progress, self.memory)
+
+        machine = by_machine is not None
+        helps = lacking(asked(self._watch)) if machine else serving(asked, self.ask, self._watch)
+        reason = replace(found.reason, relax=(*found.reason.relax, *helps))
         return replace(found, reason=reason)
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:

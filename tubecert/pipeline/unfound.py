@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
+from math import inf
 
 from tubecert.claims.advice import (
     AskForRateUpTo,
     HigherDegree,
     LowerRate,
+    NoKnobAlone,
     RaiseBudget,
     ShrinkSafeSet,
+    TurnKnob,
 )
 from tubecert.claims.failures import (
     NoneCertified,
     NothingFound,
 )
 from tubecert.claims.family import Relax
-from tubecert.pipeline.certification import answer, explain
+from tubecert.claims.gains import ConditionHolds
+from tubecert.pipeline.advice import Ask, Ledger, advised
+from tubecert.pipeline.certification import answer, explain, result
 from tubecert.pipeline.deadline import OutOfTime
 from tubecert.pipeline.synthesised import Row
+from tubecert.progress import Progress
 from tubecert.spec import Spec
 from tubecert.stages.judged import Judged
 from tubecert.stages.question import Question
@@ -62,6 +68,34 @@ def lacking(question: Question) -> tuple[Relax, ...]:
     except OutOfTime:
         return ()
     return explain(end).reasons[0].relax if isinstance(end, Judged) else ()
+
+
+def closest(rows: Iterable[Row]) -> Row | None:
+    """The metric whose condition is missed by least; None where none says by how much."""
+    return max((row for row in rows if _margin(row) > -inf), key=_margin, default=None)
+
+
+def _margin(row: Row) -> float:
+    """What is left of the condition that fails, a share of what is allowed."""
+    claim = row.claim
+    known = isinstance(claim, ConditionHolds) and row.floor == "identity" and claim.margin is not None
+    return -inf if not known or claim.margin.below is None else claim.margin.below  # type: ignore[union-attr]
+
+
+def serving(questioned: Callable[[Progress], Question], ask: Ask, told: Progress) -> tuple[Relax, ...]:
+    """What would certify with a metric, in numbers; nothing if time is up. Other rates have been tried."""
+    ledger = Ledger(told)
+    try:
+        end = answer(questioned(ledger))
+        found = advised(result(end), end, ledger, ask)
+    except OutOfTime:
+        return ()
+    relax = () if found.reason is None else found.reason.relax
+    return tuple(
+        each
+        for each in relax
+        if isinstance(each, NoKnobAlone) or (isinstance(each, TurnKnob) and each.knob != "rate")
+    )
 
 
 def tried(attempts: Sequence[Attempt]) -> NothingFound:

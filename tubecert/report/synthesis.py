@@ -62,8 +62,8 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
         parts += map(indented, _proven(file))
     if data.table:
         parts += titled("Metrics compared", [_compared(data.table), Text(_COLUMNS, style="dim")])
-    if data.limits is not None:
-        parts += titled("What limits the rate", _limits(data.limits))
+    if data.limits is not None and (lines := _limits(data.limits)):
+        parts += titled("What limits the rate", lines)
     if data.cut is not None:
         parts += cut_short(data.cut, _NONE) if file is None else cut_short(data.cut)
     if file is None:
