@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from fractions import Fraction
+from importlib import resources
 
 import pytest
 from mistakes import GOOD, MISTAKES
@@ -12,7 +14,7 @@ from systems import SCALAR
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.pipeline import inspect
-from tubecert.spec import load_text
+from tubecert.spec import instead, load_text
 
 JARGON = re.compile(r"value error|pydantic|NoneType|Traceback|instance of|expected type", re.IGNORECASE)
 
@@ -53,3 +55,8 @@ def test_a_delay_may_use_a_parameter_whose_name_is_about_samples() -> None:
     spec = load_text(text.replace("rate: 200", "rate: 200, delay: sample_time/2"))
     assert spec.hardware is not None
     assert spec.hardware.delay == Fraction(1, 2000)
+
+
+def test_the_sections_that_may_be_indented_too_far_are_those_of_the_schema():
+    schema = json.loads(resources.files("tubecert.schemas").joinpath("spec.schema.json").read_text("utf-8"))
+    assert set(schema["properties"]) - {"tubecert"} == instead._SECTIONS
