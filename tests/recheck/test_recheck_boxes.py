@@ -101,6 +101,28 @@ def _product_of(outputs, combined):
     return again._monomials
 
 
+def test_where_monomials_cancel_steps_take_over():
+    """Over boxes (x + y/10 - z)^5 of small bases is the sum of 21 products that nearly cancel."""
+    outputs = terms([FEW[5]])
+    combined = Combinations(outputs, list(NAMES))
+    combined._monomials = _product_of(outputs, combined)
+    near = [arb(1, 1e-3), arb(1, 1e-3), arb(1.1, 1e-3)]
+    assert float(combined.run([near])[0][0].rad()) > 1e-3
+    for _ in range(3):
+        ((found,),) = combined.over([near])
+        assert found.contains(arb(0))
+        assert float(found.rad()) < 1e-9
+
+
+def test_where_monomials_do_not_cancel_they_stay():
+    outputs = terms([FEW[0]])
+    combined = Combinations(outputs, list(NAMES))
+    combined._monomials = _product_of(outputs, combined)
+    box = [arb(0.5, 0.1), arb(1, 0.1), arb(0)]
+    for _ in range(5):
+        assert str(combined.over([box])) == str(combined.run([box]))
+
+
 def check_expansion():
     box = [(-0.9, 0.7), (0.1, 1.2), (-0.5, 1.0)]
     for text in BENDING:

@@ -184,7 +184,7 @@ class Field:
         at_centre = self._centre.run(points)
         count = len(self._entries)
         weights = [1.0] * count if weighing is None else weighing(at_centre[0][:count])
-        around = zip(at_centre, self._whole.run(ranges), strict=True)
+        around = zip(at_centre, self._whole.over(ranges), strict=True)
         found = [self._around(at, over, radius, weights, (caused, spread)) for at, over in around]
         for place, i in enumerate(self._affine):  # two corners that differ in that variable only
             other = found[1 << (len(self._affine) - 1 - place)]

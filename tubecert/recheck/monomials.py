@@ -19,6 +19,8 @@ from tubecert.recheck.terms import UNIT, Term, in_order, number_of
 
 _CHEAPER = 10  # terms of a product of matrices for each step of a program: a step costs three times that
 _LARGE = 4_000  # terms of a polynomial
+_CLOSER = 4.0  # times as close, on average, are steps that are worth what they cost
+_MOST = 64.0  # what one of many outputs counts at most
 
 Monomial = tuple[tuple[int, int], ...]  # (factor, exponent), factors ascending
 Quotient = tuple[int, int]  # of whole numbers without a common divisor
@@ -31,6 +33,8 @@ class Combinations:
     def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
         self._plain = Program(outputs, inputs)
         self._monomials: _Monomials | None = None
+        self._boxes = 0
+        self._wide = False
         most = _CHEAPER * len(in_order(outputs))
         found = expanded(outputs, most)
         if found is None:
@@ -56,6 +60,29 @@ class Combinations:
         columns = [self._monomials.run(point) for point in points]
         values = (self._table * arb_mat(columns).transpose()).tolist()
         return [[values[row][k] for row in self._row] for k in range(len(points))]
+
+    def over(self, boxes: Sequence[Sequence[Ball]]) -> list[list[Ball]]:
+        """The same for boxes, where monomials that cancel are wide: steps take over once they are found much closer."""
+        if self._monomials is None or self._wide:
+            return [self._plain.run(box) for box in boxes]
+        found = self.run(boxes)
+        self._boxes += 1
+        if self._boxes & (self._boxes - 1) == 0:  # 1, 2, 4, 8, ...
+            steps = [self._plain.run(box) for box in boxes]
+            self._wide = _times_wider(found, steps) > _CLOSER
+            return steps if self._wide else found
+        return found
+
+
+def _times_wider(found: Sequence[Sequence[Ball]], other: Sequence[Sequence[Ball]]) -> float:
+    """How much wider one list of enclosures is than another, on average."""
+    ratios = [
+        min(float(x.rad()) / float(y.rad()), _MOST) if x.is_finite() else _MOST
+        for row, beside in zip(found, other, strict=True)
+        for x, y in zip(row, beside, strict=True)
+        if y.is_finite() and float(y.rad()) > 0
+    ]
+    return sum(ratios) / len(ratios) if ratios else 0.0
 
 
 class _Monomials:
