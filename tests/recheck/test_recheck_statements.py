@@ -155,6 +155,16 @@ def gain(limit, ends, F="2", W="1", BBt="1"):
     return test
 
 
+def test_what_is_left_near_mu_0_is_everything_again():
+    """On a part of a box a tangent that is further off serves; what is left elsewhere stays what is left."""
+    test = gain(1, (0.0, 4.0))
+    box = [(0.0, 1.0)]
+    test._left = [(box, [(1.0, 2.0), (2.0, 4.0)])]
+    assert test._waiting([(0.25, 0.5)]) == [(1.0, 2.0), (2.0, 4.0)]
+    test._left = [(box, [(0.0, 1e-9), (1.0, 2.0)])]
+    assert test._waiting([(0.25, 0.5)]) == [(0.0, 4.0)]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "ends", [(0.0, 1.0), (0.5, 2.0), (0.9, 1.1), (1.0, 1.0), (1.0, 4.0), (0.25, 1.0), (0.1, 10.0)]

@@ -33,6 +33,7 @@ from tubecert.recheck.terms import Rows, names, plus, scaled, times, turned, uni
 
 _APART, _BENT, _EVEN = 0.25, 0.65, 0.1  # of what is left of a limit: by size, by curvature, to all alike
 _INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
+_SMALL = 2.0**-12  # of the largest mu
 _RANGES = 40  # of mu, that are looked at on one box
 _ALL_RANGES = 2000  # where nothing varies with the states: there are no parts
 _DEAR = 4.0  # a range more is passed on to all parts of a box
@@ -198,11 +199,15 @@ class GainBelow:
         return False
 
     def _waiting(self, box: Box) -> list[tuple[float, float]]:
-        """What was not proven on the last box that was looked at and contains this one: its parts need no more."""
+        """What was not proven on the last box that was looked at and contains this one: its parts need no more.
+
+        Near mu = 0 that is everything again: t B B'/mu is so large there that only a tangent further off serves.
+        """
         while self._left:
             around, left = self._left[-1]
             if all(a <= lo and hi <= b for (lo, hi), (a, b) in zip(box, around, strict=True)):
-                return left.copy()
+                small = min(hi for _, hi in left) < _SMALL * self._whole[1]
+                return [self._whole] if small else left.copy()
             self._left.pop()
         return [self._whole]
 
