@@ -17,10 +17,8 @@ from typing import NoReturn
 
 _INTERNAL, _INTERRUPTED = 3, 130  # as in `errors.ExitCode`, which is not imported yet
 _SIGNALS = ("SIGTERM", "SIGHUP")  # as SIGINT: what is half written is removed, then 128 + the signal's number
-_KEPT = (
-    ("MALLOC_MMAP_THRESHOLD_", -3, 32 << 20),
-    ("MALLOC_TRIM_THRESHOLD_", -1, 256 << 20),
-)  # see mallopt(3)
+# mallopt(3): the environment's name, the option's number, bytes
+_KEPT = (("MALLOC_MMAP_THRESHOLD_", -3, 32 << 20), ("MALLOC_TRIM_THRESHOLD_", -1, 256 << 20))
 _ENDED = b"tubecert: internal error: a library ended the process, perhaps for lack of memory"
 
 _received: list[int] = []

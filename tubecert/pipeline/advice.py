@@ -185,9 +185,8 @@ class _Search:
             return
         problem = self.judged.bounded.problem
         if _start_share(problem) >= 1:  # the start is not in the tube: neither h nor a narrower one can help
-            self.ledger.limit = (
-                self.ledger.limit and self.ledger.limit + 2 * _CHEAP
-            )  # each needs new constants
+            # each needs new constants
+            self.ledger.limit = self.ledger.limit and self.ledger.limit + 2 * _CHEAP
             yield from nearer_start(spec, list(map(float, middle)))
             yield from wider_tube(spec, split)
             return

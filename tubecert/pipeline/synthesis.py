@@ -281,10 +281,9 @@ class SynthesisRun:
         """Whether certificate H decides."""
         return (self.options.conditions or self.spec.decides) in (HARDWARE.option, HARDWARE.key)
 
-    def _watch(self, step: Step) -> None:
-        self.deadline.check()
-        if self.progress is not None:
-            self.progress(step)
+    @property
+    def _watch(self) -> Progress:
+        return self.deadline.watched(self.progress)
 
     # -- outcomes ---------------------------------------------------------------------------------------------------
 

@@ -78,8 +78,9 @@ def closest(rows: Iterable[Row]) -> Row | None:
 def _margin(row: Row) -> float:
     """What is left of the condition that fails, a share of what is allowed."""
     claim = row.claim
-    known = isinstance(claim, ConditionHolds) and row.floor == "identity" and claim.margin is not None
-    return -inf if not known or claim.margin.below is None else claim.margin.below  # type: ignore[union-attr]
+    if row.floor != "identity" or not isinstance(claim, ConditionHolds) or claim.margin is None:
+        return -inf
+    return -inf if claim.margin.below is None else claim.margin.below
 
 
 def serving(questioned: Callable[[Progress], Question], ask: Ask, told: Progress) -> tuple[Relax, ...]:

@@ -34,7 +34,6 @@ class Combinations:
         self._plain = Program(outputs, inputs)
         self._monomials: _Monomials | None = None
         self._boxes = 0
-        self._wide = False
         most = _CHEAPER * len(in_order(outputs))
         found = expanded(outputs, most)
         if found is None:
@@ -63,15 +62,15 @@ class Combinations:
 
     def over(self, boxes: Sequence[Sequence[Ball]]) -> list[list[Ball]]:
         """The same for boxes, where monomials that cancel are wide: steps take over once they are found much closer."""
-        if self._monomials is None or self._wide:
-            return [self._plain.run(box) for box in boxes]
         found = self.run(boxes)
         self._boxes += 1
-        if self._boxes & (self._boxes - 1) == 0:  # 1, 2, 4, 8, ...
-            steps = [self._plain.run(box) for box in boxes]
-            self._wide = _times_wider(found, steps) > _CLOSER
-            return steps if self._wide else found
-        return found
+        if self._monomials is None or self._boxes & (self._boxes - 1):  # but for 1, 2, 4, 8, ...
+            return found
+        steps = [self._plain.run(box) for box in boxes]
+        if _times_wider(found, steps) <= _CLOSER:
+            return found
+        self._monomials = None
+        return steps
 
 
 def _times_wider(found: Sequence[Sequence[Ball]], other: Sequence[Sequence[Ball]]) -> float:

@@ -101,16 +101,8 @@ _PLACES: Final[Mapping[str, str]] = {
 _SECTIONS: Final = frozenset(
     {
         *("name", "system", "safe_set", "uncertainty", "trajectory", "initial_state", "metric", "tube"),
-        *(
-            "adaptation",
-            "conditions",
-            "obstacles",
-            "hardware",
-            "disturbance",
-            "limits",
-            "simulation",
-            "expect",
-        ),
+        *("adaptation", "conditions", "obstacles", "hardware", "disturbance", "limits"),
+        *("simulation", "expect"),
     }
 )
 """Keys of the file itself, of which one that is indented too far ends in the section above it."""
@@ -178,9 +170,9 @@ def of_key(key: str, known: Sequence[str]) -> tuple[str, list[str]]:
     if key in _PLACES:
         meant = _MEANT.get(key, ()) if key in _KEYS else ()
         return f"it belongs to {_PLACES[key]}: {_PLACES[key]}.{key}", list(meant)
-    if key in _SECTIONS and not near(key, known):
-        return f"{key} is a section of the file: write it without indentation, beside system", []
     close = near(key, known)
+    if key in _SECTIONS and not close:
+        return f"{key} is a section of the file: write it without indentation, beside system", []
     advice = _KEYS.get(key) or suggestion(key, known, what="known keys")
     return advice, list(_MEANT.get(key, ())) if key in _KEYS else close
 
