@@ -73,6 +73,18 @@ WORDS = (
     *("sha256", "Not certified", "contraction", "certified", "refuted", "undecided"),
 )
 NAMED = ("for", "t", "x", "y", "z", "v", "it")
+PLAIN = frozenset(
+    re.findall(
+        r"\w+",
+        """a add adds after all alone an and another are around as at be behind below beside between bounded by
+    can check claim command computes control danger delayed do does each every exactly fails false
+    follow from full gain give gives good half has holding however in is its lag large later left
+    lengths lies long make marked measurements most ms must narrower nearest needs neither next no
+    nor not nothing of on one or over own pushes relied rest rests row run safe same say says set
+    sets shows sign so specified stated stays supports rates take takes that the their them these
+    this time to twice under unknown up versions was what where widest with within without would""",
+    )
+)
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +117,28 @@ def labels(shown):
     )  # ends of sentences
 
 
+def unexplained(shown):
+    """Norms, words and symbols that have no page and are neither plain English nor names of the specification."""
+    shown = re.sub(r"sha256:\w+|\S+\.json", "", shown)
+    norms = re.findall(r"\|[^|\n]+\|", shown)
+    words = re.findall(r"(?<![\w.])[A-Za-z][\w'*/-]*", re.sub(r"\|[^|\n]+\|", "", shown))
+    asked = dict.fromkeys([*norms, *(word.strip("'/-").removesuffix("'s") for word in words), "*"])
+    told = (*NAMED, *(f"{name}*" for name in NAMED), "cart", "small")
+    return [word for word in asked if word.lower() not in PLAIN and word not in told and not pages.find(word)]
+
+
+def test_every_word_of_a_comparison_of_metrics_has_a_page():
+    from tubecert.certificate.searched import MetricRow
+    from tubecert.report.synthesis import FLOORS, _compared
+
+    row = MetricRow(
+        rate=Fraction(1), floor="input", degree=2, condition_number=3.0, verdict=Verdict.CERTIFIED
+    )
+    heads = [column.header for column in _compared([row]).columns]
+    assert "beta/sqrt(a)" in heads
+    assert [word for word in [*map(str, heads), *FLOORS.values()] if not pages.find(word)] == []
+
+
 @pytest.mark.slow
 def test_every_label_of_the_first_screen_has_a_page(screen):
     found = labels(screen)
@@ -119,6 +153,7 @@ def test_every_label_of_the_first_screen_has_a_page(screen):
         "filter",
     } <= set(found)
     assert [word for word in found if pages.find(word) is None] == []
+    assert unexplained(screen) == []
 
 
 @pytest.mark.slow
@@ -130,6 +165,7 @@ def test_every_label_of_every_first_screen_has_a_page(kind):
     assert len(labels(shown)) >= 5
     assert [word for word in labels(shown) if pages.find(word) is None] == []
     assert [word for word in WORDS if word in shown and pages.find(word) is None] == []
+    assert unexplained(shown) == []
 
 
 def test_what_fills_a_tube_and_every_condition_has_a_page():

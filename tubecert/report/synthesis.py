@@ -27,7 +27,7 @@ FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
 _COLUMNS = (
     "rate in 1/s, omega in rad/s; omega and Gamma are those of certificate B. beta/sqrt(a): how strongly the metric "
-    "lets inputs act over the tube (tubecert explain input_gain)."
+    "lets inputs act over the tube (tubecert explain 'beta/sqrt(a)')."
 )
 _HARDLY = 1.05  # times as much
 _NONE = "no metric that certifies was found by then"
