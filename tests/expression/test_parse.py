@@ -26,6 +26,7 @@ from tubecert.expression import (
     to_text,
 )
 from tubecert.expression.elsewhere import ELSEWHERE
+from tubecert.expression.meant import mistyped, near
 
 x, y, t = (SYMBOLS[name] for name in ("x", "y", "t"))
 
@@ -385,6 +386,29 @@ def test_words_of_other_languages_are_never_taken_for_typing_errors(word: str) -
 )
 def test_another_function_is_never_proposed(word: str) -> None:
     assert "did you mean" not in refusal(f"{word}(y)").help
+
+
+@pytest.mark.parametrize(
+    "word", ["dx", "xdot", "x_dot", "vx", "x0", "x_ref", "thetadot", "dtheta", "theta2", "tau", "m"]
+)
+def test_a_name_is_not_meant_by_its_derivative_its_index_or_a_part_of_it(word: str) -> None:
+    """dz was told `did you mean z?`: with z in its place the model is another one, and nothing complains."""
+    assert mistyped(word, ["x", "theta", "tau1", "mx"]) == []
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        *[("thetta", "theta"), ("thet", "theta"), ("thetaa", "theta"), ("tehta", "theta"), ("X", "x")],
+        *[("xx", "x"), ("x_", "x"), ("mass", "masses")],
+    ],
+)
+def test_a_typing_error_is_told(word: str, meant: str) -> None:
+    assert mistyped(word, ["x", "theta", "masses"]) == [meant]
+
+
+def test_a_key_is_not_meant_by_its_derivative() -> None:
+    assert (near("dz", ["z"]), near("z_dot", ["z"]), near("zz", ["z"])) == ([], [], ["z"])
 
 
 @pytest.mark.parametrize(

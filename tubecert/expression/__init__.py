@@ -10,6 +10,7 @@ yes.
 | `lookup` | functions given by tables |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
+| `meant` | which known word a typing error stands for |
 | `number` | text -> rational number, pi and degrees rounded |
 | `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |
@@ -35,6 +36,7 @@ from tubecert.expression.graph import (
     topological,
 )
 from tubecert.expression.lookup import UNKNOWN, Lookup
+from tubecert.expression.meant import near, rates_of, suggestion
 from tubecert.expression.number import Side, parse_constant, parse_number, root_above
 from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse
@@ -46,8 +48,6 @@ from tubecert.expression.scan import (
     RESERVED,
     ExpressionError,
     is_name,
-    near,
-    suggestion,
 )
 from tubecert.expression.text import longest_text, number_text, to_text
 from tubecert.expression.zero import is_zero
@@ -87,6 +87,7 @@ __all__ = [
     "parse_constant",
     "parse_number",
     "power",
+    "rates_of",
     "rebuild",
     "root_above",
     "sin",

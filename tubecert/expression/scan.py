@@ -11,11 +11,11 @@ import keyword
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Final, Literal
 
 from tubecert.expression.elsewhere import ELSEWHERE
 from tubecert.expression.graph import FUNCTIONS as SMOOTH
+from tubecert.expression.meant import mistyped
 from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
 
 MAX_LENGTH: Final = 4_000
@@ -336,7 +336,7 @@ class _Walk:
         if name in ELSEWHERE:
             return ELSEWHERE[name]
         functions = [*(f for f in FUNCTIONS if words.kinks or f not in KINKED), *sorted(words.tables)]
-        meant = [f for f in functions if sorted(f) == sorted(name.lower())] or near(
+        meant = [f for f in functions if sorted(f) == sorted(name.lower())] or mistyped(
             name, [*words.symbols, *words.tables, "pi"]
         )
         listed = sorted({*words.symbols, "pi"})
@@ -373,17 +373,3 @@ _ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), "angles are in radians: leave the unit out"),
 }
 _QUOTE = "text with commas inside [ ] or { } must stand in quotes in YAML"
-
-
-def near(name: str, known: Collection[str]) -> list[str]:
-    """The known word that is closest to `name`, if one is close."""
-    lower = {word.lower(): word for word in sorted(known, reverse=True)}
-    return [lower[word] for word in get_close_matches(name.lower()[:60], lower, n=1, cutoff=0.6)]
-
-
-def suggestion(name: str, known: Collection[str], *, what: str = "known names") -> str:
-    """A did-you-mean, and the list of what is known."""
-    words = sorted(set(known))
-    shown = ", ".join(words[:20]) + (", ..." if len(words) > 20 else "")
-    meant = "".join(f"did you mean {word}? " for word in near(name, words))
-    return f"{meant}{what}: {shown}"

@@ -26,6 +26,7 @@ from tubecert.expression import (
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.lookup import read_lookup
+from tubecert.spec.rates import rates_of_states
 from tubecert.spec.reader import Field
 from tubecert.spec.scope import Scope
 from tubecert.spec.types import Output
@@ -56,6 +57,7 @@ class Names:
     ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
     tables: tuple[tuple[str, Lookup], ...] = ()
     outputs: tuple[Output, ...] = ()
+    rates: tuple[tuple[str, str], ...] = ()  # what people call the derivatives of states, and what to say
 
     @property
     def lengths(self) -> tuple[str, ...]:
@@ -72,6 +74,7 @@ class Names:
         refused = {
             TIME: "t is allowed in f, h and a trajectory only; B and the metric depend on the state alone",
             **self._inputs_refused(),
+            **dict(self.rates),
         }
         refused |= {
             name: f"{name} is a table; tables may be used in f, B, h and plans, not in a metric or in E"
@@ -94,13 +97,13 @@ class Names:
 
     def of_uncertainty(self) -> Scope:
         """For h: states, time and parameters; abs and norm are allowed."""
-        refused = self._inputs_refused() | self._ranges_refused()
+        refused = dict(self.rates) | self._inputs_refused() | self._ranges_refused()
         return self._scope((*self.states, TIME), refused, kinks=True)
 
     def of_definition(self) -> Scope:
         """For a definition: whatever any expression may use."""
         names = (*self.states, TIME, *dict(self.ranges))
-        return self._scope(names, self._inputs_refused(), kinks=True)
+        return self._scope(names, dict(self.rates) | self._inputs_refused(), kinks=True)
 
     def of_plan(self) -> Scope:
         """For a trajectory: time and parameters."""
@@ -182,6 +185,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
         parameters=tuple((name, value.fraction) for name, value in values.items() if value.is_constant),
         irrational=tuple((name, value) for name, value in values.items() if not value.is_constant),
         ranges=tuple(ranges.items()),
+        rates=tuple(rates_of_states(system.get("f"), states).items()),
     )
     names = _with_tables(names, system.get("tables"), taken)
     return _with_definitions(names, system.get("definitions"), taken)
