@@ -89,8 +89,9 @@ def test_without_what_the_rule_is_off_the_bound_is_false(monkeypatch):
 
 def test_a_long_delay_has_no_bound():
     c, _ = predicting("0.2", held=True)
-    with pytest.raises(UncoveredError, match="so long a delay"):
+    with pytest.raises(UncoveredError, match="so long a delay") as caught:
         rounding_of(c, "double")
+    assert caught.value.help.endswith("or leave hardware.predict out")
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

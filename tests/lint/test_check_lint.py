@@ -74,6 +74,7 @@ CASES = {
     "leaves": ("TC403", "12:36", [(HELD, MOVING.replace("0.5", "3") % "0"), (START, ALONG)]),
     "no equilibrium": ("TC404", "12:52", [("input: [0]", "input: [1]")]),
     "no input given": ("TC404", "12:37", [("at: [0, 0], input: [0]", "at: [0.1, 0]"), (START, "")]),
+    "a rounded point": ("TC404", "12:52", [("input: [0]", "input: [0.0001]")]),
     "start": ("TC405", "13:22", [("{at: [0, 0]}", "{at: [3, 0]}")]),
     "no room": ("TC406", "17:7", [("epsilon: 0.1", "epsilon: 1")]),
     "no room for the start": ("TC406", "17:7", [("{at: [0, 0]}", "{at: [0.95, 0]}")]),
@@ -201,6 +202,16 @@ def test_a_file_that_expects_to_be_refuted_is_not_blamed():
     text = changed(("rate: 0.4", "rate: 0.6"), ("safe_set", "expect: {verdict: refuted}\nsafe_set"))
     [finding] = found(text)
     assert (finding.code, finding.severity) == ("TC302", Severity.NOTE)
+
+
+def test_a_rounded_point_is_told_to_be_one():
+    """It was told to be no equilibrium, in the words of an input that is forgotten."""
+    [finding] = found(changed(("input: [0]", "input: [0.0001]")))
+    assert (finding.code, finding.severity) == ("TC404", Severity.NOTE)
+    assert re.search(r"equilibrium up to a rounding.*\(v would move\), 0\.\d+ % of", finding.message)
+    assert finding.help.startswith("nothing is wrong")
+    [finding] = found(changed(("input: [0]", "input: [1]")))
+    assert (finding.severity, "no equilibrium" in finding.message) == (Severity.WARNING, True)
 
 
 def test_the_rate_that_a_point_allows_is_named():

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from controllers import CONTROLLERS
-from flint import ctx
+from flint import arb, ctx
 from followed import bounds, covered, in_recheck, predicting, predicting_path, texts
 
 from tubecert.enclosure.interval import Interval
@@ -18,12 +18,13 @@ from tubecert.export import rounding as own
 from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
-from tubecert.recheck.balls import exact
+from tubecert.recheck.balls import between, exact
 from tubecert.recheck.code.constants import of_tables, otherwise
 from tubecert.recheck.code.examination import agreement
-from tubecert.recheck.code.prediction import STEPS
+from tubecert.recheck.code.prediction import STEPS, Model, cut
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
+from tubecert.recheck.terms import function, number, variable
 
 NAMES = ("feedback", "input", "estimate")
 
@@ -447,3 +448,11 @@ def test_a_piece_more_than_the_plan_has_is_refused():
     source = source.replace("for (k = 0; k < 2; k++) {", "for (k = 0; k < 3; k++) {", 1)
     with pytest.raises(UnreadError, match="tables of the plan"):
         bounds(c, in_recheck("path"), (more(header), more(source)))
+
+
+def test_a_steep_function_in_a_prediction_has_no_bound_and_is_no_error_of_the_program():
+    """tanh(y/0.02) was an internal error: on a wide box a divisor of its series may vanish."""
+    steep = function("tanh", variable("y") * number(500))
+    model = Model(states=("y",), f=(steep,), B=((number(1),),), delay=Fraction(1, 1000))
+    with ctx.workprec(200), pytest.raises(UnreadError, match="has no bound here"):
+        cut(model, [between(-1, 1)], [between(-1, 1)], arb(1), arb(0))

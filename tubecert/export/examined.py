@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,12 @@ from tubecert.recheck.code.python_reader import read_python
 from tubecert.recheck.code.reader import Code, read_code
 from tubecert.recheck.code.words import UnreadError
 from tubecert.recheck.steering import Column
+
+_INSTEAD: Final = (
+    "nothing is shown to be wrong with it, but too little to be right. Of steep functions in a prediction, long delays "
+    "and single precision a bound may be missing: try hardware.arithmetic: double, a shorter hardware.delay or no "
+    "hardware.predict; without hardware.arithmetic rounding is assumed away (docs/export.md has a table)"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +137,6 @@ def _difference(u: Array, expected: Sequence[Column]) -> float:
 
 def undecided(message: str) -> TubecertError:
     """The error for code of which too little is known."""
-    error = refused(message, "export again, or certify without hardware.arithmetic", "TC711")
+    error = refused(message, _INSTEAD, "TC711")
     error.exit_code = ExitCode.UNDECIDED
     return error

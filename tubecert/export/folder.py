@@ -125,8 +125,9 @@ def _require_digits(controller: Controller, precision: Precision) -> None:
     try:
         covered = within(controller, precision)
     except UncoveredError as error:
+        help = f"{error.help}, or certify" if error.help else "certify"
         raise refused(
-            f"no bound of rounding is known for {error}", "certify without hardware.arithmetic"
+            f"no bound of rounding is known for {error}", f"{help} without hardware.arithmetic"
         ) from error
     if not covered:
         raise refused(

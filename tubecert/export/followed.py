@@ -19,7 +19,11 @@ from tubecert.spec import Arithmetic
 
 
 class UncoveredError(ValueError):
-    """What a controller does, and no bound is derived for; the text says what, for a reader."""
+    """What a controller does, and no bound is derived for, in words; `help`: what to do instead."""
+
+    def __init__(self, what: str, help: str = "") -> None:
+        super().__init__(what)
+        self.help = help
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from tubecert.export.series import ORDER, Series, added, constant, moving, multi
 Followed_: TypeAlias = Mapping[str, Sequence[Followed]]
 Runner: TypeAlias = Callable[[Program, Followed_], Mapping[str, list[Followed]]]
 
+_UNPREDICTED: Final = "leave hardware.predict out"
 _ROOM = Fraction(1, 1000)  # of the narrowest half-width: so far from the model the code may be on its way
 
 
@@ -46,9 +47,11 @@ class Predicted:
 def off(c: Controller, given: Predicted, follow: Runner) -> Interval:
     """r_p; raises `UncoveredError` where it has no bound."""
     if c.predictor is None or c.steep is None:
-        raise UncoveredError("the integration of a prediction with the function of a table")
+        raise UncoveredError("the integration of a prediction with the function of a table", _UNPREDICTED)
     if c.pieces is not None and not c.adds_plan:
-        raise UncoveredError("a prediction in which a feedforward through knots is played")
+        raise UncoveredError(
+            "a prediction in which a feedforward through knots is played", "write hardware.feedforward: held"
+        )
     room = given.narrow * Interval.of(_ROOM)
     y = [_widened(_whole(x), room) for x in given.near]
     us = [_whole(u) for u in given.us]
@@ -65,7 +68,10 @@ def off(c: Controller, given: Predicted, follow: Runner) -> Interval:
     cut = _frobenius(_cut(c, [x.value for x in y], held, given))
     lost = exp(D * tau) * (B * given.wrong * tau + INTEGRATION * (h**ORDER * cut + rounded))
     if not bool(np.all(lost.sanitised().hi < room.lo)):
-        raise UncoveredError("a prediction over so long a delay")
+        raise UncoveredError(
+            "a prediction over so long a delay",
+            f"shorten hardware.delay, for which f is too steep, or {_UNPREDICTED}",
+        )
     return largest_of(lost) * Interval.of(c.stretch)
 
 

@@ -70,9 +70,11 @@ class _Analysis:
 
     def __init__(self, controller: Controller, real: Float) -> None:
         if controller.swept is not None:
-            raise UncoveredError("geodesics that are computed")
+            raise UncoveredError("geodesics that are computed", "take a constant metric")
         if controller.pieces is not None and not controller.pieces.continuous:
-            raise UncoveredError("a plan through knots whose input jumps")
+            raise UncoveredError(
+                "a plan through knots whose input jumps", "write trajectory.interpolation: linear"
+            )
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)
         self.eta, self.estimate = Interval.of(real.least), Interval.of(controller.estimate)
         self.m, self.n = len(controller.inputs), len(controller.states)
@@ -104,7 +106,9 @@ class _Analysis:
     @property
     def _horizon(self) -> Fraction:
         if self.c.horizon is None:
-            raise UncoveredError("a plan that moves without end: the time itself loses digits")
+            raise UncoveredError(
+                "a plan that moves without end: the time itself loses digits", "give trajectory.horizon"
+            )
         if self.c.horizon >= _MOST_SAMPLES * self.c.sample_time:
             raise UncoveredError("a plan of more samples than the code counts")
         return max(self.c.horizon, self.c.sample_time)

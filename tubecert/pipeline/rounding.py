@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, Final
 
 from tubecert.conditions.decimals import round_up
 from tubecert.conditions.hardware import HardwareRecipe, Rounding
@@ -27,6 +27,7 @@ from tubecert.search.proposers import PROPOSERS
 from tubecert.spec import Arithmetic
 from tubecert.stages.bounded import Bounded
 
+_LEAVE: Final = "leave hardware.arithmetic out: the certificate then assumes that the computer is exact"
 _ROOM, _DIGITS = (
     2,
     3,
@@ -48,14 +49,18 @@ def rounded(
 def _lost(bounded: Bounded, known: Known, recipe: HardwareRecipe, arithmetic: Arithmetic) -> Rounding:
     """With some room, as decimals."""
     if bounded.question.spec.trajectory.bundle is not None:
-        raise _refused(bounded, "of a plan that is handed in no bound of rounding is derived")
+        raise _refused(
+            bounded,
+            "of a plan that is handed in no bound of rounding is derived",
+            "certify the plan that the machine follows",
+        )
     gain = Fraction(bounded.problem.constants.feedback_gain.above)
     try:
         own = rounding_of(assembled(_machine(bounded, known, recipe, gain)), arithmetic)
     except UncoveredError as error:
-        raise _refused(bounded, f"no bound of rounding is known for {error}") from error
+        raise _refused(bounded, f"no bound of rounding is known for {error}", error.help) from error
     except TubecertError as error:
-        raise _refused(bounded, error.findings[0].message) from error
+        raise _refused(bounded, error.findings[0].message, error.findings[0].help) from error
     return Rounding(
         feedback=_above(own.feedback),
         input=_above(own.input),
@@ -87,7 +92,7 @@ def _machine(bounded: Bounded, known: Known, recipe: HardwareRecipe, gain: Fract
     )
 
 
-def _refused(bounded: Bounded, reason: str) -> SpecError:
+def _refused(bounded: Bounded, reason: str, help: str) -> SpecError:
     spec = bounded.question.spec
     return SpecError(
         [
@@ -95,7 +100,7 @@ def _refused(bounded: Bounded, reason: str) -> SpecError:
                 code="TC710",
                 message=f"hardware.arithmetic: {reason}",
                 location=spec.location("hardware.arithmetic"),
-                help="leave it out: the certificate then assumes that the computer is exact",
+                help=f"{help}, or {_LEAVE}" if help else _LEAVE,
             )
         ]
     )

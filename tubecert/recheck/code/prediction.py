@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Final
 
 from flint import arb, arb_series, ctx
 
@@ -25,6 +26,7 @@ from tubecert.recheck.terms import Term, in_order, number_of, slopes, variable
 
 STEPS = 4
 _LAST = 5  # order of the derivative that bounds a step
+_LONG: Final = "a prediction over so long a delay has no bound here"
 _ROOM = Fraction(1, 500)  # of the narrowest half-width
 _SERIES = ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sqrt")
 
@@ -68,10 +70,13 @@ def cut(model: Model, near: Sequence[Ball], acting: Sequence[Ball], narrow: Ball
     turned = [each for name in model.states for each in slopes(speed, name)]
     steep = length([magnitude(each) for each in Program(turned, names).run(known)])
     with _capped():
-        bent = _bent(speed, dict(zip(names, known, strict=True)), h)
+        try:
+            bent = _bent(speed, dict(zip(names, known, strict=True)), h)
+        except ValueError as error:  # a divisor that may vanish, on so wide a box
+            raise error if isinstance(error, UnreadError) else UnreadError(_LONG) from error
     found = STEPS * h**_LAST * length(bent) * (steep * exact(model.delay)).exp()
     if not found < room:
-        raise UnreadError("a prediction over so long a delay has no bound here")
+        raise UnreadError(_LONG)
     return found.upper()
 
 
