@@ -87,6 +87,12 @@ def test_two_state_function_level():
     assert result.least_adaptation.recipe.predictor_gain == result.least_adaptation.recipe.bandwidth
 
 
+def test_the_row_of_least_bandwidth_has_no_larger_one_than_that_of_least_adaptation():
+    """With much left to rho_a the split pair had omega = 30.28 beside 26.39, and the larger Gamma."""
+    result = judged_distance(two_state(epsilon=Fraction("0.3"), rho_r=Fraction("0.3"), rho_a=Fraction("0.4")))
+    assert gains(result.split) == gains(result.least_adaptation) == pytest.approx((26.39, 6.09e4), rel=1e-3)
+
+
 @pytest.mark.parametrize(("delta", "omega", "Gamma"), [(0.1, 32.2, 1.35e5), (0.3, 58.0, 1.43e6)])
 def test_two_state_with_a_plan_defect(delta, omega, Gamma):
     result = judged_distance(two_state(values={"plan_defect_metric": delta}))

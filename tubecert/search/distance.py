@@ -247,10 +247,11 @@ def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRec
         return Proposal()
     n = problem.floats(problem.projection_radius)
     low = smallest_bandwidth(n, reach(n))
-    found = {
-        "least_adaptation": recipe_from(problem, _best(problem, n, low)),
-        "split": recipe_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r)),
-    }
+    least = recipe_from(problem, _best(problem, n, low))
+    split = recipe_from(problem, smallest_bandwidth(n, np.sqrt(n.a) * n.rho_r))
+    if least is not None and split is not None and least.bandwidth < split.bandwidth:
+        split = least  # much is left to rho_a: the pair of least Gamma has the smaller bandwidth as well
+    found = {"least_adaptation": least, "split": split}
     roles = {role: recipe for role, recipe in found.items() if recipe is not None}
     curve = _curve(problem, low) if asked.curve and np.isfinite(low) else ()
     whole = Proposal(beside=roles, curve=curve)
