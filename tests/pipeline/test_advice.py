@@ -10,7 +10,7 @@ from proven import proven
 from systems import SMALL
 
 from tubecert import certificate, pipeline
-from tubecert.claims.advice import EnlargeSafeSet, NoKnobAlone, ReduceRadii, TurnKnob
+from tubecert.claims.advice import EnlargeSafeSet, HalveConstant, NoKnobAlone, ReduceRadii, TurnKnob
 from tubecert.pipeline import Options, advice, certify
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import CertificateError, read
@@ -174,3 +174,15 @@ def test_words():
         "nothing that was tried serves alone (epsilon); together these are proven to serve: all half-widths at 50 % "
         "and all of h at 10 % of its size"
     )
+
+
+def test_the_users_own_h_is_named_beside_the_constant_that_bounds_it():
+    """Once: reports said `halving Dh (sup |h|)`, which no user has written."""
+    items = [HalveConstant(constant=name, factor=0.5) for name in ("M_x", "h", "h_t")]
+    told = words(items, ["0.1*sin(t)"])
+    assert "DMx (sup of the sum of |dM/dx_i|) would" in told
+    assert "halving Dh (sup |h|, h = 0.1*sin(t)) would lower the least Gamma by 50 %" in told
+    assert told.count("sin(t)") == 1
+    assert "h = [a, b])" in words(items[1:], ["a", "b"])
+    assert "h = " not in words(items)
+    assert f"h = {'1 + ' * 15} ...)" in words(items, ["1 + " * 40])

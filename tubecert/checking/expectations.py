@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
@@ -102,12 +102,12 @@ def outcome_of_metric(found: Verified) -> Outcome:
     return Outcome(verdict=found.verdict, numbers=numbers, claims=tuple(claims))
 
 
-def _claim(reason: Reason) -> Claim:
+def _claim(reason: Reason, h: Sequence[str] = ()) -> Claim:
     return Claim(
         name=title(reason.claim),
         verdict=reason.verdict,
         message=message(reason),
-        relax=advice(reason.relax),
+        relax=advice(reason.relax, h),
     )
 
 
@@ -115,7 +115,7 @@ def _claims(result: Result) -> Iterator[Claim]:
     """A claim per reason, and one per certificate that has no reason among them."""
     named = {getattr(reason.claim, "section", None) for reason in result.reasons}
     for reason in result.reasons:
-        yield _claim(reason)
+        yield _claim(reason, result.spec.effective.uncertainty.h)
     of_metric = any(isinstance(reason.claim, (*METRIC_CLAIMS, MetricFound)) for reason in result.reasons)
     if result.metric is not None and not of_metric:
         yield Claim(name="metric", verdict=result.metric.verdict)

@@ -145,7 +145,7 @@ def reasons(result: Result) -> tuple[Reason, ...]:
             claim=title(reason.claim),
             message=message(reason),
             at="" if reason.at is None else claimed.point(result, reason.at),
-            relax=advice(reason.relax),
+            relax=advice(reason.relax, result.spec.effective.uncertainty.h),
         )
         for reason in result.reasons
     )

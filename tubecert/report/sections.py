@@ -77,7 +77,7 @@ def _reason(result: Result, reason: Reason) -> Group:
     more = []
     if reason.at is not None:
         more.append(Text(f"at {point(result, reason.at)}"))
-    if relax := advice(reason.relax):
+    if relax := advice(reason.relax, result.spec.effective.uncertainty.h):
         more.append(Text.assemble(("help: ", "green"), relax))
     return Group(text, *(Padding(line, (0, 0, 0, 2)) for line in more))
 

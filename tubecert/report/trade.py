@@ -85,7 +85,7 @@ def _stops(result: Result) -> str:
     reason = result.reason
     if reason is None:
         return ""
-    helps = advice(reason.relax)
+    helps = advice(reason.relax, result.spec.effective.uncertainty.h)
     return sentence(reason) + (f"; {helps}" if helps else "")
 
 

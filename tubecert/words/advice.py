@@ -49,10 +49,13 @@ from tubecert.digits import down, near, up
 from tubecert.words.machine import CAUSES, PARTS
 
 
-def advice(items: Sequence[Relax]) -> str:
-    """What would help; empty if nothing is known to."""
+def advice(items: Sequence[Relax], h: Sequence[str] = ()) -> str:
+    """What would help; empty if nothing is known to. `h`: the expressions of the uncertainty, as they are written."""
+    about_h = next(
+        (item for item in items if isinstance(item, HalveConstant) and item.constant in _OF_H), None
+    )
     halvings = ", ".join(
-        _halving(item) if isinstance(item, HalveConstant) else _better(item)
+        _halving(item, h if item is about_h else ()) if isinstance(item, HalveConstant) else _better(item)
         for item in items
         if isinstance(item, (HalveConstant, HalveHardware))
     )
@@ -80,10 +83,17 @@ def _is_known(item: Relax) -> bool:
     return not isinstance(item, ShrinkSafeSet) or item.factor is not None
 
 
-def _halving(item: HalveConstant) -> str:
+_OF_H = ("h", "h_x", "h_t")
+_LONGEST = 60  # characters of h
+
+
+def _halving(item: HalveConstant, h: Sequence[str]) -> str:
     meaning = EVERY[item.constant]
     share = 100 * (1 - item.factor)
-    return f"halving {meaning.symbol} ({meaning.words}) would lower the least Gamma by {share:.0f} %"
+    whole = h[0] if len(h) == 1 else f"[{', '.join(h)}]"
+    shown = whole if len(whole) <= _LONGEST else f"{whole[:_LONGEST]} ..."
+    words = f"{meaning.words}, h = {shown}" if h else meaning.words
+    return f"halving {meaning.symbol} ({words}) would lower the least Gamma by {share:.0f} %"
 
 
 def _better(item: HalveHardware) -> str:
