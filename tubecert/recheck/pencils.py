@@ -33,7 +33,6 @@ from tubecert.recheck.terms import Rows, names, plus, scaled, times, turned, uni
 
 _APART, _BENT, _EVEN = 0.25, 0.65, 0.1  # of what is left of a limit: by size, by curvature, to all alike
 _INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
-_SMALL = 2.0**-12  # of the largest mu
 _RANGES = 40  # of mu, that are looked at on one box
 _ALL_RANGES = 2000  # where nothing varies with the states: there are no parts
 _DEAR = 4.0  # a range more is passed on to all parts of a box
@@ -199,15 +198,11 @@ class GainBelow:
         return False
 
     def _waiting(self, box: Box) -> list[tuple[float, float]]:
-        """What was not proven on the last box that was looked at and contains this one: its parts need no more.
-
-        Near mu = 0 that is everything again: t B B'/mu is so large there that only a tangent further off serves.
-        """
+        """What was not proven on the last box that was looked at and contains this one: its parts need no more."""
         while self._left:
             around, left = self._left[-1]
             if all(a <= lo and hi <= b for (lo, hi), (a, b) in zip(box, around, strict=True)):
-                small = min(hi for _, hi in left) < _SMALL * self._whole[1]
-                return [self._whole] if small else left.copy()
+                return _together(left)
             self._left.pop()
         return [self._whole]
 
@@ -255,6 +250,20 @@ def _tangent(ends: tuple[float, float]) -> float:
     """Where 1/mu is touched: the geometric middle of a range of mu."""
     lo, hi = ends
     return math.sqrt(lo) * math.sqrt(hi) if lo > 0 else hi
+
+
+def _together(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Ranges of mu; those that reach from one to the next down to 0 as one, with a tangent further off.
+
+    A small one of them is the harder the smaller it is: t B B'/mu is large there, and so is what it varies on a box.
+    """
+    apart, top = [], 0.0
+    for lo, hi in sorted(ranges):
+        if lo <= top:
+            top = max(top, hi)
+        else:
+            apart.append((lo, hi))
+    return [*apart, (0.0, top)] if top > 0 else list(ranges)
 
 
 class LeastGain:
