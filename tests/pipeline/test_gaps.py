@@ -77,9 +77,13 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
         ("tubecert/templates/csv.yaml", True, {}),
         ("tubecert/templates/csv.yaml", False, {"by_effect": False}),
         ("tubecert/templates/regulation.yaml", False, {}),
+        ("tubecert/templates/car.yaml", False, {}),
+        ("tubecert/templates/crane.yaml", True, {}),
+        ("configs/quadrotor3d.yaml", False, {}),
+        ("configs/hardware_pvtol.yaml", False, {}),
         ("configs/two_state_orbit.yaml", False, {}),
         ("configs/hardware_pvtol_moving.yaml", False, {}),
     ],
 )
-def test_half_widths_along_a_plan_that_moves_ask_for_it_by_themselves(file, wanted, options):
+def test_half_widths_along_a_plan_that_moves_or_of_many_states_ask_for_it_by_themselves(file, wanted, options):
     assert question_of(load(str(CONFIGS.parent / file)), Options(**options)).by_effect is wanted

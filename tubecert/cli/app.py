@@ -146,7 +146,7 @@ def certify(
             "--gap",
             metavar="NUMBER|auto",
             help="Relative width at which a constant is sharp enough; auto: of each by its effect on the gains.  "
-            "[tube.gap; else auto for half-widths along a plan that moves, 1/100 elsewhere]",
+            "[tube.gap; else auto for half-widths of four or more states or along a plan that moves, 1/100 elsewhere]",
             show_default=False,
         ),
     ] = None,

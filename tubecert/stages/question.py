@@ -36,6 +36,7 @@ _APART: Final = (
     "limits",
     "obstacles",
 )
+_MANY: Final = 4  # states: with fewer, constants that are as close as asked for cost less than to find which matter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,13 +75,14 @@ class Question:
     def by_effect(self) -> bool:
         """Whether the gap of each constant is to follow from its effect on the gains.
 
-        Half-widths along a plan that moves ask for it by themselves: all constants as close as that take minutes there.
+        Half-widths along a plan that moves, or of many states, ask for it by themselves: all constants as close as
+        that may take minutes there.
         """
         if self.options.by_effect is not None:
             return self.options.by_effect
         spec = self.spec
-        wide = bool(spec.tube.half_widths) and spec.trajectory.moves and spec.hardware is None
-        return spec.tube.gap == "auto" or wide
+        long = spec.trajectory.moves or len(spec.states) >= _MANY
+        return spec.tube.gap == "auto" or (bool(spec.tube.half_widths) and long and spec.hardware is None)
 
     @cached_property
     def model(self) -> ControlAffineModel:
