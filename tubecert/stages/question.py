@@ -36,7 +36,9 @@ _APART: Final = (
     "limits",
     "obstacles",
 )
-_MANY: Final = 4  # states: with fewer, constants that are as close as asked for cost less than to find which matter
+_MANY: Final = (
+    4  # states: with fewer, constants that are as close as asked for cost less than to find which matter
+)
 
 
 @dataclass(frozen=True, kw_only=True)
