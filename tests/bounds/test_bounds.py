@@ -358,6 +358,34 @@ def test_a_contracting_system_needs_no_feedback():
     assert 0 <= found.below <= found.above < 1e-9
 
 
+def test_the_feedback_gain_of_a_moving_input_is_found_where_the_metric_nearly_attains_its_rate():
+    """Without 2.1a it was infinite after 30 000 boxes: near mu = 0 a bound needs more margin of C2 than there is."""
+    from systems import matrix_of
+
+    from tubecert.model import ControlAffineModel
+    from tubecert.trajectory import constant_plan
+
+    names = ("x1", "x2")
+    model = ControlAffineModel(
+        states=names, inputs=("u",), f=matrix_of([["-x1 + x2 - (x1 - x2)**3/3", "x1"]], names)[0],
+        B=matrix_of([["0"], ["1 + x1**2/4"]], names), W=matrix_of([["1", "-1/2"], ["-1/2", "1"]], ()),
+        rate=Fraction("1.49999"), h=None,
+    )  # fmt: skip
+    plan = constant_plan([Fraction(0)] * 2, [Fraction(0)], None)
+    found = Suprema(model, plan, 0.5, None, Effort(gap=0.02, budget=3000)).feedback_gain()
+
+    def sampled(points):
+        x, v = points[:, :2], points[:, 2:]
+        slope, W = 1 + (x[:, 0] - x[:, 1]) ** 2, np.array([[1, -0.5], [-0.5, 1]])
+        f_x = stacked([[-slope, slope], [1 + 0 * slope, 0 * slope]], len(x))
+        F = f_x @ W + W @ f_x.transpose(0, 2, 1) + 2 * 1.49999 * W
+        size = np.sqrt(np.einsum("ni,ij,nj->n", v, W, v)) * np.abs(v[:, 1] * (1 + x[:, 0] ** 2 / 4))
+        return np.einsum("ni,nij,nj->n", v, F, v) / (2 * size)
+
+    least = largest(sampled, with_directions(ball_proposal(2, 0.5), 2))
+    assert least <= found.above <= 1.03 * least
+
+
 # -- the radius ----------------------------------------------------------------------------------------------
 
 

@@ -192,3 +192,18 @@ def test_what_is_owed_over_time_is_proven_to_the_horizon(key: str) -> None:
     assert codes(**{key: "0/(t - 3)"}) == ["TC201"]
     assert codes(**{key: "0*sqrt(4 - t)"}) == ["TC202"]
     assert codes(**{key: "0*sqrt(4.01 - t)"}) == []
+
+
+@pytest.mark.parametrize("rows", [(0, 1), (0, 2), (1, 2)])
+def test_what_inputs_do_not_reach_is_solved_for_by_any_rows(rows):
+    own = model([["1 + x**2", "y"], ["z", "2 - y"], ["x*y", "1 + z**2"]])
+    basis = own.annihilator_by(rows)
+    found = multiply(own.columns, basis)
+    assert [len(basis), len(basis[0])] == [3, 1]
+    for at in (
+        {"x": Fraction(1, 3), "y": Fraction(-1, 2), "z": Fraction(1, 5)},
+        dict.fromkeys(STATES, Fraction(2, 7)),
+    ):
+        given = {name: constant(value) for name, value in at.items()}
+        assert all(e.fraction == 0 for row in found for e in substitute(row, given))
+        assert any(e.fraction != 0 for row in basis for e in substitute(row, given))

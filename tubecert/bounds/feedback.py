@@ -27,7 +27,7 @@ from tubecert.enclosure.objective import Estimate, Objective, Target
 from tubecert.enclosure.pencil import FirstFinite, WeightedPencil, Weights
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ONE, ZERO
-from tubecert.expression.matrix import multiply, transpose
+from tubecert.expression.matrix import Matrix, determinant, multiply, transpose
 from tubecert.model import ControlAffineModel
 
 Ball = tuple[Array, Array]  # midpoints and radii of matrices
@@ -36,17 +36,18 @@ _WIDE = 4.0  # hi/lo of a range over which the tangent is worse than the values 
 
 
 def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
-    """du as a supremum over x and mu in (0, largest]; for constant B, C2 must hold at the model's rate, theory 2.1."""
+    """du as a supremum over x and mu in (0, largest]; C2 must hold at the model's rate, theory 2.1."""
     loss = partial(_loss, largest=largest)
     exact = WeightedPencil(
         [model.F],
         [model.BBt, model.W],
         Weights(variables=(MU,), ends=tangents, loss=loss, made_of=("tangents", largest)),
     )
-    if not (model.constant_input and model.annihilator):
+    null = model.annihilator if model.constant_input else _moving_annihilator(model)
+    if not null:
         return exact
     n, m = len(model.states), len(model.inputs)
-    basis = tuple((*r, *c) for r, c in zip(transpose(model.B_pinv), model.annihilator, strict=True))
+    basis = tuple((*r, *c) for r, c in zip(transpose(model.B_pinv), null, strict=True))
     F, W = (multiply(transpose(basis), multiply(a, basis)) for a in (model.F, model.W))
     gram = tuple(tuple(ONE if i == j < m else ZERO for j in range(n)) for i in range(n))
     ends = partial(down_to_zero, inputs=m, states=n)
@@ -57,6 +58,14 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     )
     # products may hide from simplification that a variable cancels
     return FirstFinite(exact, split) if set(split.variables) <= set(exact.variables) else exact
+
+
+def _moving_annihilator(model: ControlAffineModel) -> Matrix:
+    """B_perp(x) by rows of B that may depend on each other somewhere: no bound comes out there."""
+    rows = next(
+        (rows for rows in model.pivots[0] if determinant([model.B[i] for i in rows]) is not ZERO), None
+    )
+    return () if rows is None else model.annihilator_by(rows)
 
 
 def tangents(lo: Array, hi: Array) -> tuple[Array, Array, Array]:

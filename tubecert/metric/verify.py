@@ -24,9 +24,9 @@ from tubecert.enclosure.objective import Objective
 from tubecert.enclosure.pencil import Definite, Pencil, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
-from tubecert.expression import ONE, ZERO, Expression, is_zero
-from tubecert.expression.matrix import Matrix, adjugate, determinant, identity, multiply, transpose
-from tubecert.model import TIME, ControlAffineModel, divide
+from tubecert.expression import ZERO, is_zero
+from tubecert.expression.matrix import Matrix, determinant, identity, multiply, transpose
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.verdict import Verdict
 
 Box = Sequence[tuple[Fraction, Fraction]]
@@ -187,11 +187,7 @@ def _rates(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Obje
 
 
 def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Matrix | None:
-    """B_perp(x) by m pivot rows of B that are proven independent on the whole set, if there are such rows.
-
-    With B_1 the pivot rows and B_2 the others, v = (v_1, v_2) has B'v = 0 iff v_1 = -(B_2 B_1^-1)' v_2.
-    """
-    n = len(model.states)
+    """B_perp(x) by m pivot rows of B that are proven independent on the whole set, if there are such rows."""
     for rows in model.pivots[0]:
         pivot = determinant([model.B[i] for i in rows])
         if not any(
@@ -200,17 +196,7 @@ def _moving_annihilator(model: ControlAffineModel, domain: BoxDomain, effort: Ef
             for sign in (1, -1)
         ):
             continue
-        others = [i for i in range(n) if i not in rows]
-        gain = divide(
-            multiply([model.B[i] for i in others], adjugate([model.B[i] for i in rows])), pivot
-        )  # B_2 B_1^-1, (n - m, m)
-        basis: list[tuple[Expression, ...]] = []
-        for i in range(n):
-            if i in rows:
-                basis.append(tuple(-row[rows.index(i)] for row in gain))
-            else:
-                basis.append(tuple(ONE if i == j else ZERO for j in others))
-        return tuple(basis)
+        return model.annihilator_by(rows)
     return None
 
 

@@ -142,6 +142,19 @@ class ControlAffineModel:
         basis = null_space([[e.fraction for e in column] for column in self.columns])
         return transpose(constants(basis)) if basis else ()
 
+    def annihilator_by(self, rows: tuple[int, ...]) -> Matrix:
+        """B_perp(x), (n, n - m), where m rows of B, given by their numbers, are independent.
+
+        With B_1 these rows and B_2 the others, v = (v_1, v_2) has B'v = 0 iff v_1 = -(B_2 B_1^-1)' v_2.
+        """
+        others = [i for i in range(len(self.states)) if i not in rows]
+        square = [self.B[i] for i in rows]
+        solved = multiply([self.B[i] for i in others], adjugate(square))
+        gain = divide(solved, determinant(square))  # B_2 B_1^-1, (n - m, m)
+        own = dict(zip(rows, ([-e for e in column] for column in transpose(gain)), strict=True))
+        free = dict(zip(others, identity(len(others)), strict=True))
+        return tuple(tuple((own | free)[i]) for i in range(len(self.states)))
+
     @cached_property
     def projector(self) -> Matrix:
         """I - B B^+, (n, n): its columns span {v : B'v = 0}."""
