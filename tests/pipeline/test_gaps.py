@@ -85,5 +85,7 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
         ("configs/hardware_pvtol_moving.yaml", False, {}),
     ],
 )
-def test_half_widths_along_a_plan_that_moves_or_of_many_states_ask_for_it_by_themselves(file, wanted, options):
+def test_half_widths_along_a_plan_that_moves_or_of_many_states_ask_for_it_by_themselves(
+    file, wanted, options
+):
     assert question_of(load(str(CONFIGS.parent / file)), Options(**options)).by_effect is wanted
