@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from math import inf
 
 import pytest
 from proven import proven
@@ -12,6 +13,7 @@ from systems import SMALL
 from tubecert import certificate, pipeline
 from tubecert.claims.advice import EnlargeSafeSet, HalveConstant, NoKnobAlone, ReduceRadii, TurnKnob
 from tubecert.pipeline import Options, advice, certify
+from tubecert.pipeline.levers import nearer_start
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import CertificateError, read
 from tubecert.spec import Setting, load_text
@@ -98,6 +100,22 @@ def test_a_start_outside_of_the_tube_is_told_how_near_it_may_be_and_how_wide_the
     knobs = {item.knob: item.value for item in result.reason.relax if isinstance(item, TurnKnob)}
     assert list(knobs) == ["start", "half_widths"]
     assert knobs["start"] < 1 < knobs["half_widths"]
+
+
+@pytest.mark.parametrize("share", [1.5, 9.85, 1234.5, inf])
+def test_a_start_that_is_far_outside_is_tried_where_the_tube_begins(share):
+    """Half the way and the plan itself were tried: `start where the plan starts`."""
+    spec = load_text(SMALL)
+    for start, further in (
+        ({}, Fraction(0)),
+        ({"start_box": ((Fraction(0), Fraction(1)),) * 2}, Fraction(1, 10)),
+    ):
+        (lever,) = nearer_start(replace(spec, **start), [0.0, 0.0], share)
+        if share in (1.5, inf):
+            assert lever.tries == (Fraction(1, 2), further)
+        else:
+            assert 0.85 < lever.tries[0] * share <= 0.9
+            assert lever.tries[1:] in ((further,), ())
 
 
 @pytest.mark.slow

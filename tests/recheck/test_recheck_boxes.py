@@ -114,6 +114,23 @@ def test_where_monomials_cancel_steps_take_over():
         assert float(found.rad()) < 1e-9
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("text", FEW)
+def test_over_boxes_either_way_encloses(text):
+    """Wide boxes, narrow ones and points, two at once, before and after steps have taken over."""
+    outputs = terms([text])
+    combined = Combinations(outputs, list(NAMES))
+    combined._monomials = _product_of(outputs, combined)
+    random = np.random.default_rng(5)
+    for radius in (0.9, 0.0, 1e-3, 1e-9, 0.3, 1e-6):
+        centres = random.uniform(-1, 1, (2, len(NAMES)))
+        around = [[(c - radius, c + radius) for c in centre] for centre in centres]
+        found = combined.over([[arb(lo).union(arb(hi)) for lo, hi in box] for box in around])
+        for (ball,), box in zip(found, around, strict=True):
+            for value in at_points([text], samples(box, 9))[:, 0]:
+                assert ball.overlaps(arb(value, 1e-9 * (1 + abs(value))))
+
+
 def test_where_monomials_do_not_cancel_they_stay():
     outputs = terms([FEW[0]])
     combined = Combinations(outputs, list(NAMES))

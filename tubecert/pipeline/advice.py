@@ -184,17 +184,18 @@ class _Search:
             yield from nearer_start(spec, list(map(float, middle)))
             return
         problem = self.judged.bounded.problem
-        if _start_share(problem) >= 1:  # the start is not in the tube: neither h nor a narrower one can help
+        share = _start_share(problem)
+        if share >= 1:  # the start is not in the tube: neither h nor a narrower one can help
             # each needs new constants
             self.ledger.limit = self.ledger.limit and self.ledger.limit + 2 * _CHEAP
-            yield from nearer_start(spec, list(map(float, middle)))
+            yield from nearer_start(spec, list(map(float, middle)), share)
             yield from wider_tube(spec, split)
             return
         if not self._is_blocked(self.judged):
             yield from less_uncertainty(spec)
         yield from smaller_tube(spec, split)
         yield from wider_tube(spec, split)
-        if _start_share(problem) >= NOTABLE:
+        if share >= NOTABLE:
             yield from nearer_start(spec, list(map(float, middle)))
         largest = self.planned.metric.proof.largest_rate
         fixed = self.question.synthesis is not None

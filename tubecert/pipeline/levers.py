@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 from tubecert.claims.advice import Knob
 from tubecert.conditions.decimals import round_down, round_up
@@ -24,6 +24,7 @@ _NARROWER = (Fraction(1, 2),)
 _WIDER = (Fraction(2), Fraction(4))
 _LESS = (Fraction(1, 2), Fraction(1, 10))
 _TOWARDS = (Fraction(1, 2), Fraction(0))
+_INSIDE = 0.9  # of the tube, for a start that is far outside
 _STEEPER = Fraction(1005, 1000)  # what a metric must support beyond its rate
 
 
@@ -69,8 +70,8 @@ def wider_tube(spec: Spec, rates: bool) -> Iterator[Lever]:
     yield from _tube(spec, _WIDER, rates)
 
 
-def nearer_start(spec: Spec, middle: Sequence[float]) -> Iterator[Lever]:
-    """A start nearer to the plan, which starts at `middle`."""
+def nearer_start(spec: Spec, middle: Sequence[float], share: float = 1.0) -> Iterator[Lever]:
+    """A start nearer to the plan, which starts at `middle`; `share` of the tube is what it takes, if that is known."""
     centre = tuple(Fraction(repr(value)) for value in middle)
 
     def moved(factor: Fraction) -> Spec:
@@ -85,7 +86,10 @@ def nearer_start(spec: Spec, middle: Sequence[float]) -> Iterator[Lever]:
 
     apart = any(abs(float(a) - b) > 1e-9 for a, b in zip(spec.x0, middle, strict=True))
     if spec.within is not None or spec.start_box or apart:
-        tries = _TOWARDS if spec.within is None and not spec.start_box else _LESS
+        tries: tuple[Fraction, ...] = _TOWARDS if spec.within is None and not spec.start_box else _LESS
+        if 1 / tries[0] < share < inf:  # half the way is outside of the tube
+            inside = shorter(_INSIDE / share, below=True)
+            tries = (inside, *(value for value in tries if value < inside))
         yield Lever(knob="start", now=Fraction(1), tries=tries, turned=moved)
 
 
