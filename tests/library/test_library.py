@@ -345,7 +345,7 @@ def test_progress_is_told():
     assert proven[-1].phase is tc.Phase.GAINS
     told.clear()
     claims = tc.recheck(certified(), progress=told.append).claims
-    assert [(step.name, step.done, step.of) for step in told] == [
+    assert [(step.name, step.done, step.of) for step in told if step.count == 0] == [
         (claim.name, done, len(claims)) for done, claim in enumerate(claims)
     ]
 

@@ -20,7 +20,8 @@ from strategies import texts
 
 from tubecert.recheck import boxes, expansion, monomials, pencils, statements
 from tubecert.recheck.balls import is_positive
-from tubecert.recheck.boxes import Field
+from tubecert.recheck.boxes import Field, Found
+from tubecert.recheck.clock import telling
 from tubecert.recheck.cover import Boxed, prove
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.pencils import LeastGain, SlopesBelow
@@ -397,3 +398,29 @@ def test_random_expressions_are_enclosed(text, ends):
 
 def test_proposals_come_from_the_pencil():
     assert pencils.proposed_largest([[4.0, 0.0], [0.0, 1.0]]) == pytest.approx(4)
+
+
+def test_a_long_claim_tells_how_much_of_it_is_proven():
+    """A claim of a minute stood still."""
+
+    class Narrow:
+        variables = ("x", "y")
+
+        def over(self, box):
+            return Found(all(hi - lo < 0.1 for lo, hi in box), [0.0, 0.0], [0.0, 0.0])
+
+        def broken(self, at):
+            return False
+
+    told = []
+    domain = Boxed({"x": (Fraction(-1), Fraction(1)), "y": (Fraction(0), Fraction(1))})
+    with telling(lambda *each: told.append(each)):
+        assert prove(Narrow(), domain, 10_000).verdict == "confirmed"
+    assert [count for count, _ in told] == [64 * k for k in range(1, len(told) + 1)]
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert 0 < shares[0] < 0.2
+    assert 0.8 < shares[-1] <= 1
+    told.clear()
+    prove(Narrow(), domain, 10_000)
+    assert told == []

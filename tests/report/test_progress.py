@@ -210,3 +210,8 @@ def test_in_words():
 @pytest.mark.parametrize("phase", Phase)
 def test_every_phase_has_words(phase):
     assert described(Step(phase=phase))
+
+
+def test_how_much_of_a_long_claim_is_proven_is_said():
+    step = Step(phase=Phase.RECHECK, name="f_x <= 3", count=1280, share=0.382, done=3, of=7)
+    assert described(step).endswith("examining: f_x <= 3, 1,280 boxes, 38 % of this part proven")

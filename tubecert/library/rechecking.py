@@ -132,4 +132,6 @@ def verdict_line(found: Recheck, name: str) -> str:
 
 def told(progress: Progress) -> Report:
     """What recheck, which shares no record with the rest, tells its progress to."""
-    return lambda claim, done, of: progress(Step(phase=Phase.RECHECK, name=claim, done=done, of=of))
+    return lambda claim, done, of, boxes, share: progress(
+        Step(phase=Phase.RECHECK, name=claim, done=done, of=of, count=boxes, share=share)
+    )

@@ -16,9 +16,10 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Found, Test
-from tubecert.recheck.clock import time_is_up
+from tubecert.recheck.clock import time_is_up, told
 
 _TRIES = 4  # every so many boxes a point is tried
+_TELLS = 64  # ... it is told how far the claim is
 _UNKNOWN = 1e300
 
 State = tuple[list[tuple[float, float]], Any]  # a box, and what the domain remembers about it
@@ -70,6 +71,7 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
     own, count = len(test.variables), 0
     waiting = domain.start(variables)
     sides = _sides(waiting)
+    whole = _volume(waiting, sides)
     while waiting:
         state = domain.cut(variables, waiting.pop())
         if state is None:
@@ -77,6 +79,8 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
         count += 1
         box = state[0]
         found = test.over(box[:own])
+        if count % _TELLS == 0 and (tell := told()) is not None and whole > 0:
+            tell(count, 1 - _volume(waiting if found.proven else [*waiting, state], sides) / whole)
         if found.proven:
             continue
         if count % _TRIES == 1:
@@ -91,6 +95,14 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
             return Outcome(verdict="undecided", why=why, boxes=count)
         waiting += halves
     return Outcome(verdict="confirmed", boxes=count)
+
+
+def _volume(states: Sequence[State], sides: Sequence[float]) -> float:
+    """Of boxes, in units of the sides: how much is left, in words; nothing is decided by it."""
+    return sum(
+        math.prod((hi - lo) / side for (lo, hi), side in zip(box, sides, strict=True) if side > 0)
+        for box, _ in states
+    )
 
 
 def _sides(states: Sequence[State]) -> list[float]:

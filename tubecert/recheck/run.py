@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
 from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import of_certified, of_every
-from tubecert.recheck.clock import time_is_up, within
+from tubecert.recheck.clock import telling, time_is_up, within
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import read
 from tubecert.recheck.examination import Claim, Memory
@@ -19,7 +20,8 @@ from tubecert.recheck.orientation import NOT_EXAMINED
 from tubecert.recheck.result import Certificate
 
 BUDGET = 200_000
-Report = Callable[[str, int, int], None]  # the claim that is examined now, how many are done, of how many
+Report = Callable[[str, int, int, int, float], None]
+# the claim that is examined now, how many are done, of how many; its boxes so far, and the share of it that is proven
 
 _TOO_LATE = Outcome(verdict="undecided", why="not examined: the time was up")
 _CODES = {
@@ -89,9 +91,11 @@ def recheck(
     with within(seconds):
         claims = tuple(_claims(certificate, budget))
         for claim in claims:
-            if report is not None:
-                report(claim.name, len(found), len(claims))
-            found.append(Examined(claim.name, _TOO_LATE if time_is_up() else claim.outcome(kept)))
+            told = None if report is None else partial(report, claim.name, len(found), len(claims))
+            if told is not None:
+                told(0, 0.0)
+            with telling(told):
+                found.append(Examined(claim.name, _TOO_LATE if time_is_up() else claim.outcome(kept)))
             if to_first_failure and not found[-1].outcome.holds:
                 break
     return Recheck(

@@ -81,6 +81,8 @@ def _now(step: Step) -> str:
     if step.count:
         unit = str(step.unit) if step.count != 1 else _ONE[step.unit]
         words += f", {step.count:,} {unit}"
+    if step.share > 0:
+        words += f", {100 * step.share:.0f} % of this part proven"
     if math.isfinite(step.below) and math.isfinite(step.above):
         words += f", between {near(step.below, 4)} and {near(step.above, 4)}"
     return words
