@@ -88,6 +88,7 @@ def narrowest(
     At the `deadline`, and at an interruption, the narrowest of those that were tried; the first is always certified.
     """
     memory = Memory() if memory is None else memory
+    deadline = deadline or Deadline()
     attempts: dict[Fraction, Attempt] = {}
     cut: Cut | None = None
 
@@ -95,7 +96,7 @@ def narrowest(
         if scale not in attempts:
             told = None if progress is None else partial(_told, progress, len(attempts))
             spec = at(scale)
-            watched = deadline.watched(told) if deadline is not None and attempts else told
+            watched = deadline.watched(told) if attempts else told
             result = certify(spec, options, watched, memory, brief=True)
             attempts[scale] = Attempt(
                 scale=scale,

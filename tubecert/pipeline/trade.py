@@ -53,11 +53,11 @@ def cheapest(
     deadline: Deadline | None = None,
 ) -> Cheapest:
     """The cheapest machine for the tube of a specification, part by part; `at` asks for the largest of one."""
-    memory = Memory()
+    memory, deadline = Memory(), deadline or Deadline()
     found: list[Offer] = []
     try:
         for part in parts:
-            watched = deadline.watched(progress) if deadline is not None and found else progress
+            watched = deadline.watched(progress) if found else progress
             found.append(Offer(part=part, result=certify(at(part), options, watched, memory)))
     except (OutOfTime, KeyboardInterrupt) as end:
         if not found:
@@ -114,11 +114,11 @@ def front(
 
     Sizes grow and shrink by fourth roots of two from the specification's, until two in a row gain nothing.
     """
-    memory = Memory()
+    memory, deadline = Memory(), deadline or Deadline()
     points: list[Point] = []
 
     def point(scale: Fraction) -> Point:
-        watched = deadline.watched(progress) if deadline is not None and points else progress
+        watched = deadline.watched(progress) if points else progress
         offer = Offer(part=part, result=certify(at(scale), options, watched, memory))
         points.append(Point(scale=scale, offer=offer, size=size_of(offer.result, measure)))
         return points[-1]
