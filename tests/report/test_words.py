@@ -119,7 +119,9 @@ def labels(shown):
 
 def unexplained(shown):
     """Norms, words and symbols that have no page and are neither plain English nor names of the specification."""
-    shown = re.sub(r"sha256:\w+|\S+\.json", "", shown)
+    shown = re.sub(
+        r"sha256:\w+|\S+\.json|,\s+h\s+=\s.*?\)\s+(?=would)", " ", shown, flags=re.DOTALL
+    )  # h of the user
     norms = re.findall(r"\|[^|\n]+\|", shown)
     words = re.findall(r"(?<![\w.])[A-Za-z][\w'*/-]*", re.sub(r"\|[^|\n]+\|", "", shown))
     asked = dict.fromkeys([*norms, *(word.strip("'/-").removesuffix("'s") for word in words), "*"])
