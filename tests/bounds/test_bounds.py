@@ -386,6 +386,23 @@ def test_the_feedback_gain_of_a_moving_input_is_found_where_the_metric_nearly_at
     assert least <= found.above <= 1.03 * least
 
 
+def test_the_feedback_gain_of_as_many_moving_inputs_as_states_needs_no_null_space():
+    """There is none to span. F = 2 (f' + rate) and W = 1, so that du = sup (f' + rate)/b."""
+    from systems import matrix_of
+
+    from tubecert.model import ControlAffineModel
+    from tubecert.trajectory import constant_plan
+
+    model = ControlAffineModel(
+        states=("x1",), inputs=("u",), f=matrix_of([["x1**2"]], ("x1",))[0], B=matrix_of([["2 + x1"]], ("x1",)),
+        W=matrix_of([["1"]], ()), rate=Fraction(3), h=None,
+    )  # fmt: skip
+    plan = constant_plan([Fraction(0)], [Fraction(0)], None)
+    found = Suprema(model, plan, 0.5, None, Effort(gap=0.01, budget=500)).feedback_gain()
+    # (2 x + 3)/(2 + x) grows with x
+    assert found.below <= 4 / 2.5 <= found.above <= 1.02 * 4 / 2.5
+
+
 # -- the radius ----------------------------------------------------------------------------------------------
 
 

@@ -143,11 +143,13 @@ class ControlAffineModel:
         return transpose(constants(basis)) if basis else ()
 
     def annihilator_by(self, rows: tuple[int, ...]) -> Matrix:
-        """B_perp(x), (n, n - m), where m rows of B, given by their numbers, are independent.
+        """B_perp(x), (n, n - m), where m rows of B, given by their numbers, are independent; empty where m = n.
 
         With B_1 these rows and B_2 the others, v = (v_1, v_2) has B'v = 0 iff v_1 = -(B_2 B_1^-1)' v_2.
         """
         others = [i for i in range(len(self.states)) if i not in rows]
+        if not others:
+            return ()
         square = [self.B[i] for i in rows]
         solved = multiply([self.B[i] for i in others], adjugate(square))
         gain = divide(solved, determinant(square))  # B_2 B_1^-1, (n - m, m)
