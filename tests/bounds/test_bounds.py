@@ -358,6 +358,7 @@ def test_a_contracting_system_needs_no_feedback():
     assert 0 <= found.below <= found.above < 1e-9
 
 
+@pytest.mark.slow
 def test_the_feedback_gain_of_a_moving_input_is_found_where_the_metric_nearly_attains_its_rate():
     """Without 2.1a it was infinite after 30 000 boxes: near mu = 0 a bound needs more margin of C2 than there is."""
     from systems import matrix_of
