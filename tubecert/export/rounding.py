@@ -72,9 +72,7 @@ class _Analysis:
         if controller.swept is not None:
             raise UncoveredError("geodesics that are computed", "take a constant metric")
         if controller.pieces is not None and not controller.pieces.continuous:
-            raise UncoveredError(
-                "a plan through knots whose input jumps", "write trajectory.interpolation: linear"
-            )
+            raise UncoveredError("a plan through knots whose input jumps", "write interpolation: linear")
         self.c, self.real, self.u = controller, real, Interval.of(real.unit)
         self.eta, self.estimate = Interval.of(real.least), Interval.of(controller.estimate)
         self.m, self.n = len(controller.inputs), len(controller.states)
