@@ -38,12 +38,9 @@ def suggestion(name: str, known: Collection[str], *, what: str = "known names") 
 
 def rates_of(name: str) -> tuple[str, ...]:
     """What people call the derivative of `name` by the time."""
-    before, after = ("d", "d_", "dot", "dot_"), ("dot", "_dot", "Dot", "_dt", "dt")
-    return (
-        *(f"{prefix}{name}" for prefix in before),
-        *(f"{name}{suffix}" for suffix in after[:3]),
-        *(f"d{name}{suffix}" for suffix in after[3:]),
-    )
+    before = (f"{prefix}{name}" for prefix in ("d", "d_", "dot", "dot_"))
+    after = (f"{name}{suffix}" for suffix in ("dot", "_dot", "Dot"))
+    return (*before, *after, f"d{name}_dt", f"d{name}dt")
 
 
 def _is_other(name: str, word: str) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -203,24 +203,24 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
-        size_there = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
-        finding = Finding(
-            code=codes.NO_EQUILIBRIUM,
-            severity=Severity.WARNING,
-            message=f"the point is no equilibrium: {size_there}",
-            location=spec.locations.get("trajectory.input") or spec.location("trajectory.at"),
-            help="choose at and input with f(at) + B(at) input = 0; what is missing is paid for in the gains",
-        )
-        yield (
-            finding
-            if notable
-            else replace(
-                finding,
-                severity=Severity.NOTE,
-                message=f"the point is an equilibrium up to a rounding: {size_there}, "
-                f"{up(100 * worst / bearable, 2)} % of what the tube has room for",
-                help="nothing is wrong: the proof counts it in; more digits, or expressions (input: [m*g]), help",
+        message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
+        if notable:
+            message = f"the point is no equilibrium: {message}"
+            help = (
+                "choose at and input with f(at) + B(at) input = 0; what is missing is paid for in the gains"
             )
+        else:
+            room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
+            message = f"the point is an equilibrium up to a rounding: {message}, {room}"
+            help = (
+                "nothing is wrong: the proof counts it in; more digits, or expressions (input: [m*g]), help"
+            )
+        yield Finding(
+            code=codes.NO_EQUILIBRIUM,
+            severity=Severity.WARNING if notable else Severity.NOTE,
+            message=message,
+            location=spec.locations.get("trajectory.input") or spec.location("trajectory.at"),
+            help=help,
         )
     elif notable:
         yield Finding(

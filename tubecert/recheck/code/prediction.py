@@ -72,8 +72,10 @@ def cut(model: Model, near: Sequence[Ball], acting: Sequence[Ball], narrow: Ball
     with _capped():
         try:
             bent = _bent(speed, dict(zip(names, known, strict=True)), h)
+        except UnreadError:
+            raise
         except ValueError as error:  # a divisor that may vanish, on so wide a box
-            raise error if isinstance(error, UnreadError) else UnreadError(_LONG) from error
+            raise UnreadError(_LONG) from error
     found = STEPS * h**_LAST * length(bent) * (steep * exact(model.delay)).exp()
     if not found < room:
         raise UnreadError(_LONG)
