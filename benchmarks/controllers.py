@@ -20,9 +20,6 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-
-import tubecert as tc
-from tubecert.enclosure.interval import Array
 from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import Compiled, Memory, compiled, compiler
 from tubecert.export.controller import Controller
@@ -30,6 +27,9 @@ from tubecert.export.driven import Given, driven
 from tubecert.export.folder import Exported, exported
 from tubecert.export.vectors import vectors
 from tubecert.library.driving import Attack
+
+import tubecert as tc
+from tubecert.enclosure.interval import Array
 from tubecert.simulate.certified import adopted
 from tubecert.simulate.setting import setting_of
 from tubecert.spec import load_text

@@ -19,16 +19,16 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from tubecert.conditions.hardware import HardwareRecipe
+from tubecert.search.hardware import Setting, recipe_at
+from tubecert.search.lanes import DEADBEAT, Choice, Lanes, Search
 
 from tubecert.conditions.decimals import round_down
-from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array
 from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import plan, tube
-from tubecert.search.hardware import Setting, recipe_at
-from tubecert.search.lanes import DEADBEAT, Choice, Lanes, Search
 from tubecert.search.scan import serves
 from tubecert.spec import Hardware, load, load_text
 from tubecert.stages.bounded import bound, enclose

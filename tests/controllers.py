@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.sampled import SampledRecipe
 from tubecert.export.assembly import assembled
 from tubecert.export.blocks import Machine
 from tubecert.export.continuous.assembly import Loop, together
 from tubecert.export.controller import Boxes, Continuous, Controller
+
 from tubecert.model import build
 from tubecert.spec import Knots, Picard, load_text
 from tubecert.trajectory import Plan

@@ -11,13 +11,10 @@ from typing import Any
 import controllers
 from controllers import GIVEN, SLOW
 from flint import arb_mat, ctx
-
-from tubecert import certificate
 from tubecert.conditions.hardware import Rounding
 from tubecert.export.assembly import assembled
 from tubecert.export.controller import Controller
 from tubecert.export.folder import exported
-from tubecert.recheck.balls import exact, root
 from tubecert.recheck.code.about import About
 from tubecert.recheck.code.examination import model_of, moves_of, read_by
 from tubecert.recheck.code.losses import lost_by
@@ -25,9 +22,12 @@ from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.continuous import Adapted, OfFamily
 from tubecert.recheck.controller import Machine
 from tubecert.recheck.controller import OfFamily as OfPlans
+from tubecert.recheck.sampling import SampledGains
+
+from tubecert import certificate
+from tubecert.recheck.balls import exact, root
 from tubecert.recheck.curve import Knots, hermite
 from tubecert.recheck.document import read
-from tubecert.recheck.sampling import SampledGains
 from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import curve_of, system_of
 from tubecert.spec import load_text

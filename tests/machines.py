@@ -7,11 +7,11 @@ from fractions import Fraction
 from typing import Any
 
 from problems import alive
-
-from tubecert.bounds.constants import WindConstants
 from tubecert.bounds.covariant import CovariantConstants
 from tubecert.bounds.hardware import HardwareConstants
 from tubecert.conditions.machine import Machine
+
+from tubecert.bounds.constants import WindConstants
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.enclosure.constant import Constant
 from tubecert.spec import Hardware

@@ -6,6 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from tubecert.conditions.sampled import SampledRecipe, margin_sampled_along
+from tubecert.kinds.sampled import SampledSection
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions import rates
@@ -13,13 +15,11 @@ from tubecert.conditions.distance import DistanceRecipe, margin_distance_along
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe, margins_26_along
-from tubecert.conditions.sampled import SampledRecipe, margin_sampled_along
 from tubecert.conditions.verdict import Verdict
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import judge
 from tubecert.kinds.distance import DistanceSection
 from tubecert.kinds.rates import RatesSection
-from tubecert.kinds.sampled import SampledSection
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline import Options, question_of
 from tubecert.pipeline.certification import answer

@@ -9,12 +9,12 @@ from itertools import pairwise
 from typing import Any
 
 from problems import alive
+from tubecert.conditions.sampled import SampledRecipe
+from tubecert.conditions.stretches import LevelProof
 
 from tubecert.bounds.constants import WindConstants
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import Part, TubeProblem, Wind
-from tubecert.conditions.sampled import SampledRecipe
-from tubecert.conditions.stretches import LevelProof
 from tubecert.enclosure.constant import Constant
 
 F = Fraction

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from tubecert.library.certifying import certify
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
-    from tubecert.library.designing import design, machines, trade_off
-    from tubecert.library.designs import Design, Machines, TradeOff
-    from tubecert.library.driving import Drive, drive
-    from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.rechecking import Rechecked, recheck
@@ -36,11 +32,7 @@ __all__ = [
     "Certification",
     "Checked",
     "Comparison",
-    "Design",
-    "Drive",
-    "Exported",
     "Gains",
-    "Machines",
     "Phase",
     "Rechecked",
     "Report",
@@ -51,7 +43,6 @@ __all__ = [
     "Swept",
     "SynthesisedMetric",
     "TargetError",
-    "TradeOff",
     "TubecertError",
     "Unit",
     "Verdict",
@@ -60,11 +51,7 @@ __all__ = [
     "certify",
     "check",
     "compare",
-    "design",
-    "drive",
-    "export",
     "load",
-    "machines",
     "read",
     "recheck",
     "report",
@@ -72,7 +59,6 @@ __all__ = [
     "specification",
     "sweep",
     "synthesise",
-    "trade_off",
     "verify",
 ]
 
@@ -85,16 +71,7 @@ _HOMES = {
     "check": "library.checks",
     "Comparison": "library.comparing",
     "compare": "library.comparing",
-    "Design": "library.designs",
-    "Machines": "library.designs",
-    "TradeOff": "library.designs",
-    "design": "library.designing",
-    "machines": "library.designing",
-    "trade_off": "library.designing",
-    "Drive": "library.driving",
-    "drive": "library.driving",
     "Swept": "library.sweeping",
-    "Exported": "library.exporting",
     "SynthesisedMetric": "library.metrics",
     "VerifiedMetric": "library.metrics",
     "synthesise": "library.metrics",
@@ -114,7 +91,6 @@ _HOMES = {
     "Verdict": "verdict",
 }
 _ROOMS = {
-    "export": "library.exporting",
     "recheck": "library.rechecking",
     "report": "library.pages",
     "simulate": "library.simulating",

@@ -5,7 +5,7 @@ holds, and held: `check` is its only maker. Who proposed the recipe does not mat
 proofs, here; nothing else may say "certified" (tests/house/test_trust.py).
 
 In: a `TubeProblem` and recipes from anywhere. Out: proofs, or what is missing. Trusted: yes, and it imports nothing
-that is not. Implements: theorems 0, A (26a)-(26c), B, C and H by what `THEOREMS` lists.
+that is not. Implements: theorems 0, A (26a)-(26c) and B by what `THEOREMS` lists.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final, Generic, NoReturn
 
 import numpy as np
 
-from tubecert.conditions import alone, distance, hardware, rates, sampled
+from tubecert.conditions import alone, distance, rates
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.inputs import InputShares
 from tubecert.conditions.problem import TubeProblem
@@ -27,8 +27,7 @@ from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.processor import require_ieee
 
 THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
-    theorem.recipe: theorem
-    for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM, sampled.THEOREM, hardware.THEOREM)
+    theorem.recipe: theorem for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM)
 }
 
 
@@ -129,7 +128,7 @@ def _proves(problem: TubeProblem, recipe: Recipe, margins: Mapping[str, Interval
     """Whether all that the theorem asks for is proven."""
     theorem = theorem_of(type(recipe))
     sound = not theorem.provisos(problem) and not theorem.unbounded(problem)
-    return sound and theorem.is_about(problem, recipe) and _holds(margins)
+    return sound and theorem.states(problem, recipe) and _holds(margins)
 
 
 def _holds(margins: Mapping[str, Interval]) -> bool:
@@ -187,24 +186,20 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
 
 
 def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Proposal[R]:
-    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed.
-
-    A curve is about other loops like the decisive one: what the theorem is stated for.
-    """
+    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed."""
 
     def kept(recipe: R | None) -> R | None:
-        return recipe if recipe is not None and theorem.is_about(problem, recipe) else None
+        return recipe if recipe is not None and theorem.states(problem, recipe) else None
 
     def those(recipes: Iterable[R]) -> tuple[R, ...]:
         return tuple(recipe for recipe in recipes if theorem.states(problem, recipe))
 
-    decisive = kept(proposal.decisive)
     return replace(
         proposal,
-        decisive=decisive,
+        decisive=kept(proposal.decisive),
         hopeless=kept(proposal.hopeless),
-        beside={role: r for role, r in proposal.beside.items() if theorem.is_about(problem, r)},
-        curve=tuple(r for r in those(proposal.curve) if theorem.alike(problem, decisive, r)),
+        beside={role: r for role, r in proposal.beside.items() if theorem.states(problem, r)},
+        curve=those(proposal.curve),
         around=those(proposal.around),
     )
 

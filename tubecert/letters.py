@@ -13,10 +13,8 @@ __all__ = [
     "ALL",
     "ALONE",
     "DISTANCE",
-    "HARDWARE",
     "NAMES",
     "RATES",
-    "SAMPLED",
     "Name",
     "name_of",
     "words_of",
@@ -43,10 +41,8 @@ class Name:
 ALONE: Final = Name(key="no_adaptation", option="none", letter="0", title="no adaptation", adapts=False)
 RATES: Final = Name(key="conditions_26", option="26", letter="A", title="(26)")
 DISTANCE: Final = Name(key="distance", option="distance", letter="B", title="distance")
-SAMPLED: Final = Name(key="sampled", option="sampled", letter="C", title="sampled")
-HARDWARE: Final = Name(key="hardware", option="hardware", letter="H", title="hardware")
 
-NAMES: Final = (ALONE, RATES, DISTANCE, SAMPLED, HARDWARE)
+NAMES: Final = (ALONE, RATES, DISTANCE)
 ADAPTIVE: Final = tuple(name for name in NAMES if name.adapts)
 ALL: Final = "all"
 

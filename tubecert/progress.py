@@ -27,7 +27,6 @@ class Phase(StrEnum):
     SWEEP = "sweep"  # points
     COMPILATION = "compilation"  # functions
     SIMULATION = "simulation"  # runs
-    DRIVE = "drive"  # samples of a compiled controller
     FIGURES = "figures"  # no count
     RECHECK = "recheck"  # claims
 

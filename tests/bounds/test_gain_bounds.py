@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from systems import SMALL
+from tubecert.bounds.gains import Gain, gain_constants
 
 from tubecert import pipeline
-from tubecert.bounds.gains import Gain, gain_constants
 from tubecert.bounds.wind import Beside, uncertainty_constants
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.tape import Tape

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from systems import matrix_of
+from tubecert.bounds.hardware import HardwareSuprema, clip_box, corners
 
 from tubecert.bounds.constants import Constant
-from tubecert.bounds.hardware import HardwareSuprema, clip_box, corners
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, symbol
 from tubecert.model import ControlAffineModel

@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from systems import matrix_of
-
-from tubecert.bounds.constants import Constant
 from tubecert.bounds.covariant import CovariantSuprema
 from tubecert.bounds.hardware import HardwareSuprema
+
+from tubecert.bounds.constants import Constant
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort

@@ -398,7 +398,7 @@ def test_bad_metric_files(folder, proven, change, fragment):
         (json.dumps({key: METRIC[key] for key in METRIC if key != "rate"}), "the metric file lacks rate"),
         (json.dumps(METRIC | {"rate": -1}), "error TC112: rate is -1; it must be > 0"),
         (
-            '{"format": "tubecert-certificate/2", "hash": "", "result": {}}',
+            '{"format": "tubecert-certificate/3", "hash": "", "result": {}}',
             "this is a certificate, not a metric",
         ),
         (TEXT, "this is a specification, not a metric file"),

@@ -89,7 +89,7 @@ def test_nothing_is_guessed_of_an_option_of_one_letter(
 
 
 @pytest.mark.parametrize(
-    ("form", "what"), [("tubecert-certificate/2", "a certificate"), ("tubecert-metric/1", "a metric file")]
+    ("form", "what"), [("tubecert-certificate/3", "a certificate"), ("tubecert-metric/1", "a metric file")]
 )
 def test_another_file_of_ours_is_named(tmp_path: Path, form: str, what: str) -> None:
     path = tmp_path / "file.json"

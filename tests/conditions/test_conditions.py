@@ -19,6 +19,7 @@ from problems import (
     three_state,
     two_state,
 )
+from tubecert.conditions.sampled import ages
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions.arithmetic import choose
@@ -26,7 +27,6 @@ from tubecert.conditions.decimals import exact, next_up, printed, round_down, ro
 from tubecert.conditions.kernels import Kernel
 from tubecert.conditions.problem import Drift, Formulas, TubeProblem
 from tubecert.conditions.rates import RateRecipe, derived_constants
-from tubecert.conditions.sampled import ages
 from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
 from tubecert.search import distance, sampled

@@ -12,11 +12,11 @@ from fractions import Fraction
 import pytest
 from machines import covariant_constants, hardware_constants, windy
 from problems import constants, two_state
-
 from tubecert.conditions.machine import Machine
-from tubecert.conditions.problem import TubeProblem
 from tubecert.search.hardware import Setting, recipe_at
 from tubecert.search.lanes import Search
+
+from tubecert.conditions.problem import TubeProblem
 from tubecert.search.scan import serves
 from tubecert.spec import Hardware
 

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from machines import alive_machine, asking, hardware_constants, windy
 from problems import constants, two_state
-
-from tubecert.conditions import hardware
 from tubecert.conditions.hardware import margins_hardware
 from tubecert.conditions.machine import Machine
+from tubecert.kinds.hardware import HardwareData
+from tubecert.search.hardware import propose_hardware, setting_at
+from tubecert.search.lanes import Choice, Search
+
+from tubecert.conditions import hardware
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import Proof, check
-from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.table import kind_of, kinds_of
 from tubecert.letters import HARDWARE
 from tubecert.records import from_json, to_json
 from tubecert.search import hardware as searching
-from tubecert.search.hardware import propose_hardware, setting_at
-from tubecert.search.lanes import Choice, Search
 from tubecert.spec import Hardware
 from tubecert.verdict import Verdict
 

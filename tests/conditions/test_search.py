@@ -22,6 +22,8 @@ from problems import (
     verdict_at,
 )
 from test_conditions import scaled
+from tubecert.search.sampled import serves
+from tubecert.search.windows import windows
 
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions import sampled as theorem_c
@@ -35,8 +37,6 @@ from tubecert.records import to_json
 from tubecert.search.distance import least_rate
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
 from tubecert.search.proposers import LEAST, PROPOSERS
-from tubecert.search.sampled import serves
-from tubecert.search.windows import windows
 
 THREE = scalar_predictor("1", 3)
 

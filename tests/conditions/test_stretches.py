@@ -8,20 +8,20 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import stretched
+from tubecert.conditions.distance_windows import Loop, along
+from tubecert.conditions.sampled import margin_sampled_along
+from tubecert.conditions.stretches import LevelProof, over
+from tubecert.search.stretches import PartSearch
 
 from tubecert.conditions import distance, sampled, sampled_windows, stretches
 from tubecert.conditions.distance import margin_distance_along
-from tubecert.conditions.distance_windows import Loop, along
 from tubecert.conditions.inputs import InputShares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers
-from tubecert.conditions.sampled import margin_sampled_along
-from tubecert.conditions.stretches import LevelProof, over
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Proof, check
 from tubecert.search.distance import recipe_at
-from tubecert.search.stretches import PartSearch
 
 F = Fraction
 LAM, BETA = 1.3, 0.8

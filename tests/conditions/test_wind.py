@@ -18,6 +18,7 @@ from problems import (
     margin_sampled,
     two_state,
 )
+from tubecert.search.sampled import recipe_at as sampled_recipe_at
 
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
 from tubecert.conditions import alone, distance, sampled
@@ -26,7 +27,6 @@ from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.wind import prediction
 from tubecert.kernel import check
 from tubecert.search.distance import least_rate, recipe_at
-from tubecert.search.sampled import recipe_at as sampled_recipe_at
 from tubecert.verdict import Verdict
 
 

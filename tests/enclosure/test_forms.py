@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
 from systems import matrix_of
-
 from tubecert.enclosure.forms import Form, Forms, contract, least_norm, stacked, thin, unfolded_norm
 
 NAMES = ("x", "y")

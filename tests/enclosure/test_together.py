@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import systems
+from tubecert.bounds.parts import Parts
+from tubecert.trajectory.during import during
 
 from tubecert.bounds import suprema
-from tubecert.bounds.parts import Parts
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure import together
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -20,7 +21,6 @@ from tubecert.enclosure.pencil import FirstFinite, Pencil, SumOfPencils
 from tubecert.expression import constant, symbol
 from tubecert.expression.matrix import identity
 from tubecert.spec import Knots
-from tubecert.trajectory.during import during
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.tube import Tubes
 

@@ -17,11 +17,6 @@ import pytest
 from controllers import CONTINUOUS
 from flint import ctx
 from followed import adapted_in_recheck, texts
-from typer.testing import CliRunner
-
-from tubecert import certificate
-from tubecert.cli.app import app
-from tubecert.errors import TubecertError
 from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import COMPILERS, FLAGS, compiler
 from tubecert.export.continuous.assembly import together
@@ -34,10 +29,15 @@ from tubecert.export.controller import Continuous, Controller
 from tubecert.export.driven import Given
 from tubecert.export.folder import exported
 from tubecert.export.reference import Handed, execute
-from tubecert.library.certification import certification_of
 from tubecert.recheck.code.continuous import _answers, otherwise
 from tubecert.recheck.code.examination import apart
 from tubecert.recheck.code.reader import read_code
+from typer.testing import CliRunner
+
+from tubecert import certificate
+from tubecert.cli.app import app
+from tubecert.errors import TubecertError
+from tubecert.library.certification import certification_of
 from tubecert.simulate.certified import adopted
 from tubecert.simulate.setting import setting_of
 from tubecert.spec import load_text

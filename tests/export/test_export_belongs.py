@@ -16,12 +16,6 @@ import pytest
 from controllers import CONTROLLERS
 from flint import ctx
 from followed import TEXTS, in_recheck
-from typer.testing import CliRunner
-
-import tubecert as tc
-from tubecert import certificate
-from tubecert.cli.app import app
-from tubecert.errors import TubecertError
 from tubecert.export import compiled as compiled_code
 from tubecert.export.assembly import controller_of
 from tubecert.export.compiled import COMPILERS, compiled, compiler
@@ -29,13 +23,19 @@ from tubecert.export.driven import Driven
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
 from tubecert.export.vectors import vectors
-from tubecert.library.certification import certification_of
 from tubecert.library.driving import Drive
-from tubecert.library.rechecking import code_in
-from tubecert.recheck.balls import exact
 from tubecert.recheck.code.constants import otherwise
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.controller import Machine, machine_of
+from typer.testing import CliRunner
+
+import tubecert as tc
+from tubecert import certificate
+from tubecert.cli.app import app
+from tubecert.errors import TubecertError
+from tubecert.library.certification import certification_of
+from tubecert.library.rechecking import code_in
+from tubecert.recheck.balls import exact
 
 needs_cc = pytest.mark.skipif(
     compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"

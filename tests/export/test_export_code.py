@@ -18,7 +18,6 @@ import controllers
 import numpy as np
 import pytest
 from controllers import CONTROLLERS, wandering
-
 from tubecert.export.compiled import COMPILERS, FLAGS, Compiled, compiled, compiler
 from tubecert.export.folder import exported
 from tubecert.export.reference import Reference

@@ -16,21 +16,21 @@ import pytest
 from controllers import FAMILIES
 from flint import ctx
 from followed import family_in_recheck, texts
-from typer.testing import CliRunner
-
-from tubecert import certificate
-from tubecert.cli.app import app
-from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
 from tubecert.export.compiled import COMPILERS, FLAGS, compiled, compiler
 from tubecert.export.driven import Driven, joined
 from tubecert.export.folder import exported
 from tubecert.export.reference import Handed
 from tubecert.export.vectors import handed_of, run, vectors
-from tubecert.library.rechecking import code_in
 from tubecert.recheck.code.constants import of_boxes
 from tubecert.recheck.code.examination import agreement
 from tubecert.recheck.code.reader import read_code
+from typer.testing import CliRunner
+
+from tubecert import certificate
+from tubecert.cli.app import app
+from tubecert.errors import TubecertError
+from tubecert.library.rechecking import code_in
 
 needs_cc = pytest.mark.skipif(
     compiler() is None, reason=f"no C compiler on PATH (one of {', '.join(COMPILERS)})"

@@ -7,15 +7,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from followed import bounds, texts, with_a_table
-
-from tubecert.enclosure.interval import Interval
 from tubecert.export import lookups
 from tubecert.export.followed import FLOATS, Followed, UncoveredError
 from tubecert.export.rounding import _Analysis, rounding_of
 from tubecert.export.tables import looked_up
-from tubecert.expression.lookup import Lookup
 from tubecert.recheck.code import lookups as own
 from tubecert.recheck.code.words import UnreadError
+
+from tubecert.enclosure.interval import Interval
+from tubecert.expression.lookup import Lookup
 
 
 def fractions(*texts):

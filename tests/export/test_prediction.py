@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from followed import predicting, texts
-
-import tubecert as tc
-from tubecert.enclosure.interval import Interval
 from tubecert.export import prediction
 from tubecert.export.assembly import controller_of
 from tubecert.export.followed import UncoveredError
@@ -24,6 +21,9 @@ from tubecert.recheck.code.examination import about
 from tubecert.recheck.code.losses import lost_by
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.controller import machine_of
+
+import tubecert as tc
+from tubecert.enclosure.interval import Interval
 
 
 def solution(c, t, y, kappa):

@@ -9,9 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from controllers import GIVEN, KNOTS, PATH, machine, recipe, wandering
-
 from tubecert.conditions.hardware import Rounding
-from tubecert.errors import TubecertError
 from tubecert.export.accounted import Accounted
 from tubecert.export.assembly import assembled
 from tubecert.export.compiled import Memory, compiled, compiler
@@ -20,6 +18,8 @@ from tubecert.export.followed import FLOATS, UncoveredError
 from tubecert.export.program import GREATEST, LEAST, Program
 from tubecert.export.reference import Reference, _mean_on_pieces, execute
 from tubecert.export.rounding import _Analysis, rounding_of, within
+
+from tubecert.errors import TubecertError
 from tubecert.expression import constant
 from tubecert.model import build
 from tubecert.spec import load_text

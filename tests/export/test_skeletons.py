@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from controllers import GIVEN, orbit, wandering
-
-from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
 from tubecert.export.folder import exported
 from tubecert.export.reference import Reference
 from tubecert.export.skeletons import skeleton
+
+from tubecert.errors import TubecertError
 
 STUBS = Path(__file__).parent / "stubs"
 CXX = shutil.which("g++") or shutil.which("clang++")

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from controllers import GIVEN
-
-from tubecert.errors import TubecertError
 from tubecert.export.assembly import assembled
 from tubecert.export.followed import UncoveredError
 from tubecert.export.reference import Reference, speeds
 from tubecert.export.rounding import rounding_of
 from tubecert.export.words import operations
+
+from tubecert.errors import TubecertError
 from tubecert.spec import Picard
 
 

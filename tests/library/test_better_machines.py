@@ -7,9 +7,9 @@ from fractions import Fraction
 
 import pytest
 from systems import SCALAR
+from tubecert.library.trading import better_machines, largest
 
 from tubecert.errors import SpecError
-from tubecert.library.trading import better_machines, largest
 from tubecert.spec import load_text
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source

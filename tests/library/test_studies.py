@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import systems
+from tubecert.library.designing import _merged
 
 import tubecert as tc
-from tubecert.library.designing import _merged
 from tubecert.pipeline import design as attempts
 from tubecert.spec import Setting
 from tubecert.spec.load import load_source

@@ -7,12 +7,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from systems import matrix_of
+from tubecert.metric.covariant import Geometry
 
 from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.expression.matrix import column
-from tubecert.metric.covariant import Geometry
 from tubecert.model import ControlAffineModel
 
 NOTHING: frozenset[str] = frozenset()

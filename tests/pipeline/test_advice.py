@@ -9,11 +9,11 @@ from math import inf
 import pytest
 from proven import proven
 from systems import SMALL
+from tubecert.pipeline.levers import nearer_start
 
 from tubecert import certificate, pipeline
 from tubecert.claims.advice import EnlargeSafeSet, HalveConstant, NoKnobAlone, ReduceRadii, TurnKnob
 from tubecert.pipeline import Options, advice, certify
-from tubecert.pipeline.levers import nearer_start
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import CertificateError, read
 from tubecert.spec import Setting, load_text

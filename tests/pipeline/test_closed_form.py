@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-
 from tubecert.library.trading import better_machines
-from tubecert.pipeline import Options, certification, certify, design
 from tubecert.pipeline.sensitivities import sensitivities
+
+from tubecert.pipeline import Options, certification, certify, design
 from tubecert.pipeline.width import Measure, size_of
 from tubecert.search import hardware
 from tubecert.spec import load_text

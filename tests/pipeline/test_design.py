@@ -10,17 +10,17 @@ import pytest
 from rechecked import certified, examine, failing
 from rich.console import Console
 from systems import IN_WINDOWS, SCALAR, SMALL
+from tubecert.pipeline.design import narrowest, needed_of
+from tubecert.pipeline.trade import cheapest, front
+from tubecert.report.design import as_data, report
+from tubecert.spec.windows import more_windows
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import EaseHardware, LessenCause, TakeWindows
 from tubecert.digits import exact
 from tubecert.pipeline import Deadline, Options, certify, design
-from tubecert.pipeline.design import narrowest, needed_of
-from tubecert.pipeline.trade import cheapest, front
 from tubecert.pipeline.width import Measure, size_of
-from tubecert.report.design import as_data, report
 from tubecert.spec import load_text
-from tubecert.spec.windows import more_windows
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from machines import alive_machine
 from problems import ALIVE, alive, three_state
+from tubecert.conditions.hardware.loop import HardwareRecipe, Rounding, WindowProof
 
 from tubecert import certificate
-from tubecert.conditions.hardware.loop import HardwareRecipe, Rounding, WindowProof
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.verdict import Verdict
 from tubecert.kernel import NotProvenError, Proof, Unproven, check, judge

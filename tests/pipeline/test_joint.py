@@ -9,14 +9,14 @@ from math import exp, log
 import numpy as np
 import pytest
 from rechecked import examine, failing
+from tubecert.pipeline.joint import Joint, Judged, at_point
+from tubecert.pipeline.metric_search import search
+from tubecert.search.weights import Weights, descend, moves
 
 from tubecert import certificate
 from tubecert.model import build
 from tubecert.pipeline import Options, certify, joint, metric_search
-from tubecert.pipeline.joint import Joint, Judged, at_point
-from tubecert.pipeline.metric_search import search
 from tubecert.pipeline.width import measure_of
-from tubecert.search.weights import Weights, descend, moves
 from tubecert.spec import load_text
 from tubecert.spec.metric_file import with_metric_text
 from tubecert.synthesis.family import metric_family

@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rechecked import certified, examine, failing
+from tubecert.library.designing import _in_coordinates, _loader
+from tubecert.library.trading import Asked
+from tubecert.pipeline.metric_search import sampled_system, search
+from tubecert.search.metrics import Proposed, Surrogate
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app
-from tubecert.library.designing import _in_coordinates, _loader
-from tubecert.library.trading import Asked
 from tubecert.model import build
 from tubecert.pipeline import Options, design, metric_search
-from tubecert.pipeline.metric_search import sampled_system, search
 from tubecert.pipeline.width import measure_of
 from tubecert.search import metrics
-from tubecert.search.metrics import Proposed, Surrogate
 from tubecert.spec import load_text
 
 CART = """

@@ -9,6 +9,8 @@ import numpy as np
 import proven
 import pytest
 import systems
+from tubecert.stages.windows import with_windows
+from tubecert.trajectory.during import during
 
 import tubecert as tc
 from tubecert.pipeline import Options, question_of
@@ -17,8 +19,6 @@ from tubecert.simulate.promise import Levels
 from tubecert.spec import load_text
 from tubecert.stages.bounded import bound, enclose
 from tubecert.stages.metric import prove_metric
-from tubecert.stages.windows import with_windows
-from tubecert.trajectory.during import during
 
 F = Fraction
 PLAN = """

@@ -12,6 +12,8 @@ import numpy as np
 import proven
 import pytest
 from systems import GAINS_IN_WINDOWS, IN_WINDOWS
+from tubecert.pipeline.windows import _has_parts
+from tubecert.report.windows import nearest
 
 import tubecert as tc
 from tubecert.certificate.follows import InputData, PlanInputData
@@ -19,9 +21,7 @@ from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.problem import Formulas
 from tubecert.enclosure.constant import Constant
 from tubecert.pipeline import Options, question_of
-from tubecert.pipeline.windows import _has_parts
 from tubecert.report.reach import input_lines
-from tubecert.report.windows import nearest
 from tubecert.simulate.compare import compare
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.monte_carlo import case, disturbance_of, monte_carlo

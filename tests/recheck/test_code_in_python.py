@@ -13,17 +13,12 @@ import pytest
 from controllers import CONTROLLERS
 from flint import ctx
 from followed import bounds, covered, in_recheck, texts
-
-from tubecert import certificate
-from tubecert.errors import ExitCode, TubecertError
 from tubecert.export import asked
 from tubecert.export import examined as export_examined
 from tubecert.export.assembly import controller_of
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
 from tubecert.export.vectors import vectors
-from tubecert.library.certification import certification_of
-from tubecert.recheck.balls import exact
 from tubecert.recheck.code import python_reader
 from tubecert.recheck.code.constants import of_tables, otherwise
 from tubecert.recheck.code.examination import agreement
@@ -31,6 +26,11 @@ from tubecert.recheck.code.python_loop import Loop, functions, methods
 from tubecert.recheck.code.python_reader import read_python
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
+
+from tubecert import certificate
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.library.certification import certification_of
+from tubecert.recheck.balls import exact
 
 
 def module_of(c):

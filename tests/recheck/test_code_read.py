@@ -6,7 +6,6 @@ import pytest
 from controllers import CONTROLLERS
 from flint import arb, ctx
 from followed import bounds, covered, in_recheck, texts
-
 from tubecert.recheck.code.constants import of_plan
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError

@@ -11,19 +11,19 @@ import pytest
 from controllers import CONTROLLERS
 from flint import arb, ctx
 from followed import bounds, covered, in_recheck, predicting, predicting_path, texts
-
-from tubecert.enclosure.interval import Interval
 from tubecert.export import prediction as ahead
 from tubecert.export import rounding as own
 from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
-from tubecert.recheck.balls import between, exact
 from tubecert.recheck.code.constants import of_tables, otherwise
 from tubecert.recheck.code.examination import agreement
 from tubecert.recheck.code.prediction import STEPS, Model, cut
 from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
+
+from tubecert.enclosure.interval import Interval
+from tubecert.recheck.balls import between, exact
 from tubecert.recheck.terms import function, number, variable
 
 NAMES = ("feedback", "input", "estimate")

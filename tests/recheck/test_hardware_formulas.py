@@ -13,17 +13,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rechecked import case_of, certified
 from systems import SMALL
+from tubecert.bounds.covariant import CovariantConstants
+from tubecert.recheck.digital import Evaluation, loop
+from tubecert.recheck.proposal import proposed
+from tubecert.recheck.recipe import Bent, Digital, Losses, MachineNumbers, Promise
 
 from tubecert.bounds.constants import GainConstants, WindConstants
-from tubecert.bounds.covariant import CovariantConstants
 from tubecert.conditions import hardware as theorem
 from tubecert.conditions.problem import Wind
 from tubecert.enclosure.constant import Constant
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import Numbers, Setting, WindNumbers
-from tubecert.recheck.digital import Evaluation, loop
-from tubecert.recheck.proposal import proposed
-from tubecert.recheck.recipe import Bent, Digital, Losses, MachineNumbers, Promise
 from tubecert.recheck.specified.hardware import Arcs
 from tubecert.spec import Picard
 

@@ -14,14 +14,14 @@ from flint import ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_hardware_formulas import WIND, ball, same, system
+from tubecert.conditions.stretches import over
+from tubecert.recheck.sampling import SampledGains
 
 from tubecert.conditions import distance, distance_windows, sampled, sampled_windows, stretches
-from tubecert.conditions.stretches import over
 from tubecert.recheck import legs
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import Numbers, Setting, WindNumbers
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.sampling import SampledGains
 
 F = Fraction
 GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")

@@ -11,16 +11,16 @@ import pytest
 from flint import arb
 from rechecked import certified, examine, failing, sealed, terms
 from systems import SMALL
+from tubecert.recheck.relative import drift_difference, drift_difference_metric
+from tubecert.recheck.turning import feedback_curvature
 
 from tubecert.errors import TubecertError
 from tubecert.recheck import constants, relative
 from tubecert.recheck.curve import CLOCK, Curve, Part, expressed
 from tubecert.recheck.place import Place
-from tubecert.recheck.relative import drift_difference, drift_difference_metric
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import number, replaced, variable
-from tubecert.recheck.turning import feedback_curvature
 
 # f_x = [[y, x], [x, -y]] - diag(1, 2): for W = I, T_v = 2 [[v_y, v_x], [v_x, -v_y]], |T_v| = 2 |v|
 F = ["-x + x*y", "-2*y + (x**2 - y**2)/2"]

@@ -8,14 +8,14 @@ from fractions import Fraction
 import pytest
 from rechecked import CONFIGS, certified, examine, failing, sealed, terms
 from systems import SMALL, matrix_of
+from tubecert.bounds.covariant import CovariantSuprema
+from tubecert.recheck.covariant import NAMES, bounded
 
 from tubecert.bounds.constants import Constant
-from tubecert.bounds.covariant import CovariantSuprema
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression import parse, symbol
 from tubecert.model import ControlAffineModel
-from tubecert.recheck.covariant import NAMES, bounded
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.plant import Uncertainty

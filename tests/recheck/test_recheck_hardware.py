@@ -325,6 +325,7 @@ def test_no_certificate_of_calm_air_serves_in_wind(section):
 def test_the_units_of_a_drift_are_the_least_noise():
     """noise_rate bounds a length: in units of noise it is largest for the state that is measured best."""
     from tubecert.recheck.kinds.machine import promise
+
     from tubecert.recheck.specified.hardware import Hardware
 
     asked = Hardware(

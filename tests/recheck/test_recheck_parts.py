@@ -10,10 +10,10 @@ import proven
 import pytest
 from rechecked import case_of, examine, failing, sealed
 from systems import GAINS_IN_WINDOWS
+from tubecert.recheck.kinds.windows import within_tube
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.claims import of_certified
-from tubecert.recheck.kinds.windows import within_tube
 
 BUDGET = 4000  # boxes for each claim
 KINDS = {"distance": "B", "sampled": "C"}

@@ -703,7 +703,7 @@ def _tampered(change):
         ("[]", "is not a certificate"),
         ("{", "it is not JSON (line 1"),
         ("", "it is not JSON"),
-        ('{"result": {"a": NaN}, "format": "tubecert-certificate/2"}', "it holds NaN"),
+        ('{"result": {"a": NaN}, "format": "tubecert-certificate/3"}', "it holds NaN"),
         ("[" * 100_000, "it is nested too deeply"),
         ("\x00", "it is not JSON"),
     ],

@@ -5,9 +5,9 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import pytest
+from tubecert.kinds.windows import WindowData
 
 import tubecert as tc
-from tubecert.kinds.windows import WindowData
 from tubecert.report.figures_time import state_figures
 
 PLANT = """

@@ -6,6 +6,7 @@ from fractions import Fraction
 import proven
 import pytest
 from systems import BLOWN, IN_WINDOWS, SMALL
+from tubecert.words.machine import CAUSES
 from typer.testing import CliRunner
 
 from tubecert.certificate.result import Certificate
@@ -15,7 +16,6 @@ from tubecert.report import console, pages
 from tubecert.report.terminal import Terminal
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS
-from tubecert.words.machine import CAUSES
 
 PLANT = """
 tubecert: 1

@@ -55,10 +55,10 @@ def test_a_certificate_is_read_back(tmp_path):
         ("[]", "TC601"),
         ("{}", "TC601"),
         ('{"format": "tubecert-certificate/1"}', "TC602"),
-        ('{"format": "tubecert-certificate/2"}', "TC603"),
+        ('{"format": "tubecert-certificate/3"}', "TC603"),
         ("[" * 50_000, "TC600"),
         ("\x00", "TC600"),
-        ('{"format": "x", "format": "tubecert-certificate/2"}', "TC600"),
+        ('{"format": "x", "format": "tubecert-certificate/3"}', "TC600"),
     ],
 )
 def test_other_files_are_no_certificates(tmp_path, text, code):

@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from simulated import Failure, certified, runs, setting
-
 from tubecert.conditions.hardware import HardwareRecipe
+
 from tubecert.simulate.certified import Own, Section, Values, read_numbers
 from tubecert.simulate.compare import compare
 from tubecert.simulate.inputs import InputRange

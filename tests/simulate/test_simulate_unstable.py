@@ -8,13 +8,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from simulated import setting
+from tubecert.simulate.held import growth, least_rate
 
 from tubecert.expression import as_expression, sin, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.report.simulation import report, verdict_line
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
-from tubecert.simulate.held import growth, least_rate
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.simulate.summary import summary

@@ -17,12 +17,12 @@ import proven
 import pytest
 import yaml
 from systems import IN_WINDOWS, SCALAR, SMALL
+from tubecert.bounds.covariant import TABLE as COVARIANT
+from tubecert.bounds.hardware import TABLE as HARDWARE
 
 import tubecert
 from tubecert import certificate, spec
 from tubecert.bounds.constants import DERIVED, TABLE, WIND
-from tubecert.bounds.covariant import TABLE as COVARIANT
-from tubecert.bounds.hardware import TABLE as HARDWARE
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError

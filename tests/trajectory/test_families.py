@@ -184,7 +184,7 @@ def test_a_family_that_leaves_the_safe_set_is_refuted_where_it_does():
     assert result.reason.claim.state == "x2"
     assert result.reason.at.x[1] > 6
     assert (
-        failing(examine(sealed({"format": "tubecert-certificate/2", "result": result.to_json(), "run": {}})))
+        failing(examine(sealed({"format": "tubecert-certificate/3", "result": result.to_json(), "run": {}})))
         == []
     )
 

@@ -9,9 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from tubecert.bounds.feedforward import rate_of
 
 from tubecert import certificate, pipeline
-from tubecert.bounds.feedforward import rate_of
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import constant, symbol

@@ -150,8 +150,6 @@ def bound_constants(
         initial_distance=start.distance(suprema, metric),
         plan_defect=delta_p,
         plan_defect_metric=delta,
-        input_gain_least=one("input_gain_least", suprema.input_gain_least),
-        contraction_excess=one("contraction_excess", suprema.contraction_excess),
     )
     # what is declared is an exact decimal already
     return replace(constants.printable(), **declared)

@@ -61,7 +61,7 @@ def _of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundConstants:
-    """Every constant of certificates A, B and C over O(rho), each an enclosure.
+    """Every constant of certificates 0, A and B over O(rho), each an enclosure.
 
     The units are those of the states and inputs of the specification; "1" is dimensionless.
     """
@@ -101,28 +101,11 @@ class BoundConstants:
     initial_distance: Constant = field(
         metadata=_of("d0", "theory 4", "d", "length of the segment from x*(0) to x(0)")
     )
-    plan_defect: Constant = field(metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|"))
+    plan_defect: Constant = field(
+        metadata=_of("delta_p", "theory 3", "x/s", "sup |x*' - f(x*) - B(x*) u*|", number="")
+    )
     plan_defect_metric: Constant = field(
         metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
-    )
-    input_gain_least: Constant = field(
-        metadata=_of(
-            "smin(Theta B)",
-            "bounds:delta_u",
-            "d/(u s)",
-            "inf of the smallest singular value of Theta B",
-            side="below",
-            number="smin",
-        )
-    )
-    contraction_excess: Constant = field(
-        metadata=_of(
-            "lmax(F~)",
-            "bounds:delta_u",
-            "1/s",
-            "sup of the largest eigenvalue of the pencil (F, W)",
-            number="excess",
-        )
     )
 
     def printable(self) -> BoundConstants:
@@ -191,31 +174,9 @@ class ResidualConstants:
         ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GainConstants:
-    """How far the gain of the inputs is from what the controller takes it for (theory 8.10).
-
-    `matched`: whether the plant's inputs are proven to act where the controller's do, B_u = 0.
-    """
-
-    error: Constant = field(metadata=_of("D_b", "theory 8.10", "1", "sup |B^+ B(x, theta) - I|"))
-    matched: bool
-
-    def printable(self) -> GainConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return GainConstants(error=self.error.printable(), matched=self.matched)
-
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of each, by its name in a certificate."""
-        return [
-            (f"gain_{name}", getattr(self, name), meaning) for name, meaning in table_of(fields(self)).items()
-        ]
-
-
 WIND: dict[str, Meaning] = {
     **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
     **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
-    **{f"gain_{name}": meaning for name, meaning in table_of(fields(GainConstants)).items()},
 }
 
 DERIVED: dict[str, Meaning] = {

@@ -11,7 +11,6 @@ from typing import Self
 import numpy as np
 
 from tubecert.bounds.constants import Constant, Witness
-from tubecert.bounds.parts import Parts
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.domain import Range
@@ -38,7 +37,6 @@ class Searches:
     <= rho cut to `sides` (n,), what |x_i - x*_i| is at most; without, they are those in x and the tube is a ball.
     `time` is the range of t for h (the horizon, or one period of h); the plan brings its own. `gaps`: the relative gaps
     of constants, by name, that are not enclosed to the gap of the effort. `spent` is told what work each search was.
-    `parts`: what is found for several parts of a plan at once, this one among them.
     """
 
     model: ControlAffineModel
@@ -51,7 +49,6 @@ class Searches:
     sides: tuple[float, ...] | None = None
     gaps: Mapping[str, float] = field(default_factory=dict)
     spent: Spent | None = None
-    parts: Parts | None = None
 
     def effort_for(self, name: str) -> Effort:
         """How hard to try for a constant; one with a gap of its own is as close as few boxes make it."""
@@ -90,15 +87,7 @@ class Searches:
         effort: Effort | None = None,
         extra: dict[str, Range] | None = None,
     ) -> Supremum:
-        chosen, more = effort or self.effort_for(name), extra or {}
-        found = (
-            None
-            if self.parts is None
-            else self.parts.over_tube(self, objective, self._heard(name, chosen), more)
-        )
-        if found is not None:
-            return self._told(name, objective, found)
-        return self._run(name, objective, self.tube(more), chosen)
+        return self._run(name, objective, self.tube(extra or {}), effort or self.effort_for(name))
 
     def tube(self, extra: Mapping[str, Range]) -> Tube:
         """The tube as a domain, with further ranges."""

@@ -22,8 +22,8 @@ from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain
-from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
-from tubecert.enclosure.objective import LeastInputGain, Objective, SumOfNorms
+from tubecert.enclosure.interval import Interval, fraction_bounds
+from tubecert.enclosure.objective import Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
 from tubecert.expression import (
     ONE,
@@ -36,7 +36,6 @@ from tubecert.expression.matrix import Matrix, column, constants, identity, mult
 from tubecert.model import TIME
 from tubecert.trajectory.defect import Defect
 
-_FEW = 20_000  # boxes
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
 _BESIDE = 500  # boxes beside a bound by the linear part
 _NEAR = 0.05  # such bounds serve where they are this close, however close was asked for
@@ -222,21 +221,6 @@ class Suprema(Searches):
     def feedback_gain_closed_form(self, effort: Effort | None = None) -> float:
         """A bound of du in closed form: looser, but it needs no search over mu, theory 2.2."""
         return self._over_tube("feedback_gain", ClosedFormGain(self.model), effort).above
-
-    def contraction_excess(self) -> Constant:
-        """sup lmax of the pencil (F, W), as in the printed (bounds:delta_u)."""
-        return self._constant(self._over_tube("contraction_excess", Pencil(self.model.F, self.model.W)))
-
-    def input_gain_least(self) -> Constant:
-        """inf over the tube of the smallest singular value of Theta B.
-
-        Only the formulas as printed use it, and its bound converges linearly: it is not worth many boxes.
-        """
-        effort = self.effort_for("input_gain_least")
-        few = replace(effort, budget=min(effort.budget, _FEW))
-        found = self._over_tube("input_gain_least", LeastInputGain(self.model.B, self.model.W), few)
-        root = sqrt(Interval(max(0.0, -found.above), max(0.0, -found.below)))
-        return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
 
     # -- on the plan -------------------------------------------------------------------------------------------
 

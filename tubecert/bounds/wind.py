@@ -13,7 +13,6 @@ from fractions import Fraction
 from functools import cached_property
 
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
-from tubecert.bounds.gains import Gain
 from tubecert.bounds.start import InitialState
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Fields
@@ -28,14 +27,9 @@ Entries = tuple[Expression, ...]
 
 @dataclass(frozen=True)
 class Beside:
-    """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly.
-
-    Where parameters stand in B, too, what joins h is made by the B of the plant, and part of it is what that B does to
-    u* (theory 8.10); `inputs` is u* then, in t.
-    """
+    """E and f(x, theta) - f0(x) in the coordinates of the tube, each split by B^+; what vanishes is zero exactly."""
 
     fields: Fields
-    inputs: Entries = ()
 
     @cached_property
     def reached(self) -> Matrix:
@@ -48,23 +42,9 @@ class Beside:
         return self._split(self.fields.model.E)[1]
 
     @cached_property
-    def gain(self) -> Gain | None:
-        """What is not known of B; None if it is known."""
-        return Gain(self.fields) if self.fields.model.gained else None
-
-    @cached_property
     def known(self) -> Entries:
-        """What of unknown parameters joins h, (m,); empty without any.
-
-        B^+ (f(x, theta) - f0(x)), or of an unknown B `Gain.joined` of it.
-        """
-        own = self.matched if self.gain is None else self.gain.joined(self.matched, column(self.inputs))
-        return tuple(row[0] for row in own)
-
-    @cached_property
-    def matched(self) -> Matrix:
-        """B^+ (f(x, theta) - f0(x)), (m, 1); empty where no parameter is unknown."""
-        return self._split(self._unknown_drift)[0]
+        """What of unknown parameters joins h, B^+ (f(x, theta) - f0(x)), (m,); empty without any."""
+        return tuple(row[0] for row in self._split(self._unknown_drift)[0])
 
     @cached_property
     def residual(self) -> Matrix:
@@ -91,12 +71,7 @@ class Beside:
         model = self.fields.model
         if not model.E or model.wind_bound is None or model.wind_rate is None or _vanishes(self.reached):
             return ()
-        return _times(model.wind_bound, self.made)
-
-    @cached_property
-    def made(self) -> Matrix:
-        """What of a wind with a rate joins h: B^+ E, of an unknown B by (I + Delta)^-1 of it."""
-        return self.reached if self.gain is None else multiply(self.gain.inverse, self.reached)
+        return _times(model.wind_bound, self.reached)
 
     @property
     def rate(self) -> Fraction:
@@ -120,7 +95,7 @@ def _vanishes(rows: Matrix) -> bool:
 
 def beside_of(suprema: Suprema) -> Beside:
     """What joins h in the loop of a plan."""
-    return Beside(suprema.fields, suprema.plan.u)
+    return Beside(suprema.fields)
 
 
 def wind_constants(suprema: Suprema, beta: Constant) -> WindConstants | None:
@@ -201,7 +176,7 @@ def uncertainty_constants(
         in_time = by_time
     if blown:
         lipschitz = grown(lipschitz, suprema.norms("h_x", suprema.fields.slopes(blown)))
-        in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.made)]))
+        in_time = grown(in_time, suprema.norms("h_t", [_times(beside.rate, beside.reached)]))
     at_start = whole if first is not None else _at_start(suprema, start, total, blown)
     return {"h": whole, "h_x": lipschitz, "h_t": in_time, "h_initial": at_start}
 

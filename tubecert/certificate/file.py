@@ -20,7 +20,7 @@ from tubecert.files import STDIN, Kind, read, read_stdin, replace
 from tubecert.findings import Finding
 from tubecert.printable import printable_json, visible
 
-FORMAT = "tubecert-certificate/2"
+FORMAT = "tubecert-certificate/3"
 KIND: Final = Kind(
     most=64_000_000, unreadable="TC600", too_large="TC600", help="give a file that tubecert certify wrote"
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.enclosure.constant import Constant
@@ -53,24 +53,17 @@ class InputBoundData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputData:
-    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key.
-
-    `windows`: by the key of a kind that has windows, the verdict in each.
-    """
+    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
 
     input: str
     limits: tuple[Fraction, Fraction]
     verdict: Verdict
     plan: PlanInputData
     bounds: Mapping[str, InputBoundData]
-    windows: Mapping[str, tuple[Verdict, ...]] = field(default_factory=dict)
 
     def use(self, kinds: Iterable[str]) -> float | None:
         """The share of its limits that it uses at most: 0 in the middle, 1 at a limit; None without bounds."""
         found = [self.bounds[key] for key in kinds if key in self.bounds]
-        return max((self.share((bound.least, bound.greatest)) for bound in found), default=None)
-
-    def share(self, found: tuple[float, float]) -> float:
-        """The share of its limits that a range uses."""
         low, high = self.limits
-        return float(max(abs(2 * Fraction(end) - low - high) for end in found) / (high - low))
+        ends = [end for bound in found for end in (bound.least, bound.greatest)]
+        return max((float(abs(2 * Fraction(end) - low - high) / (high - low)) for end in ends), default=None)

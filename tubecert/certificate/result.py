@@ -60,9 +60,9 @@ class Plans:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blowing:
-    """Every wind that is claimed about: |w| and, where it is known, |w'| at most; exact texts. None: searched for."""
+    """Every wind that is claimed about: |w| and, where it is known, |w'| at most; exact texts."""
 
-    bound: str | None
+    bound: str
     rate: str | None = None
 
 
@@ -221,7 +221,6 @@ class Result:
     """
 
     verdict: Verdict
-    formulas: Literal["corrected", "as-printed"]
     spec: Source
     claim: Claimed
     overrides: Overrides

@@ -27,8 +27,8 @@ from tubecert.claims.assumptions import (
     FirstOrderFilter,
     ForAllTime,
     HardProjection,
+    HardwareLeftOut,
     LeastFeedback,
-    MachineAsGiven,
     ParametersWithin,
     PerfectState,
     SmoothProjection,
@@ -45,7 +45,7 @@ from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Hardware, Spec, canonical
+from tubecert.spec import Spec, canonical
 from tubecert.spec.types import Bundle, Disturbance
 from tubecert.trajectory import Plan
 
@@ -111,7 +111,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
 
 def _wind(wind: Disturbance) -> Blowing:
     return Blowing(
-        bound=None if wind.bound is None else number_text(wind.bound),
+        bound=number_text(wind.bound),
         rate=None if wind.rate is None else number_text(wind.rate),
     )
 
@@ -215,7 +215,6 @@ def assumptions(
     """
     flat = all(e.is_constant for row in model.W for e in row)
     smooth, horizon, wind = spec.adaptation.smooth, spec.trajectory.horizon, spec.disturbance
-    machine = () if spec.hardware is None else (_machine(spec.hardware),)
     return (
         LeastFeedback(),
         StraightGeodesics() if flat else _geodesic_assumption(geodesics),
@@ -229,16 +228,7 @@ def assumptions(
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
         *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
         *(() if not spec.ranges else (ParametersWithin(),)),
-        *machine,
-    )
-
-
-def _machine(asked: Hardware) -> MachineAsGiven:
-    own = asked.geodesic
-    return MachineAsGiven(
-        arithmetic=asked.arithmetic,
-        nodes=None if own is None else own.nodes,
-        sweeps=None if own is None else own.sweeps,
+        *(() if spec.hardware is None else (HardwareLeftOut(),)),
     )
 
 

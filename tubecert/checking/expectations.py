@@ -14,7 +14,6 @@ from tubecert.digits import near
 from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
-from tubecert.kinds import SAMPLED
 from tubecert.pipeline.verification import Verified
 from tubecert.spec import Expectation, Spec
 from tubecert.verdict import Verdict
@@ -64,10 +63,7 @@ def outcome(result: Result) -> Outcome:
 
 
 def _numbers(result: Result) -> Iterator[tuple[str, float]]:
-    """rho, the least clearance, the largest share of limits, the gains of the first certificate that decides.
-
-    The sample time is that of C.
-    """
+    """rho, the least clearance, the largest share of limits, the gains of the first certificate that decides."""
     if result.metric is not None and result.metric.largest_rate is not None:
         yield from _largest_rate(result.metric.largest_rate)
     if result.tube is not None:
@@ -83,10 +79,6 @@ def _numbers(result: Result) -> Iterator[tuple[str, float]]:
             yield "bandwidth", float(pair.bandwidth)
         if pair.adaptation_rate is not None:
             yield "adaptation_rate", float(pair.adaptation_rate)
-    sampled = result.sections.get(SAMPLED.key)
-    gains = None if sampled is None else sampled.decisive(asked=result.asked)
-    if gains is not None and gains.sample_time is not None:
-        yield "sample_time", float(gains.sample_time)
 
 
 def _largest_rate(enclosed: Constant) -> Iterator[tuple[str, float]]:

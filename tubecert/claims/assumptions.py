@@ -103,28 +103,21 @@ class UncertaintyAsGiven(Assumption):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MachineAsGiven(Assumption):
-    """The computer, its sensors and its inputs are what the section `hardware` says; for certificate H.
+class HardwareLeftOut(Assumption):
+    """Sampling, delay and noise of the section `hardware` are no part of what is proven."""
 
-    `arithmetic` that the controller computes in, losing no more than `rounding` of the proof says; None: it is exact.
-    With `nodes` and `sweeps` it computes geodesics as theory 8.12 says; else it has exact ones.
-    """
-
-    tag: ClassVar[str] = "machine_as_given"
-    arithmetic: Literal["single", "double"] | None = None
-    nodes: int | None = None
-    sweeps: int | None = None
+    tag: ClassVar[str] = "hardware_left_out"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindWithin(Assumption):
-    """Beside the inputs acts E(x) w with |w| <= `bound` (None: whatever a certificate finds), else arbitrary.
+    """Beside the inputs acts E(x) w with |w| <= `bound`, else arbitrary.
 
     `rate` bounds |w'|, in 1/s, where that is known.
     """
 
     tag: ClassVar[str] = "wind_within"
-    bound: Fraction | None = None
+    bound: Fraction
     rate: Fraction | None = None
 
 

@@ -15,15 +15,13 @@ from tubecert.enclosure.constant import Constant
 class GainsSuffice(Claim):
     """The gains of a section satisfy its conditions; `margins` are what is proven to be left of each.
 
-    `binds` sets the bandwidth, if one does; `below_twice_rate`: the bandwidth lies in the window below 2 lambda;
-    `predictor_gain` g where the predictor is -g I by choice of the search.
+    `binds` sets the bandwidth, if one does; `predictor_gain` g where the predictor is -g I by choice of the search.
     """
 
     tag: ClassVar[str] = "gains_suffice"
     section: str
     margins: Mapping[str, float]
     binds: str | None = None
-    below_twice_rate: bool = False
     predictor_gain: Fraction | None = None
 
 
@@ -31,12 +29,10 @@ class GainsSuffice(Claim):
 class ConditionHolds(Claim):
     """A condition of a section that is not proven, by `margin`, or by what is `needed` and `allowed`.
 
-    `condition` is one of the section's own (26a, 26b, 26c, distance, sampled), or what no gains can help:
+    `condition` is one of the section's own (26a, 26b, 26c, distance), or what no gains can help:
     `initial_distance` (d0 < dbar), `plan_defect` (delta/lambda < dbar), `parameters` and `wind` (the same with what
-    they add), `wind_bound` (it is searched for), `wind_not_covered` (the theorem knows no wind), `gain_not_covered`
-    (it knows no uncertain B), `gain_unmatched` (B acts where B(theta0) does), `gain_range` (|Delta| < 1), `bounded`
-    (the constant `constant` is),
-    `corrected_formulas`; or `any_gains`: none were found; or `proven_gains`: of those found none could be proven.
+    they add), `wind_not_covered` (the theorem knows no wind), `gain_not_covered` (it knows no uncertain B), `bounded`
+    (the constant `constant` is); or `any_gains`: none were found; or `proven_gains`: of those none could be proven.
     `beyond`: the margin is below all floats; `blocked_by` names a condition without which this one has no margin.
     """
 

@@ -12,9 +12,7 @@ import typer
 
 from tubecert.cli import (
     comparing,
-    designing,
     everyday,
-    exporting,
     rechecking,
     simulating,
     sweeping,
@@ -85,13 +83,6 @@ app = typer.Typer(
 Conditions = StrEnum("Conditions", [(word, word) for word in (*words_of(), ALL)])  # type: ignore[misc]
 
 
-class Formulas(StrEnum):
-    """Whose formulas."""
-
-    CORRECTED = "corrected"
-    AS_PRINTED = "as-printed"
-
-
 @app.callback(invoke_without_command=True)
 @with_output
 def _main(context: typer.Context, *, how: Output) -> None:
@@ -126,14 +117,11 @@ def certify(
         Conditions | None,
         typer.Option(
             help="Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
-            "C (sampled), H (hardware), or all of them; all are always computed.  [conditions.decides, or A]",
+            "or all of them; all are always computed.  [conditions.decides, or A]",
             show_default=False,
             case_sensitive=False,
         ),
     ] = None,
-    formulas: Annotated[
-        Formulas, typer.Option(help="Corrected formulas, or the paper's own (proves nothing).")
-    ] = Formulas.CORRECTED,
     bandwidth: Annotated[
         str | None, number_option("--bandwidth", "Judge this filter bandwidth, in rad/s.")
     ] = None,
@@ -182,7 +170,6 @@ def certify(
             settings=set_ or (),
             metric=metric,
             conditions=None if conditions is None else str(conditions),
-            formulas=formulas.value,
             numbers={
                 "rho_a": rho_a,
                 "epsilon": epsilon,
@@ -235,11 +222,9 @@ def make_report(
 synthesising.register(app)
 sweeping.register(app)
 comparing.register(app)
-designing.register(app)
 verifying.register(app)
 simulating.register(app)
 rechecking.register(app)
-exporting.register(app)
 everyday.register(app)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
     from tubecert.spec import Spec
-    from tubecert.stages.options import Formulas
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +36,6 @@ class Given:
     settings: Sequence[str]
     metric: Path | None
     conditions: str | None
-    formulas: Formulas
     numbers: Mapping[str, str | None]
     jobs: str
     scheduler: str | None
@@ -67,7 +65,7 @@ def run(given: Given, output: Output) -> ExitCode:
     from tubecert.report import progress
 
     workers = workers_of(jobs, given.scheduler, "--scheduler")
-    options = numbers.options(conditions=given.conditions, formulas=given.formulas, metric=given.metric)
+    options = numbers.options(conditions=given.conditions, metric=given.metric)
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
     with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
@@ -78,7 +76,6 @@ def run(given: Given, output: Output) -> ExitCode:
             seconds=numbers.deadline,
             command=command,
             workers=workers,
-            told=None if output.quiet or _is_data(target, output) else _told_by(terminal),
         )
     if target != certificate.STDOUT:
         certificate.write_text(target, found.text)
@@ -86,13 +83,6 @@ def run(given: Given, output: Output) -> ExitCode:
     write_pages(pages, found.certificate)
     _report(found, target, metric, pages, output)
     return found.verdict.exit_code
-
-
-def _told_by(terminal: Terminal) -> Callable[[Result], None]:
-    """The verdict, before it is looked for what would certify."""
-    from tubecert.report import console
-
-    return lambda result: terminal.show(console.verdict_line(result))
 
 
 def _is_data(target: str, output: Output) -> bool:

@@ -78,6 +78,8 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
     for word in words if len(option) == 2 else ():
         if word.startswith(option) and len(word) > 2 and word[1:].split("=")[0].replace("-", "").isalpha():
             return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
+    if words and words[0] in _GONE and "No such command" in str(getattr(error, "message", "")):
+        return f"  {_GONE[words[0]]}\n"
     if option in _OTHER_OPTIONS:
         return f"  {_OTHER_OPTIONS[option]}\n"
     message = str(getattr(error, "message", ""))
@@ -98,6 +100,14 @@ _PLAIN: Final = (
 )
 """What a library says of a value, and what is said here."""
 
+_GONE: Final[Mapping[str, str]] = {
+    "design": "the narrowest tube for a machine is withdrawn until the sampled loop has a certificate of its own; "
+    "tubecert sweep tries widths, e.g. --over tube.half_widths.x1=0.1:0.5:5",
+    "export": "controllers are withdrawn until the sampled loop has a certificate of its own; "
+    "tc.certify(...).gains has the gains of the continuous one",
+}
+"""Commands that there once were."""
+
 _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
         ("--omega", "--bw"), "omega is --bandwidth, in rad/s; it is given together with --adaptation-rate"
@@ -108,7 +118,11 @@ _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("--rho", "--rho_a", "--rhoa"), "the radius left to the adaptation is --rho-a"),
     **dict.fromkeys(("--eps",), "the radius beyond the initial offset is --epsilon"),
     **dict.fromkeys(("--out", "--json-out"), "the certificate's file is --output FILE, or -o FILE"),
-    **dict.fromkeys(("--Ts", "--ts"), "the sample time is found: --conditions sampled shows it"),
+    "--formulas": "the paper's formulas as printed are in benchmarks/published.py; certify has the corrected ones",
+    "--controller": "exported controllers are gone until the sampled loop has a certificate of its own",
+    **dict.fromkeys(
+        ("--control-rate", "--sample-time"), "the loop of certificate B acts in continuous time: leave it out"
+    ),
     **dict.fromkeys(
         ("--rate", "--lambda"), "the rate belongs to the metric: metric.rate, or tubecert synth --rate"
     ),

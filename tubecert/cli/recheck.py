@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import code_in, text_of, told, verdict_line
+from tubecert.library.rechecking import text_of, told, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.cover import Outcome
@@ -23,13 +22,12 @@ class Given:
 
     certificate: str
     spec: str | None
-    controller: str | None
     budget: str | None
     deadline: str | None
 
 
 def run(given: Given, output: Output) -> ExitCode:
-    """Recheck a certificate; with a specification, also whether it belongs to it, with a folder its controller."""
+    """Recheck a certificate; with a specification, also whether it belongs to it."""
     numbers = Numbers()
     budget = numbers.count("--budget", given.budget)
     seconds = numbers.positive("--deadline", given.deadline)
@@ -37,7 +35,6 @@ def run(given: Given, output: Output) -> ExitCode:
     name = given.certificate
     text = text_of(name)
     note = "" if given.spec is None else _specification(given.spec, text, name)
-    code = "" if given.controller is None else str(code_in(given.controller, text, name))
     from tubecert.report import progress
     from tubecert.report.terminal import Terminal
 
@@ -46,8 +43,7 @@ def run(given: Given, output: Output) -> ExitCode:
         report = None if show is None else told(show)
         most, limit = BUDGET if budget is None else budget, None if seconds is None else float(seconds)
         found = recheck(text, name, most, report, seconds=limit)
-    notes = {"specification": note, "controller": code}
-    shown = _as_json(found, name, notes) if output.json else _as_text(found, name, notes, output)
+    shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
     write_stdout(shown)
     return found.exit_code
 
@@ -59,7 +55,7 @@ def _specification(path: str, text: str, name: str) -> str:
     return belongs(document.read(text, name), name, path)
 
 
-def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:
+def _as_json(found: Recheck, name: str, note: str) -> str:
     failing = found.failing
     data = {
         "certificate": name,
@@ -77,19 +73,19 @@ def _as_json(found: Recheck, name: str, notes: Mapping[str, str]) -> str:
         ],
         "first_failing": None if failing is None else failing.name,
         "not_examined": list(found.unread),
-        **{what: note for what, note in notes.items() if note},
+        **({"specification": note} if note else {}),
     }
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
-def _as_text(found: Recheck, name: str, notes: Mapping[str, str], output: Output) -> str:
+def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
     failing = found.failing
     lines = [verdict_line(found, name)]
     if failing is not None:
         lines.append(f"  first failing claim: {failing.name}: {failing.outcome.why}")
     elif found.stated != "certified":
         lines.append("  what can be examined of it agrees; it certifies nothing")
-    lines += [f"  {note}" for note in notes.values() if note]
+    lines += [f"  {note}"] if note else []
     if not output.quiet:
         lines.append("")
         lines += [_line(item.name, item.outcome, verbose=output.verbose) for item in found.claims]

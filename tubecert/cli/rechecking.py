@@ -13,13 +13,11 @@ _AFTER = """\b
 Examples:
   tubecert recheck plant.certificate.json
   tubecert recheck plant.certificate.json --spec plant.yaml
-  tubecert recheck plant.certificate.json --controller plant.controller
   tubecert recheck plant.certificate.json --json | jq .first_failing
 
 \b
-Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted, or the
-controller is another one; 2 no certificate, or one of another specification; 4 a claim could not be
-decided, or it says undecided.
+Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted; 2 no
+certificate, or one of another specification; 4 a claim could not be decided, or it says undecided.
 """
 
 
@@ -40,10 +38,6 @@ def recheck(
         str | None,
         typer.Option(metavar="SPEC", help="Also: that the certificate is of this specification."),
     ] = None,
-    controller: Annotated[
-        str | None,
-        typer.Option(metavar="FOLDER", help="Also: that the exported code in it is that of the certificate."),
-    ] = None,
     budget: Annotated[
         str | None,
         typer.Option(metavar="NUMBER", help="Boxes examined per claim before giving up.  [200000]"),
@@ -58,8 +52,6 @@ def recheck(
     with guarded(how):
         from tubecert.cli.recheck import Given, run
 
-        given = Given(
-            certificate=certificate, spec=spec, controller=controller, budget=budget, deadline=deadline
-        )
+        given = Given(certificate=certificate, spec=spec, budget=budget, deadline=deadline)
         code = run(given, how)
     raise typer.Exit(code)

@@ -17,8 +17,7 @@ _AFTER = """\b
 Examples:
   tubecert simulate plant.yaml
   tubecert simulate plant.yaml --certificate plant.certificate.json --runs 1000 -o plant.runs
-  tubecert simulate plant.yaml --controllers ccm,l1,sampled --control-rate 500
-  tubecert simulate plant.yaml --certificate plant.certificate.json --controller plant.controller
+  tubecert simulate plant.yaml --controllers ccm,reference,l1
   tubecert simulate plant.yaml --bandwidth 20 --adaptation-rate 1e5
   tubecert simulate family.yaml --certificate family.certificate.json --members 1000 --runs 4000
 
@@ -48,17 +47,11 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE", help="Its certificate; without one, simulate certifies first."),
     ] = None,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Compile the exported C in it, and let it drive: processor in the loop."
-        ),
-    ] = None,
     controllers: Annotated[
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Loops, separated by commas: nominal, ccm, reference, l1, sampled, hardware.  [ccm,l1,hardware]",
+            help="Loops, separated by commas: nominal, ccm, reference, l1.  [ccm,l1]",
         ),
     ] = None,
     gains: Annotated[
@@ -94,17 +87,11 @@ def simulate(
     duration: Annotated[
         str | None, number_option("--duration", "How long, in s.  [the horizon, else 10/rate]")
     ] = None,
-    control_rate: Annotated[
-        str | None, number_option("--control-rate", "Hold the whole controller at this rate, in Hz.")
-    ] = None,
     bandwidth: Annotated[
         str | None, number_option("--bandwidth", "Choose the filter bandwidth, in rad/s.")
     ] = None,
     adaptation_rate: Annotated[
         str | None, number_option("--adaptation-rate", "Choose the adaptation rate of l1.")
-    ] = None,
-    sample_time: Annotated[
-        str | None, number_option("--sample-time", "Choose the sample time of sampled, in s.")
     ] = None,
     metric: Annotated[
         Path | None,
@@ -132,47 +119,34 @@ def simulate(
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context
         )
-    if scheduler is not None and controller is not None:
-        raise typer.BadParameter(
-            "compiled code drives on this machine: --controller or --scheduler", ctx=context
-        )
     if plan is not None and (members is not None or replan is not None):
         words = "a plan of your own, or random ones: --plan, or --members and --replan"
         raise typer.BadParameter(words, ctx=context)
-    if controller is not None and certificate is None:
-        raise typer.BadParameter("a controller is that of a certificate: --certificate FILE", ctx=context)
     with guarded(how):
-        if controller is not None:
-            from tubecert.cli.driving import drive
+        from tubecert.cli.simulate import Given, run
 
-            code = drive((str(spec), str(certificate), str(controller)), (runs, seed, duration), how)
-        else:
-            from tubecert.cli.simulate import Given, run
-
-            given = Given(
-                spec=spec,
-                settings=set_ or (),
-                certificate=certificate,
-                metric=metric,
-                controllers=controllers,
-                gains=None if gains is None else str(gains),
-                plan=plan,
-                numbers={
-                    "epsilon": epsilon,
-                    "rho_a": rho_a,
-                    "duration": duration,
-                    "control_rate": control_rate,
-                    "bandwidth": bandwidth,
-                    "adaptation_rate": adaptation_rate,
-                    "sample_time": sample_time,
-                    "runs": runs,
-                    "seed": seed,
-                    "replay": replay,
-                    "members": members,
-                    "replan": replan,
-                },
-                folder=output,
-                scheduler=scheduler,
-            )
-            code = run(given, how)
+        given = Given(
+            spec=spec,
+            settings=set_ or (),
+            certificate=certificate,
+            metric=metric,
+            controllers=controllers,
+            gains=None if gains is None else str(gains),
+            plan=plan,
+            numbers={
+                "epsilon": epsilon,
+                "rho_a": rho_a,
+                "duration": duration,
+                "bandwidth": bandwidth,
+                "adaptation_rate": adaptation_rate,
+                "runs": runs,
+                "seed": seed,
+                "replay": replay,
+                "members": members,
+                "replan": replan,
+            },
+            folder=output,
+            scheduler=scheduler,
+        )
+        code = run(given, how)
     raise typer.Exit(code)

@@ -1,8 +1,4 @@
-"""Derived constants of certificate A: everything in (26a)-(26c) that does not depend on omega or Gamma.
-
-Two variants with one result: the corrected formulas (theory section 3) and the paper's own (as printed). The
-docs/theory page says which lines differ and why.
-"""
+"""Derived constants of certificate A: everything in (26a)-(26c) that does not depend on omega or Gamma (theory 3)."""
 
 from __future__ import annotations
 
@@ -10,9 +6,9 @@ from dataclasses import dataclass
 from typing import Generic
 
 from tubecert.conditions.arithmetic import T, quiet, sqrt
-from tubecert.conditions.kernels import Kernel, paper_kernel, tight_kernel
+from tubecert.conditions.kernels import tight_kernel
 from tubecert.conditions.predictor import Predictor
-from tubecert.conditions.problem import Drift, Numbers, TubeProblem
+from tubecert.conditions.problem import Numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,68 +28,32 @@ class RateTerms(Generic[T]):
     third: T
 
 
-def rate_terms(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
-    """The derived constants in the formulas that the problem asks for."""
-    return _printed(problem, n) if problem.as_printed else _corrected(problem, n)
-
-
-def known_drift(problem: TubeProblem, n: Numbers[T]) -> T:
-    """The bound of |f + B u*| over the tube that the problem asks for, phi of (2.4)."""
-    return n.phi if problem.drift == Drift.PLAN else n.Df + n.DB * n.Dus
-
-
 @quiet
-def _corrected(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
+def rate_terms(n: Numbers[T]) -> RateTerms[T]:
     """(3.1)-(3.5), line by line."""
     hs = n.Dh + n.R
     kmax = sqrt(n.a) * n.rho * n.du  # (3.1)
-    speed = known_drift(problem, n) + n.DB * (hs + kmax)  # (3.1)
+    speed = n.phi + n.DB * (hs + kmax)  # (3.1), phi of (2.4)
     # (3.5)
     geodesic_rate = sqrt(n.A / n.a) * (n.Dfx + (hs + n.Dus + kmax) * n.Dbx + n.Dhx * n.DB) + (
         sqrt(n.A) * n.du * n.DB
     )
-    terms = _common(n, speed, geodesic_rate)
-    return RateTerms(
-        **terms,
-        hs=hs,
-        E0=n.d0**2,  # (3.6)
-        zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),  # (3.4)
-        third=n.Dhx * (4 * n.lam * n.A * n.DB + terms["psi_rate"]) / n.lam,  # (3.4)
-    )
-
-
-@quiet
-def _printed(problem: TubeProblem, n: Numbers[T]) -> RateTerms[T]:
-    """The same as the paper prints it, bounds:dx to bounds:dgamma_s; errata E4-E6 say what is wrong with it."""
-    du = n.excess / (2 * n.smin)  # no bound of the feedback, and may be negative
-    speed = known_drift(problem, n) + n.DB * (2 * n.Dh + n.rho * du)
-    geodesic_rate = sqrt(n.A / n.a) * (
-        n.Dfx + (n.Dh + n.Dus + n.rho * du) * n.Dbx + (n.Dhx + sqrt(n.a) * du / sqrt(n.A)) * n.DB
-    )
-    terms = _common(n, speed, geodesic_rate)
-    return RateTerms(
-        **terms,
-        hs=2 * n.Dh,
-        E0=n.A * n.offset**2,
-        zeta_p=0 * n.rho,
-        third=n.A * n.Dhx * (4 * n.lam * n.DB + terms["psi_rate"]) / n.lam,
-    )
-
-
-def _common(n: Numbers[T], speed: T, geodesic_rate: T) -> dict[str, T]:
-    """What both variants share, (3.1), (3.3) and (3.5)."""
     psi_x = 2 * n.DBx + n.DB * n.DMx / n.a  # (3.5)
     # (3.5)
     psi_rate = n.A * (n.DB * geodesic_rate + n.DB * n.DMx * speed / sqrt(n.A * n.a) + n.DBx * speed)
-    return {
-        "speed": speed,
-        "s1": n.Dht + n.Dhx * speed,  # (3.1)
-        "psi_x": psi_x,
-        "geodesic_rate": geodesic_rate,
-        "psi_rate": psi_rate,
-        "weight1": 2 * n.rho * n.DB * (n.A / n.a),  # (3.3)
-        "weight2": n.A * psi_x,  # (3.3)
-    }
+    return RateTerms(
+        speed=speed,
+        s1=n.Dht + n.Dhx * speed,  # (3.1)
+        hs=hs,
+        psi_x=psi_x,
+        geodesic_rate=geodesic_rate,
+        psi_rate=psi_rate,
+        E0=n.d0**2,  # (3.6)
+        zeta_p=n.rho * n.delta / (n.lam * sqrt(n.a)),  # (3.4)
+        weight1=2 * n.rho * n.DB * (n.A / n.a),  # (3.3)
+        weight2=n.A * psi_x,  # (3.3)
+        third=n.Dhx * (4 * n.lam * n.A * n.DB + psi_rate) / n.lam,  # (3.4)
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,10 +66,9 @@ class Zetas(Generic[T]):
 
 
 @quiet
-def zetas(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T) -> Zetas[T]:
-    """(zeta_1) to (zeta_3) with the kernel that the problem asks for, (3.3), (3.4)."""
-    kernel = paper_kernel if problem.active_kernel is Kernel.PAPER else tight_kernel
-    k = kernel(2 * n.lam, omega, n.Dh, terms.s1)
+def zetas(n: Numbers[T], terms: RateTerms[T], omega: T) -> Zetas[T]:
+    """zeta_1 to zeta_3 with the kernel J of (2.19), (3.3), (3.4)."""
+    k = tight_kernel(2 * n.lam, omega, n.Dh, terms.s1)
     return Zetas(zeta1=terms.weight1 * k, zeta2=terms.weight2 * k, zeta3=terms.third / omega)
 
 
@@ -120,7 +79,7 @@ def prediction_error(hs: T, s1: T, q: T) -> T:
 
 
 @quiet
-def filter_error(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, p: Predictor[T]) -> T:
-    """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt, (2.13)."""
-    gain = n.DBpx * terms.speed + (problem.filter_factor * omega + p.norm) * n.DBp
+def filter_error(n: Numbers[T], terms: RateTerms[T], omega: T, p: Predictor[T]) -> T:
+    """Deta of certificate A: (DBpx Dxdot + (|sC| + |A_m|) DBp) Dxt with |sC| = 2 omega, (2.13)."""
+    gain = n.DBpx * terms.speed + (2 * omega + p.norm) * n.DBp
     return gain * prediction_error(terms.hs, terms.s1, p.q)

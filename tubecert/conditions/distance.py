@@ -4,8 +4,7 @@ THEOREM B. If Y > phi + DB[du dbar + min((1+r_H) Dh, max(H0, S) + e)] with S >= 
 Deta(omega, g, Y)/sqrt(Gamma), then dbar = sqrt(a) rho > sup D implies |x - x*| < rho over the horizon. A
 proof is a recipe, a tuple of decimals for which these inequalities are verified; a recipe that fails
 refutes nothing but itself. What refutes gains is `distance_ceiling`: every Y that serves is at least the
-least fixed point, whatever the constants are within their enclosures. Over a problem with parts a recipe has
-a level in each of them, and theorem BW takes the place of B. Implements: theory sections 4 and 4f.
+least fixed point, whatever the constants are within their enclosures. Implements: theory section 4.
 """
 
 from __future__ import annotations
@@ -19,13 +18,11 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import Array, T, least_solution, maximum, minimum, quiet, sqrt, vector
 from tubecert.conditions.derived import prediction_error
-from tubecert.conditions.distance_windows import InWindow, Loop, along
 from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
-from tubecert.conditions.predictor import Predictor, predictor
+from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.stretches import LevelProof, cover, margin, numbers_of, widest_shares
 from tubecert.conditions.theorem import Theorem
 from tubecert.conditions.wind import drifting, felt, is_felt, prediction, provisos, pushed, taken
 from tubecert.enclosure.interval import Interval
@@ -35,21 +32,15 @@ _RISES = 200  # iterations towards the least fixed point from below; any number 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceRecipe:
-    """The proof of theorem B at printed gains: `speed` is Y, `prediction_error` e, `uncertainty` S.
-
-    With `windows` (theorem BW) these are at least those of every window; `settling` in s is the time that a window is
-    given to forget the one before.
-    """
+    """The proof of theorem B at printed gains: `speed` is Y, `prediction_error` e, `uncertainty` S."""
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     projection_radius: Fraction
     speed: Fraction
     prediction_error: Fraction
     uncertainty: Fraction
-    settling: Fraction | None = None
-    windows: tuple[LevelProof, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +91,7 @@ def error_needed(n: Numbers[T], Y: T, omega: T, p: Predictor[T], Gamma: T) -> T:
     """What e has to be at least: Deta/sqrt(Gamma), (4.2); with what is no input (7.9)."""
     if not is_felt(n):
         return filter_error(n, Y, omega, p) / sqrt(Gamma)
-    xt = prediction(n, n.Dht + n.Dhx * Y, p, Gamma, felt(n, p))
+    xt = prediction(n, n.Dht + n.Dhx * Y, p, Gamma, felt(n))
     return (n.DBpx * Y + n.DBp * (omega + p.shifted)) * xt + taken(n)
 
 
@@ -114,19 +105,15 @@ def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
 @quiet
 def margin_distance_along(problem: TubeProblem, recipes: Sequence[DistanceRecipe]) -> Interval:
     """Margins of many recipes at once, shape `(len(recipes),)`; recipes share the projection radius."""
-    if problem.parts or any(recipe.windows or recipe.settling for recipe in recipes):
-        found = [_margin_in_windows(problem, recipe) for recipe in recipes]
-        return Interval(np.array([m.lo for m in found]), np.array([m.hi for m in found]))
     R_H = recipes[0].projection_radius
     serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H)
     omega, Gamma = vector([r.bandwidth for r in recipes]), vector([r.adaptation_rate for r in recipes])
-    gains = [r.predictor_gain for r in recipes if r.predictor_gain is not None]
     state = DistanceState(
         Y=vector([r.speed for r in recipes]),
         e=vector([r.prediction_error for r in recipes]),
         S=vector([r.uncertainty for r in recipes]),
     )
-    p = predictor(problem.A_m, omega, vector(gains) if gains else None)
+    p = Predictor.of_gain(vector([r.predictor_gain for r in recipes]), omega)
     n = problem.proven(R_H)
     valid = serves & _is_valid(n, omega, Gamma, p, state)
     low = _margin(n, omega, state).lo
@@ -152,71 +139,17 @@ def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -
     return (1 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
 
 
-# -- theorem BW
-
-
-def course_of(problem: TubeProblem, recipe: DistanceRecipe) -> tuple[InWindow[Interval], ...]:
-    """Every formula in every window, with outward rounding; `ValueError` where windows are not the parts.
-
-    (4.14)-(4.16).
-    """
-    if recipe.settling is None or not cover(problem, recipe):
-        raise ValueError("the windows of a recipe are those of its problem")
-    omega = Interval.of(recipe.bandwidth)
-    g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
-    return along(
-        [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts],
-        [Interval.of(part.end - part.begin) for part in problem.parts],
-        [Interval.of(own.speed) for own in recipe.windows],
-        Loop(
-            omega=omega,
-            Gamma=Interval.of(recipe.adaptation_rate),
-            predictor=predictor(problem.A_m, omega, g),
-            settling=Interval.of(recipe.settling),
-        ),
-    )
-
-
-def suprema_in_windows(problem: TubeProblem, recipe: DistanceRecipe) -> tuple[float, ...]:
-    """sup D in every window, by a recipe that is proven."""
-    return tuple(float(own.course.supremum.hi) for own in course_of(problem, recipe))
-
-
-@quiet
-def _margin_in_windows(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
-    nothing = Interval(np.asarray(-np.inf), np.asarray(np.inf))
-    if not problem.radius_serves(recipe.projection_radius) or not _describes_windows(problem, recipe):
-        return nothing
-    found = course_of(problem, recipe)
-    S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
-    if not all(own.uncertainty.hi <= S.lo and own.error.hi <= e.lo for own in found):
-        return nothing
-    numbers = [numbers_of(problem, part, recipe.projection_radius) for part in problem.parts]
-    return margin(problem, numbers, recipe, [own.course for own in found])
-
-
-def _describes_windows(problem: TubeProblem, recipe: DistanceRecipe) -> bool:
-    """Whether there is a level in every part, and each is longer than what it waits, as theorem BW asks for."""
-    wait = recipe.settling
-    if wait is None or not cover(problem, recipe):
-        return False
-    return wait > 0 and all(part.end - part.begin > wait for part in problem.parts)
-
-
 @quiet
 def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     """An upper bound of the margin that any Y, e, S can prove at the recipe's gains; <= 0 refutes the gains.
 
     Y is replaced by a lower bound of the least fixed point, approached from below; sup D rises with e and S,
-    they with Y. The bound holds for all constants within their enclosures. In windows nothing is refuted.
+    they with Y. The bound holds for all constants within their enclosures.
     Theory 4.2.
     """
-    if problem.parts:
-        return float(np.inf)
     n = problem.enclosed(recipe.projection_radius)
     omega, Gamma = Interval.of(recipe.bandwidth), Interval.of(recipe.adaptation_rate)
-    g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
-    p = predictor(problem.A_m, omega, g)
+    p = Predictor.of_gain(Interval.of(recipe.predictor_gain), omega)
 
     def errors(Y: Interval) -> tuple[Interval, Interval]:
         S = uncertainty(n, Y, omega).sanitised()
@@ -243,9 +176,7 @@ def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
 
 
 def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | None:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven; windows have an end, theory 4.3."""
-    if recipe.windows:
-        return None
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven, theory 4.3."""
     n = problem.proven(recipe.projection_radius)
     S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
     return float((distance_bound(n, Interval.of(recipe.bandwidth), S, e).ultimate() / sqrt(n.a)).hi)
@@ -253,8 +184,6 @@ def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | Non
 
 def input_shares(problem: TubeProblem, recipe: DistanceRecipe) -> InputShares | None:
     """|k| <= du sup D, |u_a| <= R_H, (4.13)."""
-    if recipe.windows:
-        return widest_shares(problem, suprema_in_windows(problem, recipe), recipe.projection_radius)
     n = problem.proven(recipe.projection_radius)
     S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
     top = distance_bound(n, Interval.of(recipe.bandwidth), S, e).supremum()
@@ -264,7 +193,7 @@ def input_shares(problem: TubeProblem, recipe: DistanceRecipe) -> InputShares | 
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """Everything that theorem B compares, at some gains."""
     one = np.asarray(1.0)
-    p = predictor(problem.A_m, one, one)
+    p = Predictor.of_gain(one, one)
     S = uncertainty(n, least_speed(n, one, one), one)
     return filter_error(n, one, one, p), distance_bound(n, one, S, one).supremum() < reach(n)
 
@@ -274,11 +203,8 @@ THEOREM = Theorem(
     margins=lambda problem, recipes: {"distance": margin_distance_along(problem, recipes)},
     ceilings=lambda problem, recipe: {"distance": distance_ceiling(problem, recipe)},
     formula=_at_once,
-    # what fills the tube in the long run need not fill a window
-    obstacles=lambda problem: () if problem.parts else obstacles(problem),
+    obstacles=obstacles,
     provisos=provisos,
     ultimate=ultimate_radius,
     inputs=input_shares,
-    optional=("settling",),
-    parts=("windows",),
 )

@@ -74,15 +74,8 @@ class LimitedInput:
 
     def holds(self, bound: InputBound) -> bool:
         """Whether a bound lies within the limits."""
-        return self._keeps(bound.least, bound.greatest)
-
-    def _keeps(self, least: float, greatest: float) -> bool:
         low, high = self.limits
-        return low <= Fraction(least) and Fraction(greatest) <= high
-
-    def along(self, ranges: Sequence[tuple[float, float]]) -> tuple[Verdict, ...]:
-        """On the limits in each window, from the range that is proven there."""
-        return tuple(Verdict.CERTIFIED if self._keeps(*each) else Verdict.UNDECIDED for each in ranges)
+        return low <= Fraction(bound.least) and Fraction(bound.greatest) <= high
 
     @property
     def leaves(self) -> Witness | None:
@@ -104,12 +97,8 @@ class LimitedInput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedInput:
-    """An input with limits, its bounds by the kinds that are proven (their keys), and the verdict on the limits.
-
-    `windows`: the verdict in each window of a kind that has windows.
-    """
+    """An input with limits, its bounds by the kinds that are proven (their keys), and the verdict on the limits."""
 
     input: LimitedInput
     bounds: Mapping[str, InputBound]
     verdict: Verdict
-    windows: Mapping[str, tuple[Verdict, ...]]

@@ -3,13 +3,12 @@
 Closed forms with removable singularities at omega = c taken out by r(x) = log(1 + x)/x. Every supremum is
 nondecreasing in the sizes that enter (distances, bounds on h and its rate, errors), so interval arguments are
 evaluated at their end points: no width is lost to a size that occurs twice.
-Implements: theory sections 2 (K, kappa, J) and 4 (sup D).
+Implements: theory sections 2 (kappa, J) and 4 (sup D).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any, Generic
 
 from tubecert.conditions.arithmetic import (
@@ -27,19 +26,6 @@ from tubecert.conditions.arithmetic import (
     quiet,
 )
 from tubecert.enclosure.interval import Interval
-
-
-class Kernel(StrEnum):
-    """Which bound of the filtered uncertainty enters the conditions."""
-
-    PAPER = "paper"  # K, singular at omega = c
-    TIGHT = "tight"  # J, the exact supremum
-
-
-@quiet
-def paper_kernel(c: T, w: T, s0: T, s1: T) -> T:
-    """K(c) = s0/|c - w| + s1/(c w), the kernel of (zeta_1) and (zeta_2) as printed; unbounded at w = c, (2.18)."""
-    return s0 / absolute(c - w) + s1 / (c * w)
 
 
 @quiet

@@ -1,4 +1,4 @@
-"""What no gains can overcome in B and C: a tube too narrow for where the plan starts or drifts."""
+"""What no gains can overcome in 0 and B: a tube too narrow for where the plan starts or drifts."""
 
 from __future__ import annotations
 

@@ -7,9 +7,8 @@ excluded).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from fractions import Fraction
 from typing import Final, Generic
 
@@ -19,19 +18,13 @@ from tubecert.bounds.constants import (
     TABLE,
     BoundConstants,
     Constant,
-    GainConstants,
     Meaning,
     ResidualConstants,
     WindConstants,
 )
 from tubecert.conditions.arithmetic import Array, T, minimum
 from tubecert.conditions.decimals import next_up, round_up
-from tubecert.conditions.kernels import Kernel
-from tubecert.conditions.machine import Machine
-from tubecert.conditions.predictor import Matrix, damping, scalar_gain
 from tubecert.enclosure.interval import Interval
-from tubecert.errors import TubecertError
-from tubecert.findings import Finding
 
 Side = Callable[[str, Constant], Interval]
 _ROUNDING = 1 + Fraction(1, 10**9)  # what a caller who rounds rho may miss; `proven` corrects for it
@@ -39,26 +32,12 @@ _LEAST_RADIUS = 1e-12  # of R_H where h vanishes: keeps every quotient defined
 RADIUS_DIGITS = 6  # of R_H: more than for the gains, because every digit dropped makes every constant larger
 
 
-class Formulas(StrEnum):
-    """Whose formulas: the corrected ones (theory) or the paper's own text."""
-
-    CORRECTED = "corrected"
-    AS_PRINTED = "as-printed"
-
-
-class Drift(StrEnum):
-    """How the known part of |xdot| is bounded: sup |f + B u*| or sup |f| + sup |B| sup |u*|."""
-
-    PLAN = "plan"
-    SUM = "sum"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Numbers(Generic[T]):
     """Constants, radii and options as numbers of one arithmetic; names are the paper's symbols.
 
-    `delta` and `phi` contain what unknown parameters add to them, `rest_speed` (theory 7). What a wind of the bound
-    that is given does stands beside them: None without wind, or where its bound is not given.
+    `delta` and `phi` contain what unknown parameters add to them, `rest_speed` (theory 7). What a wind does stands
+    beside them: None without wind.
     """
 
     a: T
@@ -80,16 +59,12 @@ class Numbers(Generic[T]):
     phi: T
     d0: T
     delta: T
-    delta_p: T  # the plan defect in |.| (certificate H only)
-    smin: T  # inf of the smallest singular value of Theta B (as printed only)
-    excess: T  # sup lmax(F~) (as printed only)
     H0: T
     R: T  # the radius of the projection
     lam: T
     rho: T
     rho_a: T
     rho_r: T
-    offset: T  # |x*(0) - x(0)| (as printed only)
     horizon: T | None
     wind_push: T | None = None  # beta_w |w|
     wind_speed: T | None = None  # D_E |w|
@@ -106,9 +81,9 @@ _INFIMA: Final = {meaning.number for meaning in TABLE.values() if meaning.side =
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wind:
-    """What acts beside the inputs, E w: |w| <= `bound` (None: not given), and what it does per unit of |w|."""
+    """What acts beside the inputs, E w: |w| <= `bound`, and what it does per unit of |w|."""
 
-    bound: Fraction | None
+    bound: Fraction
     constants: WindConstants
 
     @property
@@ -118,33 +93,13 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
-    """A window of theorems BW and CW, from `begin` to `end` in s, and every constant that is its own there.
-
-    They hold for t in [begin, end] and |x - x*| <= radius. `widths`: |x_i - x_i*| <= widths[i] d, by state;
-    `inputs`: the range of u*, by input.
-    """
-
-    begin: Fraction
-    end: Fraction
-    radius: Fraction
-    constants: BoundConstants
-    wind: WindConstants | None
-    residual: ResidualConstants | None
-    widths: Mapping[str, float]
-    inputs: Mapping[str, tuple[float, float]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TubeProblem:
     """Constants that hold over O(rho), and everything else that the conditions need.
 
-    `A_m` is None for `auto` (each certificate takes its best -g I). P = I throughout, Q = -(A_m + A_m').
+    `predictor_gain` is the g of the predictor A_m = -g I, None for `auto` (each certificate takes its best). P = I.
     `smooth` is the boundary layer nu of a smooth projection, None for the hard one. `states` is n. `rho_r`
-    may be any number with rho_r + rho_a <= rho. `filter_factor` is |sC|/omega: 2; the published gains need
-    the wrong value 1. `parts`: windows, where B and C are asked for levels in each.
-    Raises `TubecertError` TC501 if A_m + A_m' is not negative definite, `ValueError` for
-    inconsistent radii.
+    may be any number with rho_r + rho_a <= rho. `gained`: whether B depends on parameters that are not known, of which
+    no theorem here knows. Raises `ValueError` for inconsistent radii or a gain that is not positive.
     """
 
     constants: BoundConstants
@@ -153,49 +108,23 @@ class TubeProblem:
     rho_a: Fraction
     rho_r: Interval | Fraction
     rho: Fraction
-    initial_offset: Interval | Fraction = Fraction(0)
     horizon: Fraction | None = None
     states: int = 1
-    A_m: Matrix | None = None
+    predictor_gain: Fraction | None = None
     smooth: Fraction | None = None
-    formulas: Formulas = Formulas.CORRECTED
-    kernel: Kernel | None = None
-    drift: Drift = Drift.PLAN
-    filter_factor: int = 2
-    machine: Machine | None = None
     wind: Wind | None = None
     residual: ResidualConstants | None = None
-    gain: GainConstants | None = None
-    parts: tuple[Part, ...] = ()
+    gained: bool = False
 
     def __post_init__(self) -> None:
         if min(self.rate, self.rho_a, self.epsilon) <= 0:
             raise ValueError("rate, epsilon and rho_a must be positive")
         if Fraction(float(_interval(self.rho_r).lo)) + self.rho_a > Fraction(self.rho) * _ROUNDING:
             raise ValueError("rho must be at least rho_r + rho_a")
-        if self.filter_factor < 2 and not self.as_printed:
-            raise ValueError("|sC| is 2 omega: less proves nothing")
         if self.constants.lower.below <= 0:
             raise ValueError("the metric must be positive definite on the tube")
-        if self.A_m is not None and not damping(self.A_m).lo > 0:
-            raise TubecertError([_NOT_DAMPED])
-
-    @property
-    def as_printed(self) -> bool:
-        """Whether the paper's own formulas are to be reproduced."""
-        return self.formulas == Formulas.AS_PRINTED
-
-    @property
-    def active_kernel(self) -> Kernel:
-        """The kernel in use: tight for corrected formulas and the paper's for printed ones, unless chosen."""
-        if self.kernel is not None:
-            return Kernel(self.kernel)
-        return Kernel.PAPER if self.as_printed else Kernel.TIGHT
-
-    @property
-    def predictor_gain(self) -> Fraction | None:
-        """The g of a given A_m = -g I, else None."""
-        return None if self.A_m is None else scalar_gain(self.A_m)
+        if self.predictor_gain is not None and self.predictor_gain <= 0:
+            raise ValueError("A_m = -g I is stable for g > 0 only")
 
     @property
     def projection_radius(self) -> Fraction:
@@ -207,23 +136,15 @@ class TubeProblem:
         return radius if self.radius_serves(radius) else next_up(radius, RADIUS_DIGITS)
 
     @property
-    def clipping_radius(self) -> Fraction:
-        """R_H of certificate C, which clips: a decimal >= Dh."""
-        if not np.isfinite(self.constants.h.above):
-            return Fraction(1)  # serves nothing
-        return round_up(max(self.constants.h.above, _LEAST_RADIUS), RADIUS_DIGITS)
-
-    @property
     def constant_input(self) -> bool:
         """Whether B is proven to be the same everywhere in the tube."""
         return self.constants.B_x.above == 0
 
-    def radius_serves(self, R_H: Fraction, *, clips: bool = False) -> bool:
-        """Whether R_H >= sqrt(1 + nu) Dh (R_H >= Dh if the estimate is clipped), decided exactly, (2.10)."""
+    def radius_serves(self, R_H: Fraction) -> bool:
+        """Whether R_H >= sqrt(1 + nu) Dh, decided exactly, (2.10)."""
         if not np.isfinite(self.constants.h.above):
             return False
-        layer = Fraction(0) if clips or self.smooth is None else self.smooth
-        return R_H > 0 and (1 + layer) * Fraction(self.constants.h.above) ** 2 <= R_H**2
+        return R_H > 0 and (1 + (self.smooth or 0)) * Fraction(self.constants.h.above) ** 2 <= R_H**2
 
     def floats(self, R_H: Fraction | None = None) -> Numbers[Array]:
         """The safe side in floats, for the search."""
@@ -241,7 +162,7 @@ class TubeProblem:
         """
         safe = self._numbers(lambda name, c: Interval.exact(c.below if name in _INFIMA else c.above), R_H)
         rho_r = np.minimum(safe.rho_r.lo, (safe.rho - safe.rho_a).lo)  # the proof needs rho_r + rho_a <= rho
-        return replace(safe, rho_r=Interval.exact(rho_r), offset=Interval.exact(safe.offset.hi))
+        return replace(safe, rho_r=Interval.exact(rho_r))
 
     def enclosed(self, R_H: Fraction | None = None) -> Numbers[Interval]:
         """Enclosures of the constants themselves, for what cannot be excluded."""
@@ -261,13 +182,12 @@ class TubeProblem:
             rho=_interval(self.rho),
             rho_a=Interval.of(self.rho_a),
             rho_r=_interval(self.rho_r),
-            offset=_interval(self.initial_offset),
             horizon=None if self.horizon is None else Interval.of(self.horizon),
         )
 
     def _with_wind(self, n: Numbers[Interval], side: Side) -> Numbers[Interval]:
         """Beside the constants of the tube, what the wind does, (7.2), (7.7)."""
-        if self.wind is None or self.wind.bound is None:
+        if self.wind is None:
             return n
         own, size = self.wind.constants, Interval.of(self.wind.bound)
         push, speed, error = (
@@ -304,16 +224,10 @@ class TubeProblem:
         """What is beside the known model: constants of wind and of unknown parameters, as `BoundConstants.items`."""
         wind = [] if self.wind is None else self.wind.constants.items()
         rest = [] if self.residual is None else self.residual.items()
-        return wind + rest + ([] if self.gain is None else self.gain.items())
+        return wind + rest
 
 
 _SMALL_IS_SAFE = _INFIMA | {"rho_r", "rho_a", "lam"}
-
-_NOT_DAMPED = Finding(
-    code="TC501",
-    message="A_m + A_m' is not negative definite, so P = I is no Lyapunov matrix of the predictor",
-    help="choose A_m = -g I with g > 0, or `auto`",
-)
 
 
 def _interval(value: Interval | Fraction) -> Interval:

@@ -7,25 +7,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Generic
 
-from tubecert.conditions.hardware.loop import Rounding
 from tubecert.conditions.theorem import R
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """Gains that a user fixes, in rad/s, 1/s^2 and s; what is None is searched for. `curve`: whether one is wanted.
-
-    `lost`: what the arithmetic of the controller is allowed to lose.
-    """
+    """Gains that a user fixes, in rad/s and 1/s^2; what is None is searched for. `curve`: whether one is wanted."""
 
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None
-    sample_time: Fraction | None = None
     curve: bool = True
-    lost: Rounding | None = None
 
     def __bool__(self) -> bool:
-        return not (self.bandwidth is None and self.adaptation_rate is None and self.sample_time is None)
+        return not (self.bandwidth is None and self.adaptation_rate is None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +27,8 @@ class Proposal(Generic[R]):
     """Recipes of one theorem.
 
     `decisive`: the one that the verdict is to be about, in the `role` that it has among the gains of its kind.
-    `hopeless`: where there is none, one that stands for all that could still be chosen (a rate without bound, a sample
-    time near 0): if it is refuted, so is what was asked for. `beside`: others by role. `companion`: a recipe of
+    `hopeless`: where there is none, one that stands for all that could still be chosen (a rate without bound): if it is
+    refuted, so is what was asked for. `beside`: others by role. `companion`: a recipe of
     another theorem at the decisive gains, for their ultimate radius. `curve`: a trade-off; `around`: other bandwidths
     at the decisive gains; each of them shares one projection radius.
     """
@@ -58,10 +52,3 @@ class RateProposal(Proposal[R]):
 
     infimum: float | None = None
     binds: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampledProposal(Proposal[R]):
-    """Of certificate C: `limit`, which the sample time approaches as omega grows at the predictor gain found."""
-
-    limit: float | None = None

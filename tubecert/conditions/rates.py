@@ -24,11 +24,11 @@ from tubecert.conditions.derived import (
 )
 from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.obstacles import reach
-from tubecert.conditions.predictor import predictor
+from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Theorem
-from tubecert.conditions.verdict import UNKNOWN, Shortfall
-from tubecert.conditions.wind import known_gains_only, not_covered
+from tubecert.conditions.verdict import Shortfall
+from tubecert.conditions.wind import not_covered, provisos
 from tubecert.enclosure.interval import Interval
 
 Margins = dict[str, Interval]
@@ -36,11 +36,11 @@ Margins = dict[str, Interval]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateRecipe:
-    """Everything that the conditions (26) are checked at; `predictor_gain` is None for a general A_m."""
+    """Everything that the conditions (26) are checked at."""
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     projection_radius: Fraction
 
 
@@ -51,23 +51,22 @@ def margins_26_along(problem: TubeProblem, recipes: Sequence[RateRecipe]) -> Mar
     serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H)
     omega = vector([r.bandwidth for r in recipes])
     Gamma = vector([r.adaptation_rate for r in recipes])
-    gains = [r.predictor_gain for r in recipes if r.predictor_gain is not None]
-    g = vector(gains) if gains else None
-    proven = rate_margins(problem, problem.proven(R_H), omega, Gamma, g)
-    possible = rate_margins(problem, problem.enclosed(R_H), omega, Gamma, g)
+    g = vector([r.predictor_gain for r in recipes])
+    proven = rate_margins(problem.proven(R_H), omega, Gamma, g)
+    possible = rate_margins(problem.enclosed(R_H), omega, Gamma, g)
     return {
         claim: Interval(low if serves else np.full_like(low, -np.inf), np.maximum(low, possible[claim].hi))
         for claim, low in ((claim, margin.lo) for claim, margin in proven.items())
     }
 
 
-def rate_margins(problem: TubeProblem, n: Numbers[T], omega: T, Gamma: T, g: T | None) -> dict[str, T]:
+def rate_margins(n: Numbers[T], omega: T, Gamma: T, g: T) -> dict[str, T]:
     """The three margins in one arithmetic; (26c) is -inf where (26b) leaves nothing to divide by."""
-    terms = rate_terms(problem, n)
-    z = zetas(problem, n, terms, omega)
+    terms = rate_terms(n)
+    z = zetas(n, terms, omega)
     first = 1 - (terms.E0 / n.a + z.zeta1 + terms.zeta_p) / n.rho_r**2
     rest = n.a - z.zeta2 - z.zeta3
-    needed = theta(problem, n, terms, omega, g) / (n.rho_a * rest)
+    needed = theta(n, terms, omega, g) / (n.rho_a * rest)
     third = choose(rest, 1 - needed / sqrt(Gamma), nothing(rest))
     return {"26a": _known(first), "26b": _known(rest / n.a), "26c": _known(third)}
 
@@ -76,18 +75,18 @@ def _known(x: T) -> T:
     return x.sanitised() if isinstance(x, Interval) else x
 
 
-def theta(problem: TubeProblem, n: Numbers[T], terms: RateTerms[T], omega: T, g: T | None) -> T:
+def theta(n: Numbers[T], terms: RateTerms[T], omega: T, g: T) -> T:
     """Dtheta = DB A Deta/lambda, (3.2)."""
-    Deta = filter_error(problem, n, terms, omega, predictor(problem.A_m, omega, g))
+    Deta = filter_error(n, terms, omega, Predictor.of_gain(g, omega))
     return n.DB * n.A * Deta / n.lam
 
 
 def derived_constants(problem: TubeProblem, recipe: RateRecipe) -> dict[str, Constant]:
     """The derived constants at the printed gains as enclosures, by their names in the certificate."""
     omega = Interval.of(recipe.bandwidth)
-    g = None if recipe.predictor_gain is None else Interval.of(recipe.predictor_gain)
+    g = Interval.of(recipe.predictor_gain)
     below, above = (
-        _derived(problem, n, omega, g)
+        _derived(n, omega, g)
         for n in (problem.enclosed(recipe.projection_radius), problem.proven(recipe.projection_radius))
     )
     return {
@@ -97,18 +96,16 @@ def derived_constants(problem: TubeProblem, recipe: RateRecipe) -> dict[str, Con
 
 
 @quiet
-def _derived(
-    problem: TubeProblem, n: Numbers[Interval], omega: Interval, g: Interval | None
-) -> dict[str, Interval]:
-    terms = rate_terms(problem, n)
-    z = zetas(problem, n, terms, omega)
-    p = predictor(problem.A_m, omega, g)
+def _derived(n: Numbers[Interval], omega: Interval, g: Interval) -> dict[str, Interval]:
+    terms = rate_terms(n)
+    z = zetas(n, terms, omega)
+    p = Predictor.of_gain(g, omega)
     return {
         "speed": terms.speed,
         "uncertainty_rate": terms.s1,
         "prediction_error": prediction_error(terms.hs, terms.s1, p.q),
-        "filter_error": filter_error(problem, n, terms, omega, p),
-        "theta": theta(problem, n, terms, omega, g),
+        "filter_error": filter_error(n, terms, omega, p),
+        "theta": theta(n, terms, omega, g),
         "Psi_x": terms.psi_x,
         "geodesic_rate": terms.geodesic_rate,
         "Psi_rate": terms.psi_rate,
@@ -126,15 +123,16 @@ def input_shares(problem: TubeProblem, recipe: RateRecipe) -> InputShares | None
 
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """All of (26a)-(26c) at some gains."""
+    del problem
     one = np.asarray(1.0)
-    return rate_margins(problem, n, one, one, one)
+    return rate_margins(n, one, one, one)
 
 
 def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """Why no bandwidth serves, if so: the initial error and the plan's defect alone need rho_r^2 <= E0/a + zeta_p."""
     margins, needed = [], []
     for n in (problem.proven(), problem.enclosed()):
-        terms = rate_terms(problem, n)
+        terms = rate_terms(n)
         needed.append(terms.E0 / n.a + terms.zeta_p)
         margins.append(1 - needed[-1] / n.rho_r**2)
     low, high = margins
@@ -151,9 +149,8 @@ def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
 
 
 def _provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """Several of the paper's printed formulas are wrong, and theorem A knows nothing that is no input."""
-    printed = (Shortfall(claim="corrected_formulas", margin=UNKNOWN),) if problem.as_printed else ()
-    return (*printed, *not_covered(problem), *known_gains_only(problem))
+    """Theorem A knows nothing that is no input, and no B that is not known."""
+    return (*not_covered(problem), *provisos(problem))
 
 
 THEOREM = Theorem(

@@ -22,23 +22,13 @@ Margins = Mapping[str, Interval]
 class Recipe(Protocol):
     """The gains that a claim is about, and the auxiliary numbers of its proof: a dataclass of exact decimals.
 
-    Where the loop has a predictor A_m = -g I its gain g is called `predictor_gain`, and None stands for another A_m.
+    Where the loop has a predictor A_m = -g I its gain g is called `predictor_gain`.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
 
 R = TypeVar("R", bound=Recipe)
-
-
-def _any(problem: TubeProblem, recipe: object) -> bool:
-    del problem, recipe
-    return True
-
-
-def _all(problem: TubeProblem, decisive: object, other: object) -> bool:
-    del problem, decisive, other
-    return True
 
 
 def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
@@ -55,11 +45,7 @@ class Theorem(Generic[R]):
     overcome. `provisos`: why the formulas that the problem asks for prove nothing, if so. `formula`: everything that
     the margins contain, in floats at some gains, to record which constants it needs. `ultimate`: |x - x*| is at most
     this in the long run, for a recipe that is proven. `inputs`: what the loop adds to u* at most, for a recipe that is
-    proven; without it inputs have no bound. `own_predictor`: where a general matrix A_m is asked for, the theorem is
-    about -g I with a gain of its own. `sizes`: what of a recipe may be 0, all else being gains; `optional`:
-    what may be None; `about`: whether a recipe has the numbers that the problem fixes, as far as it fixes any;
-    `alike`: whether another one may stand on the curve of a decisive one, which is about loops like it; `parts`: what
-    of a recipe are tuples of records, whose numbers are of the same signs.
+    proven; without it inputs have no bound. `sizes`: what of a recipe may be 0, all else being gains.
     """
 
     recipe: type[R]
@@ -70,16 +56,7 @@ class Theorem(Generic[R]):
     provisos: Callable[[TubeProblem], tuple[Shortfall, ...]] = _nothing
     ultimate: Callable[[TubeProblem, R], float | None] | None = None
     inputs: Callable[[TubeProblem, R], InputShares | None] | None = None
-    own_predictor: bool = False
     sizes: tuple[str, ...] = ("speed", "prediction_error", "uncertainty")
-    optional: tuple[str, ...] = ()
-    about: Callable[[TubeProblem, R], bool] = _any
-    alike: Callable[[TubeProblem, R | None, R], bool] = _all
-    parts: tuple[str, ...] = ()
-
-    def is_about(self, problem: TubeProblem, recipe: object) -> bool:
-        """Whether a recipe is one of this theorem, for the loop of the problem: its kind, its signs, its numbers."""
-        return self.states(problem, recipe) and self.about(problem, cast("R", recipe))
 
     def states(self, problem: TubeProblem, recipe: object) -> bool:
         """Whether the theorem is stated for a recipe: its kind, its signs, its predictor.
@@ -89,32 +66,13 @@ class Theorem(Generic[R]):
         """
         if type(recipe) is not self.recipe:
             return False
-        numbers = _numbers(recipe)
-        parts = [
-            _numbers(part) for name in self.parts for part in cast("tuple[Recipe, ...]", numbers.pop(name))
-        ]
-        predicts, g = "predictor_gain" in numbers, numbers.pop("predictor_gain", None)
-        if g is not None:
-            numbers["predictor_gain"] = g
-        return all(map(self._signed, (numbers, *parts))) and (
-            not predicts or self._fits(problem, g if isinstance(g, Fraction) else None)
-        )
-
-    def _signed(self, numbers: Mapping[str, object]) -> bool:
-        """Whether gains are positive, and sizes are not negative."""
-        return all(
-            (x is None and name in self.optional)
-            or (isinstance(x, Fraction) and (x >= 0 if name in self.sizes else x > 0))
+        numbers = {item.name: getattr(recipe, item.name) for item in fields(recipe)}
+        signed = all(
+            isinstance(x, Fraction) and (x >= 0 if name in self.sizes else x > 0)
             for name, x in numbers.items()
         )
-
-    def _fits(self, problem: TubeProblem, g: Fraction | None) -> bool:
-        """Whether -g I (None: the matrix A_m) is the predictor of the problem, or free to be chosen."""
-        if problem.A_m is None:
-            return g is not None
-        if problem.predictor_gain is not None:
-            return g == problem.predictor_gain
-        return (g is not None) if self.own_predictor else g is None
+        given = problem.predictor_gain
+        return signed and (given is None or numbers.get("predictor_gain", given) == given)
 
     def needs(self, problem: TubeProblem) -> frozenset[str]:
         """The constants that the formulas contain with the options of the problem, by field name; recorded."""
@@ -130,11 +88,6 @@ class Theorem(Generic[R]):
             return beside
         own = sorted(x for x in self.needs(problem) if not np.isfinite(getattr(constants, x).above))
         return (*own, *beside)
-
-
-def _numbers(record: Recipe) -> dict[str, object]:
-    """The fields of a recipe, or of a part of one."""
-    return {item.name: getattr(record, item.name) for item in fields(record)}
 
 
 class _Recorder:

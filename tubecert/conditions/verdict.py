@@ -17,11 +17,10 @@ __all__ = ["NOTHING_FOUND", "UNKNOWN", "Shortfall", "Verdict", "unbounded"]
 class Shortfall:
     """A claim that is not proven: its margin (relative to what is allowed), both sides where known.
 
-    `claim` is `26a`, `26b`, `26c`, `distance`, `sampled` at gains asked for; `26a`, `initial_distance`, `plan_defect`,
-    `parameters`, `wind` where no gains can help; `wind_bound`, `wind_not_covered` where nothing follows for a wind;
-    `gain_not_covered`, `gain_unmatched`, `gain_range` where nothing follows for an uncertain gain;
-    `bounded` where `constant` has no finite bound; `corrected_formulas` where the formulas
-    themselves prove nothing; `proven_gains` where the search failed (see `ConditionHolds`).
+    `claim` is `26a`, `26b`, `26c`, `distance` at gains asked for; `26a`, `initial_distance`, `plan_defect`,
+    `parameters`, `wind` where no gains can help; `wind_not_covered` where nothing follows for a wind;
+    `gain_not_covered` where nothing follows for an uncertain B; `bounded` where `constant` has no finite bound;
+    `proven_gains` where the search failed (see `ConditionHolds`).
     """
 
     claim: str

@@ -1,4 +1,4 @@
-"""What a wind adds to theorems 0, B and C: to the push on the distance, to |xdot|, to the estimate. Trusted.
+"""What a wind adds to theorems 0 and B: to the push on the distance, to |xdot|, to the estimate. Trusted.
 
 Without a wind every function here gives back what it was given, digit by digit. Implements: theory section 7.
 """
@@ -33,14 +33,8 @@ def beside(n: Numbers[T]) -> T | None:
 
 
 def taken(n: Numbers[T]) -> T:
-    """What certificate C takes for a part of h at least: eps_w |w| of (7.6)."""
+    """What is taken for a part of h at least: eps_w |w| of (7.6)."""
     return number(0, n.d0) if n.wind_error is None else n.wind_error
-
-
-def turning(n: Numbers[T]) -> T:
-    """And what more of it per distance that x moves, because B^+ turns: DBpx |E w + r| of (7.6)."""
-    other = beside(n)
-    return number(0, n.d0) if other is None else n.DBpx * other
 
 
 def is_felt(n: Numbers[T]) -> bool:
@@ -48,9 +42,9 @@ def is_felt(n: Numbers[T]) -> bool:
     return n.wind_speed is not None or n.rest_speed is not None
 
 
-def felt(n: Numbers[T], p: Predictor[T]) -> T:
-    """What drives the prediction error of certificate B beside the inputs: zb of (7.7)."""
-    found = _sum(n.wind_matched, n.rest_matched) if p.scalar else beside(n)
+def felt(n: Numbers[T]) -> T:
+    """What drives the prediction error of certificate B beside the inputs: zb of (7.7) for A_m = -g I."""
+    found = _sum(n.wind_matched, n.rest_matched)
     return number(0, n.d0) if found is None else found
 
 
@@ -62,15 +56,8 @@ def prediction(n: Numbers[T], s1: T, p: Predictor[T], Gamma: T, zb: T) -> T:
 
 
 def provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """Why nothing follows for a wind whose bound is not given, but looked for; nor for an uncertain gain."""
-    sought = problem.wind is not None and problem.wind.bound is None
-    wind = (Shortfall(claim="wind_bound", margin=UNKNOWN),) if sought else ()
-    return (*wind, *known_gains_only(problem))
-
-
-def known_gains_only(problem: TubeProblem) -> tuple[Shortfall, ...]:
-    """Why all certificates but H say nothing: they are stated for the B that the controller knows."""
-    return () if problem.gain is None else (Shortfall(claim="gain_not_covered", margin=UNKNOWN),)
+    """Why nothing follows for a B that is not known: the theorems are stated for the one that the controller knows."""
+    return (Shortfall(claim="gain_not_covered", margin=UNKNOWN),) if problem.gained else ()
 
 
 def not_covered(problem: TubeProblem) -> tuple[Shortfall, ...]:

@@ -12,16 +12,11 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import (
-    congruence,
-    eigenvalues,
-    eigenvalues_midrad,
-    midrad,
     norm_bound,
     spectral_norm,
     spectral_norm_midrad,
-    whitening,
 )
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 
@@ -221,47 +216,6 @@ class Lipschitz:
     def lower(self, lo: Array, hi: Array) -> Array:
         """The norm of the Jacobian at points; where a norm vanishes its gradient is unknown, and so is the value."""
         return spectral_norm(self._function.at(lo[:, self._columns], hi[:, self._columns])[0]).lo
-
-
-class LeastInputGain:
-    """-lmin(B' M B) with M = W^-1, to be maximised.
-
-    With any T: B'MB = (TB)'(TWT')^-1(TB), between lmin((TB)'(TB))/lmax(TWT') and lmin((TB)'(TB))/lmin(TWT').
-    """
-
-    def __init__(self, B: Matrix, W: Matrix) -> None:
-        self._function = MatrixFunction([W, B])
-        self.variables = self._function.variables
-
-    def _range(self, lo: Array, hi: Array) -> Interval:
-        w, b = self._function.at(lo, hi)
-        mid, rad = midrad(w)
-        t = whitening(mid)
-        scaled = eigenvalues_midrad(*congruence(t, mid, rad))
-        n = t.shape[-1]
-        image = [
-            sum((b[:, j] * Interval.exact(t[:, i, j, None]) for j in range(n)), start=Interval.exact(0.0))
-            for i in range(n)
-        ]
-        gram_lo = np.empty((len(lo), b.shape[-1], b.shape[-1]))
-        gram_hi = gram_lo.copy()
-        for p in range(b.shape[-1]):
-            for q in range(b.shape[-1]):
-                entry = sum((row[:, p] * row[:, q] for row in image), start=Interval.exact(0.0))
-                gram_lo[:, p, q], gram_hi[:, p, q] = entry.lo, entry.hi
-        least = eigenvalues(Interval(gram_lo, gram_hi))[..., 0]
-        positive = Interval(np.where(scaled.lo[:, 0] > 0, scaled.lo[:, 0], np.nan), scaled.hi[:, -1])
-        return (Interval(np.maximum(least.lo, 0.0), least.hi) / positive).sanitised()
-
-    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
-        """Minus the smallest value over the box."""
-        value = -np.maximum(self._range(lo, hi).lo, 0.0)
-        width = hi - lo
-        return Estimate(value, 0.5 * (lo + hi), width, width)
-
-    def lower(self, lo: Array, hi: Array) -> Array:
-        """Minus the value at points."""
-        return -self._range(lo, hi).hi
 
 
 def estimate_of(value: Array, caused: Array, e: Expansion, lo: Array, hi: Array) -> Estimate:

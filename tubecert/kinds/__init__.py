@@ -9,12 +9,10 @@ here (listed in `table`, named in `letters`) and its file in `recheck`.
 | 0 | `alone` | the feedback alone, without adaptation |
 | A | `rates` | (26a)-(26c) of the paper, corrected |
 | B | `distance` | the Riemannian distance bounded directly |
-| C | `sampled` | the same with piecewise-constant adaptation |
-| H | `hardware` | sampled, delayed control from noisy measurements in wind; only where a specification has `hardware` |
 """
 
 from __future__ import annotations
 
-from tubecert.letters import ALONE, DISTANCE, HARDWARE, NAMES, RATES, SAMPLED, Name, name_of
+from tubecert.letters import ALONE, DISTANCE, NAMES, RATES, Name, name_of
 
-__all__ = ["ALONE", "DISTANCE", "HARDWARE", "NAMES", "RATES", "SAMPLED", "Name", "name_of"]
+__all__ = ["ALONE", "DISTANCE", "NAMES", "RATES", "Name", "name_of"]

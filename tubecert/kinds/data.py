@@ -19,9 +19,7 @@ from tubecert.enclosure.interval import Interval
 from tubecert.kinds import Name
 from tubecert.verdict import Verdict
 
-Role = Literal[
-    "feedback", "asked", "least_bandwidth", "least_adaptation", "longest_sample", "machine", "largest"
-]
+Role = Literal["feedback", "asked", "least_bandwidth", "least_adaptation"]
 _BEYOND = 1e300  # larger margins are not told
 
 
@@ -36,7 +34,6 @@ class Pair:
     bandwidth: Fraction | None
     margins: Mapping[str, Constant]
     adaptation_rate: Fraction | None = None
-    sample_time: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +42,7 @@ class GainPoint:
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 from tubecert.conditions import distance
 from tubecert.conditions.distance import DistanceRecipe
-from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
@@ -23,7 +22,6 @@ from tubecert.kinds.data import (
     proven_data,
 )
 from tubecert.kinds.kind import Kind, Section
-from tubecert.kinds.windows import WindowData, bound_of, told, untold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +30,7 @@ class DistancePair:
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     projection_radius: Fraction
     margin: Constant
     ultimate_radius: float | None
@@ -53,16 +51,13 @@ class DistanceAround:
 
     bandwidth: tuple[Fraction, ...]
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     margin: tuple[float | None, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceData(SectionData):
-    """Certificate B: the pair of least bandwidth, of least adaptation rate, the one asked for, the curve.
-
-    `windows`: what is proven in each, where the specification has them.
-    """
+    """Certificate B: the pair of least bandwidth, of least adaptation rate, the one asked for, the curve."""
 
     name = DISTANCE
     split: DistancePair | None
@@ -70,7 +65,6 @@ class DistanceData(SectionData):
     asked: DistancePair | None
     curve: tuple[GainPoint, ...]
     margins_around: DistanceAround | None = None
-    windows: tuple[WindowData, ...] = ()
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """The pair asked for; or that of least rate, then that of least bandwidth."""
@@ -91,15 +85,6 @@ class DistanceSection(Section[DistanceRecipe]):
     """The pair of least bandwidth, the pair of least rate, the pair asked for (which then decides), the curve."""
 
     name = DISTANCE
-    windows: tuple[WindowData, ...] = ()
-
-    def input_bound(self, own: LimitedInput) -> InputBound | None:
-        """What an input with limits does in the loop, by the proof; in windows, in any of them."""
-        return bound_of(own, self.proof, self.windows)
-
-    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
-        """The range of an input in each window."""
-        return () if self.proof is None else tuple(w.inputs[name] for w in self.windows if name in w.inputs)
 
     @property
     def split(self) -> Checked[DistanceRecipe] | None:
@@ -133,7 +118,6 @@ class DistanceSection(Section[DistanceRecipe]):
             ),
             shortfalls=missing_data(self.shortfalls),
             margins_around=None if not judgement.around_at else _around_data(judgement),
-            windows=self.windows,
         )
 
 
@@ -170,10 +154,4 @@ class Distance(Kind[DistanceRecipe]):
 
     def section(self, problem: TubeProblem, proposal: Proposal[DistanceRecipe]) -> DistanceSection:
         """The section about a proposal."""
-        judgement = judge(problem, self.theorem, proposal)
-        proof = judgement.proof
-        windows = untold(problem)
-        if proof is not None and problem.parts:
-            suprema, recipe = distance.suprema_in_windows(problem, proof.recipe), proof.recipe
-            windows = told(problem, recipe.windows, suprema, recipe.projection_radius)
-        return DistanceSection(judgement=judgement, windows=windows)
+        return DistanceSection(judgement=judge(problem, self.theorem, proposal))

@@ -43,7 +43,7 @@ class Section(ABC, Generic[R]):
 
     @property
     def predictor_gain(self) -> Fraction | None:
-        """g of the decisive gains; None for another predictor, or none."""
+        """g of the decisive gains; None where there are none."""
         return None if self.decisive is None else getattr(self.decisive.recipe, "predictor_gain", None)
 
     @property
@@ -54,11 +54,6 @@ class Section(ABC, Generic[R]):
     def input_bound(self, own: LimitedInput) -> InputBound | None:
         """What an input with limits does in the loop, by the proof; None if there is none."""
         return None if self.proof is None else own.bound(self.proof.input_shares)
-
-    def input_along(self, name: str) -> tuple[tuple[float, float], ...]:
-        """The range of an input in each window; empty where nothing is proven in windows."""
-        del name
-        return ()
 
     @property
     def shortfalls(self) -> tuple[Shortfall, ...]:
@@ -93,13 +88,6 @@ class Kind(ABC, Generic[R]):
     def key(self) -> str:
         """The name of its section in a certificate."""
         return self.name.key
-
-    def applies(self, problem: TubeProblem) -> bool:
-        """Whether the kind says anything of a problem: if not, certificates have no section of it.
-
-        All but certificate H are stated for a B that is known.
-        """
-        return problem.gain is None
 
     @abstractmethod
     def section(self, problem: TubeProblem, proposal: Proposal[R]) -> Section[R]:

@@ -8,7 +8,6 @@ from fractions import Fraction
 
 from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions import rates
-from tubecert.conditions.predictor import Matrix
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Proposal, RateProposal
 from tubecert.conditions.rates import RateRecipe
@@ -35,7 +34,7 @@ class RatePair:
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     projection_radius: Fraction
     margins: Mapping[str, Constant]
 
@@ -46,7 +45,7 @@ class RatesAround:
 
     bandwidth: tuple[Fraction, ...]
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     margins: Mapping[str, tuple[float | None, ...]] = field(
         metadata=keyed(lambda: dict.fromkeys(CONDITIONS, tuple[float | None, ...]))
     )
@@ -56,23 +55,20 @@ class RatesAround:
 class RatesData(SectionData):
     """Certificate A: the gains of least bandwidth, or asked for; those of least adaptation rate; the curve.
 
-    `A_m`, `P`, `Q` are the predictor's, (n, n); `bandwidth_infimum` is where (26a) and (26b) begin to hold, `binds` the
+    `predictor_gain` is the g of A_m = -g I; `bandwidth_infimum` is where (26a) and (26b) begin to hold, `binds` the
     condition that sets the bandwidth.
     """
 
     name = RATES
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
-    A_m: tuple[tuple[Fraction, ...], ...] | None
-    P: tuple[tuple[float, ...], ...] | None
-    Q: tuple[tuple[Fraction, ...], ...] | None
+    predictor_gain: Fraction | None
     projection_radius: Fraction | None
     margins: Mapping[str, Constant] | None
     least_adaptation: RatePair | None
     curve: tuple[GainPoint, ...]
     bandwidth_infimum: float | None
     binds: str | None
-    below_twice_rate: bool
     margins_around: RatesAround | None = None
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
@@ -128,39 +124,18 @@ class RatesSection(Section[RateRecipe]):
         """The gains of least adaptation rate."""
         return self.at("least_adaptation")
 
-    @property
-    def A_m(self) -> Matrix | None:
-        """The predictor that the pair belongs to, (n, n)."""
-        g = None if self.pair is None else self.pair.recipe.predictor_gain
-        if self.problem.A_m is not None or g is None:
-            return self.problem.A_m
-        n = range(self.problem.states)
-        return tuple(tuple(-g if i == j else Fraction(0) for j in n) for i in n)
-
-    @property
-    def below_twice_rate(self) -> bool:
-        """Whether the bandwidth lies in the window below 2 lambda.
-
-        Section 3 of the theory, "Windows below 2 lambda".
-        """
-        return self.pair is not None and self.pair.recipe.bandwidth < 2 * self.problem.rate
-
     def claim(self) -> GainsSuffice:
         """That the gains suffice, and which condition sets the bandwidth."""
-        return replace(Section.claim(self), binds=self.binds, below_twice_rate=self.below_twice_rate)
+        return replace(Section.claim(self), binds=self.binds)
 
     def data(self) -> RatesData:
         """The section `conditions_26` of the certificate."""
-        A_m, at, judgement = self.A_m, _pair_data(self.pair), self.judgement
-        n = range(0 if A_m is None else len(A_m))
+        at, judgement = _pair_data(self.pair), self.judgement
         return RatesData(
             verdict=self.verdict,
             bandwidth=None if at is None else at.bandwidth,
             adaptation_rate=None if at is None else at.adaptation_rate,
-            A_m=A_m,
-            P=None if A_m is None else tuple(tuple(float(i == j) for j in n) for i in n),
-            # the Lyapunov equation with P = I
-            Q=None if A_m is None else tuple(tuple(-(A_m[i][j] + A_m[j][i]) for j in n) for i in n),
+            predictor_gain=None if at is None else at.predictor_gain,
             projection_radius=None if at is None else at.projection_radius,
             margins=None if at is None else at.margins,
             ultimate_radius=judgement.ultimate_radius,
@@ -173,7 +148,6 @@ class RatesSection(Section[RateRecipe]):
             ),
             bandwidth_infimum=self.infimum,
             binds=self.binds,
-            below_twice_rate=self.below_twice_rate,
             shortfalls=missing_data(self.shortfalls),
             margins_around=_around_data(judgement) if judgement.around_at else None,
         )

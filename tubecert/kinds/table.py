@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tubecert.conditions.problem import TubeProblem
-from tubecert.kinds import HARDWARE, name_of
+from tubecert.kinds import name_of
 from tubecert.kinds.alone import Alone
 from tubecert.kinds.distance import Distance
-from tubecert.kinds.hardware import Hardware
 from tubecert.kinds.kind import Kind
 from tubecert.kinds.rates import Rates
-from tubecert.kinds.sampled import Sampled
 
 AnyKind = Kind[Any]
 
-KINDS: Final[tuple[AnyKind, ...]] = (Alone(), Rates(), Distance(), Sampled(), Hardware())
+KINDS: Final[tuple[AnyKind, ...]] = (Alone(), Rates(), Distance())
 
 
 def kind_of(word: str) -> AnyKind:
@@ -24,15 +22,6 @@ def kind_of(word: str) -> AnyKind:
     return next(kind for kind in KINDS if kind.name == name)
 
 
-def kinds_of(problem: TubeProblem) -> tuple[AnyKind, ...]:
-    """The kinds that say anything of a problem."""
-    return tuple(kind for kind in KINDS if kind.applies(problem))
-
-
 def needed_by_all(problem: TubeProblem) -> frozenset[str]:
-    """The constants without which no kind with adaptation can say anything, by field name.
-
-    Where nothing is said yet of a machine, an uncertain B leaves no kind: then it is about certificate H all the same.
-    """
-    adaptive = [kind for kind in kinds_of(problem) if kind.name.adapts] or [kind_of(HARDWARE.letter)]
-    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in adaptive))
+    """The constants without which no kind with adaptation can say anything, by field name."""
+    return frozenset.intersection(*(kind.theorem.needs(problem) for kind in KINDS if kind.name.adapts))

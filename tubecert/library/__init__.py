@@ -13,6 +13,5 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 | `simulating`, `simulation`, `rechecking`, `pages` | what can be done with a certificate |
 | `comparing` | certificates side by side |
 | `sweeping` | many values of some keys |
-| `designing`, `designs`, `trading` | the best tube for a machine, and what a tube asks of one |
 | `figures` | the tube and the trade-off, drawn into axes |
 """

@@ -19,7 +19,7 @@ from tubecert.library.plain import Number, number_texts
 from tubecert.pipeline.deadline import Deadline
 from tubecert.spec import Setting, Spec, Synthesis
 from tubecert.spec.synthesis import MAX_DEGREE, solver_name
-from tubecert.stages.options import Formulas, Options
+from tubecert.stages.options import Options
 
 T = TypeVar("T", bound=str)
 V = TypeVar("V", int, Fraction)
@@ -48,7 +48,7 @@ class CertificationNumbers:
     by_effect: bool | None
     budget: int | None
 
-    def options(self, *, conditions: str | None, formulas: Formulas, metric: Path | None = None) -> Options:
+    def options(self, *, conditions: str | None, metric: Path | None = None) -> Options:
         """The question, with words and a metric beside the numbers."""
         return Options(
             rho_a=self.rho_a,
@@ -59,7 +59,6 @@ class CertificationNumbers:
             by_effect=self.by_effect,
             budget=self.budget or _USUAL.budget,
             conditions=conditions,
-            formulas=formulas,
             metric=metric,
         )
 

@@ -40,7 +40,7 @@ class Gains:
     """One set of gains of one kind of certificate, proven (or not, see `verdict`) on its own: never mix two sets.
 
     `kind` is its letter; `chosen` says what they are chosen for; `decides`: whether the verdict is about them.
-    `omega` in rad/s, `Gamma`, `sample_time` in s are None where the loop has none of it, and are the decimals that the
+    `omega` in rad/s and `Gamma` are None where the loop has none of it, and are the decimals that the
     certificate prints (`exact` has them as fractions). `margins`, by condition: what is proven to be left, from below
     and from above, as a share of what is allowed.
     """
@@ -52,7 +52,6 @@ class Gains:
     decides: bool
     omega: float | None
     Gamma: float | None
-    sample_time: float | None
     margins: Mapping[str, tuple[float, float]]
     exact: Pair = field(repr=False)
 
@@ -144,11 +143,6 @@ class Certification:
         return None if (gains := self._proven()) is None else gains.Gamma
 
     @property
-    def sample_time(self) -> float | None:
-        """The sample time in s that is certified together with `omega`."""
-        return None if (gains := self._proven()) is None else gains.sample_time
-
-    @property
     def margins(self) -> Mapping[str, tuple[float, float]]:
         """Of the gains that the verdict is about: by condition what is left, proven from below and from above."""
         return MappingProxyType({}) if self.deciding is None else self.deciding.margins
@@ -156,8 +150,7 @@ class Certification:
     def curve(self, kind: str) -> Array:
         """Points (K, 2) that are proven for a kind, by its letter.
 
-        Bandwidth in rad/s and adaptation rate; C: bandwidth and sample time in s; H: sample time in s and level.
-        (0, 2) where there is none. Raises `KeyError` for a kind that there is not.
+        Bandwidth in rad/s and adaptation rate; (0, 2) where there is none. Raises `KeyError` for no kind.
         """
         section = self.section(kind)
         return _array([] if section is None else section.points()).reshape(-1, 2)
@@ -197,10 +190,7 @@ class Certification:
 
     @property
     def half_widths(self) -> Mapping[str, float]:
-        """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set.
-
-        Where certificate H decides, what H proves, which is less than what the constants are bounded over.
-        """
+        """How far each state can be from the plan, in its unit; empty if there is no tube in the safe set."""
         return MappingProxyType(widths(self.result) or {})
 
     @property
@@ -305,7 +295,6 @@ def _gains(row: report_gains.Gains) -> Gains:
         decides=row.decides,
         omega=_float(pair.bandwidth),
         Gamma=_float(pair.adaptation_rate),
-        sample_time=_float(pair.sample_time),
         margins=MappingProxyType({name: (m.below, m.above) for name, m in pair.margins.items()}),
         exact=pair,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
@@ -26,11 +25,11 @@ from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
 from tubecert.library.workers import workers_of
-from tubecert.pipeline import Options, Result
+from tubecert.pipeline import Options
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
-from tubecert.stages.options import Formulas, overridden
+from tubecert.stages.options import overridden
 
 
 def certify(
@@ -40,7 +39,6 @@ def certify(
     epsilon: Number | None = None,
     metric: MetricLike | None = None,
     conditions: str | None = None,
-    formulas: Formulas = "corrected",
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
     gap: Number | None = None,
@@ -70,10 +68,10 @@ def certify(
         deadline=deadline,
     )
     numbers = certification_numbers(texts, str)
-    _check_words(conditions, formulas, numbers)
+    _check_words(conditions, numbers)
     whole = spec_of(spec)
     require_once(whole, {**texts, "metric": metric})
-    options = numbers.options(conditions=conditions, formulas=formulas)
+    options = numbers.options(conditions=conditions)
     if metric is not None:
         whole, name = with_metric(whole, metric)
         options = replace(options, metric=Path(name))
@@ -94,19 +92,16 @@ def certified(
     *,
     seconds: Fraction | None,
     command: str,
-    told: Callable[[Result], None] | None = None,
     workers: Executor | None = None,
 ) -> Certification:
     """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric.
 
-    `told` hears a verdict that is not `certified` before it is looked for what would be; `workers` share long searches.
+    `workers` share long searches.
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
     with held(workers) as kept:
-        result = pipeline.certify(
-            spec, options, progress, deadline=deadline, advise=True, told=told, workers=kept
-        )
+        result = pipeline.certify(spec, options, progress, deadline=deadline, workers=kept)
     run = {
         "command": command,
         "started": started.isoformat(timespec="seconds"),
@@ -118,10 +113,9 @@ def certified(
     )
 
 
-def _check_words(conditions: str | None, formulas: str, numbers: CertificationNumbers) -> None:
+def _check_words(conditions: str | None, numbers: CertificationNumbers) -> None:
     """Raises `SpecError` for words that mean nothing, and for half of a pair of gains."""
     one_of("conditions", conditions, (*words_of(), ALL))
-    one_of("formulas", formulas, ("corrected", "as-printed"))
     bandwidth, rate = numbers.bandwidth, numbers.adaptation_rate
     if bandwidth is not None and rate is None:
         refuse("bandwidth", str(bandwidth), "bandwidth and adaptation_rate are given together")

@@ -15,7 +15,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.kinds import DISTANCE, HARDWARE
+from tubecert.kinds import DISTANCE
 from tubecert.library import plain
 from tubecert.library.asked import (
     SynthesisNumbers,
@@ -279,9 +279,8 @@ def synthesise(
 
 def options_of(system: Spec, numbers: SynthesisNumbers) -> pipeline.Options:
     """How metrics are compared end to end: by what the specification decides, else by the distance form."""
-    usual = HARDWARE if system.gained else DISTANCE  # of an uncertain B there is no distance form
     options = pipeline.Options(
-        rho_a=numbers.rho_a, epsilon=numbers.epsilon, conditions=system.decides or usual.option
+        rho_a=numbers.rho_a, epsilon=numbers.epsilon, conditions=system.decides or DISTANCE.option
     )
     return options if numbers.budget is None else replace(options, budget=numbers.budget)
 

@@ -11,14 +11,11 @@ from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.numbers import Numbers
 from tubecert.progress import Phase, Progress, Step
-from tubecert.recheck import document
-from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
 from tubecert.report.progress import timed
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
-    from tubecert.export.examined import Answers
     from tubecert.library.certification import Certification
     from tubecert.library.plain import Number
     from tubecert.library.specification import File
@@ -28,14 +25,10 @@ WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided":
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rechecked:
-    """What the second arithmetic says of a certificate: `found` has every claim and its outcome.
-
-    `controller` is what was found of exported code, if a folder of it was given.
-    """
+    """What the second arithmetic says of a certificate: `found` has every claim and its outcome."""
 
     found: Recheck = field(repr=False)
     name: str
-    controller: Answers | None = field(default=None, repr=False)
 
     @property
     def confirmed(self) -> bool:
@@ -68,15 +61,12 @@ class Rechecked:
             [] if failing is None else [("first failing claim", f"{failing.name}: {failing.outcome.why}")]
         )
         details.append(("claims", str(len(self.claims))))
-        if self.controller is not None:
-            details.append(("controller", str(self.controller)))
         return notebook.of_line(str(self), self.name, self.verdict, details)
 
 
 def recheck(
     result: Certification | File,
     *,
-    controller: File | None = None,
     budget: int | None = None,
     deadline: Number | None = None,
     progress: Progress | None = None,
@@ -84,8 +74,7 @@ def recheck(
     """Examines every claim of a certificate, or of the file of one, in ball arithmetic and without a solver.
 
     `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided.
-    `controller`: a folder that `export` wrote, whose code is examined as well.
-    Raises `TubecertError` for what is no certificate, and for code that is not that of the certificate.
+    Raises `TubecertError` for what is no certificate.
     """
     from tubecert.library.plain import number_texts
 
@@ -98,22 +87,11 @@ def recheck(
         text = text_of(name)
     else:
         text, name = result.text, result.name
-    code = None if controller is None else code_in(os.fspath(controller), text, name)
     shown = timed(progress)
     report = None if shown is None else told(shown)
     limit = None if seconds is None else float(seconds)
     found = examined(text, name, BUDGET if most is None else most, report, seconds=limit)
-    return Rechecked(found=found, name=name, controller=code)
-
-
-def code_in(folder: str, text: str, name: str) -> Answers:
-    """What is found of the code in a folder, beside a certificate's text; raises TC711 if it is not that of it."""
-    from tubecert.certificate.file import parse
-    from tubecert.export.examined import examined
-    from tubecert.library.certification import certification_of
-
-    read_certificate(document.read(text, name))
-    return examined(folder, certification_of(parse(text.encode(), name)).certificate, text, name)
+    return Rechecked(found=found, name=name)
 
 
 def text_of(name: str) -> str:

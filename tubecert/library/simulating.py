@@ -50,10 +50,8 @@ def simulate(
     seed: int | None = None,
     replay: int | None = None,
     duration: Number | None = None,
-    control_rate: Number | None = None,
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
-    sample_time: Number | None = None,
     members: int | None = None,
     replan: Number | None = None,
     plan: File | None = None,
@@ -68,10 +66,8 @@ def simulate(
     require_extra()
     texts = number_texts(
         duration=duration,
-        control_rate=control_rate,
         bandwidth=bandwidth,
         adaptation_rate=adaptation_rate,
-        sample_time=sample_time,
         runs=runs,
         seed=seed,
         replay=replay,
@@ -108,16 +104,13 @@ class Wishes:
     """What is asked for, then the specification's section `simulation`, then defaults."""
 
     controllers: tuple[str, ...]
-    defaulted: bool
     gains: str
     runs: int
     seed: int
     replay: int | None
     duration: Fraction | None
-    control_rate: Fraction | None
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
-    sample_time: Fraction | None
     members: int | None
     replan: Fraction | None
     plan: str | None
@@ -139,10 +132,8 @@ class SimulationNumbers:
     epsilon: Fraction | None
     rho_a: Fraction | None
     duration: Fraction | None
-    control_rate: Fraction | None
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
-    sample_time: Fraction | None
     runs: int | None
     seed: int | None
     replay: int | None
@@ -167,10 +158,8 @@ def simulation_numbers(given: Mapping[str, str | None], named: Named) -> Simulat
         epsilon=positive("epsilon"),
         rho_a=positive("rho_a"),
         duration=positive("duration"),
-        control_rate=positive("control_rate"),
         bandwidth=gain("bandwidth"),
         adaptation_rate=gain("adaptation_rate"),
-        sample_time=gain("sample_time"),
         runs=whole("runs"),
         seed=whole("seed"),
         replay=whole("replay"),
@@ -219,16 +208,13 @@ def wishes_of(
     adaptive = KINDS[option].controller
     return Wishes(
         controllers=chosen or default.controllers or ("ccm", adaptive),
-        defaulted=not (chosen or default.controllers),
         gains=option,
         runs=_first(numbers.runs, default.runs, RUNS),
         seed=_first(numbers.seed, default.seed, SEED),
         replay=numbers.replay,
         duration=numbers.duration,
-        control_rate=default.control_rate if numbers.control_rate is None else numbers.control_rate,
         bandwidth=numbers.bandwidth,
         adaptation_rate=numbers.adaptation_rate,
-        sample_time=numbers.sample_time,
         members=numbers.members,
         replan=numbers.replan,
         plan=None if plan is None else os.fspath(plan),
@@ -258,12 +244,9 @@ def campaign_of(
         source=wishes.gains,
         bandwidth=wishes.bandwidth,
         adaptation_rate=wishes.adaptation_rate,
-        sample_time=wishes.sample_time,
     )
-    rate = wishes.control_rate
-    also = ("hardware",) if wishes.defaulted and setting.certified.machine else ()
-    names = dict.fromkeys((*wishes.controllers, *also))
-    loops = [loop_of(setting, cast("Controller", name), choice, rate) for name in names]
+    names = dict.fromkeys(wishes.controllers)
+    loops = [loop_of(setting, cast("Controller", name), choice) for name in names]
     asked = MEMBERS if wishes.members is None else wishes.members
     each = wishes.runs if drawing is None else -(-wishes.runs // asked)
     with told(report):

@@ -166,7 +166,7 @@ def sweep(
         path=whole.path,
         text=whole.source,
         fixed=tuple(Setting(path=path, text=text) for path, text in whole.settings),
-        options=numbers.options(conditions=conditions, formulas="corrected", metric=file),
+        options=numbers.options(conditions=conditions, metric=file),
         folder=Path(os.fspath(folder)).resolve(),
     )
     cluster = None if scheduler is None else cluster_at(scheduler, "scheduler")

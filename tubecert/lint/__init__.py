@@ -23,7 +23,7 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
-from tubecert.lint.codes import CODES
+from tubecert.lint.codes import CODES, LEFT_OUT
 from tubecert.lint.metric import metric_findings
 from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
@@ -41,7 +41,22 @@ def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
             *plan_findings(spec),
             *uncertainty_findings(spec, time, effort),
             *metric_findings(spec),
+            *_left_out(spec),
         ]
     if spec.expect is not None and spec.expect.verdict == "refuted":
         return [replace(item, severity=Severity.NOTE) for item in findings]
     return findings
+
+
+def _left_out(spec: Spec) -> list[Finding]:
+    """What a specification says of its machine that no certificate is about yet."""
+    told = {"hardware": spec.hardware is not None, "system.parameters": bool(spec.gained)}
+    message = {
+        "hardware": "sampling, delay and noise are read, and no part of what is proven",
+        "system.parameters": "parameters known by ranges stand in B, of which nothing is proven",
+    }
+    return [
+        Finding(code=LEFT_OUT, message=message[key], severity=Severity.NOTE, location=spec.location(key))
+        for key, is_told in told.items()
+        if is_told
+    ]

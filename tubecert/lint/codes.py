@@ -30,6 +30,7 @@ OBSTACLE_OUTSIDE: Final = "TC409"
 PLAN_TIME_UNIT: Final = "TC413"
 PLAN_EXCHANGED: Final = "TC414"
 PLAN_BEYOND_LIMITS: Final = "TC415"
+LEFT_OUT: Final = "TC416"
 
 NOTABLE_DEFECT: Final = 0.02  # share of the tube that a plan's defect may take
 
@@ -59,4 +60,5 @@ CODES: Final[Mapping[str, str]] = {
     PLAN_TIME_UNIT: "the times of a plan file seem to be no seconds",
     PLAN_EXCHANGED: "two columns of a plan file seem to be exchanged",
     PLAN_BEYOND_LIMITS: "an input of the plan is beyond the limits",
+    LEFT_OUT: "what is read and no part of what is proven",
 }

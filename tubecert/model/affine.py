@@ -51,7 +51,7 @@ class ControlAffineModel:
     """xdot = f(x) + B(x)(u + h(t, x)) + E(x) w with dual metric W at a rate, all exact.
 
     Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
-    where there is no wind; |w| <= `wind_bound` (None: not given), and |w'| <= `wind_rate` where that is known. Where
+    where there is no wind; |w| <= `wind_bound`, and |w'| <= `wind_rate` where that is known. Where
     `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
     `gained`, B(x, theta) (n, m), in place of B, if that is not empty. `time`: the range of t in f(t, x), None if f is
     free of t. `outputs`: linear combinations of the states whose half-widths are told.

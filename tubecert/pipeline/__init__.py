@@ -9,12 +9,9 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `counting` | how many claims of how many are done |
 | `gaps` | how closely each constant is enclosed, where its effect decides |
 | `reasons` | why a verdict about gains is what it is |
-| `advice`, `levers` | which value of which knob would certify |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
 | `written` | that metric as its file holds it |
-| `design`, `trade`, `width` | the narrowest tube, what a tube asks of a machine |
-| `sensitivities` | what a better machine would make of the narrowest tube |
-| `metric_search`, `joint` | a metric for a machine: constant, and one that moves |
+| `width` | how wide a tube is, to compare metrics by |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 
@@ -31,9 +28,8 @@ from tubecert.executor import Executor
 from tubecert.findings import Severity
 from tubecert.metric.verify import Proofs
 from tubecert.model import domain_findings
-from tubecert.pipeline.advice import Ledger, advised
 from tubecert.pipeline.certification import answer, result
-from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, moving_drift, not_covered
+from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, moving_drift
 from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
 from tubecert.progress import Progress
@@ -65,24 +61,18 @@ def certify(
     memory: Memory | None = None,
     *,
     deadline: Deadline | None = None,
-    advise: bool = False,
-    told: Callable[[Result], None] | None = None,
     workers: Executor | None = None,
     brief: bool = False,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
     With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
-    a metric that is looked for is by then the best that was found. With `advise`, what would certify is looked for
-    where the verdict is another; `told` hears the verdict before. `workers` search parts of long suprema: what comes
+    a metric that is looked for is by then the best that was found. `workers` search parts of long suprema: what comes
     out does not depend on them. `brief`: the verdict, and the gains of what decides; no curves, no other kinds, and
     nothing that explains.
     """
-    ledger = Ledger(progress)
-    question = replace(question_of(spec, options, ledger, memory), workers=workers, brief=brief)
-    end = _end(question, deadline)
-    found = result(end)
-    return advised(found, end, ledger, question_of, told) if advise else found
+    question = replace(question_of(spec, options, progress, memory), workers=workers, brief=brief)
+    return result(_end(question, deadline))
 
 
 def _end(question: Question, deadline: Deadline | None) -> Stage | Stopped:
@@ -110,7 +100,7 @@ def question_of(
     """The question that options make of a specification; raises `SpecError` if it is meaningless."""
     spec = overridden(spec, options)
     findings, time = time_of(spec)
-    findings += [*missing_parts(spec), *not_covered(spec, options.conditions)]
+    findings += missing_parts(spec)
     if not findings:
         findings = domain_findings(spec, time, Effort(budget=options.budget))
     if any(item.severity is Severity.ERROR for item in findings):

@@ -14,17 +14,16 @@ from tubecert.claims.family import Claim
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
-from tubecert.kinds import DISTANCE, HARDWARE
+from tubecert.kinds import DISTANCE
 from tubecert.kinds.data import Pair, SectionData
-from tubecert.kinds.hardware import HardwareData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
-from tubecert.pipeline.width import Measure, measure_of, need_of
+from tubecert.pipeline.width import Measure
 from tubecert.search.proposers import LEAST, PROPOSERS, Explained
-from tubecert.stages.bounded import Enclosed, enclose, half_widths, unmet, with_machine
+from tubecert.stages.bounded import Enclosed, enclose, half_widths, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
@@ -66,19 +65,17 @@ def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> 
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
     distance = by_key[DISTANCE.key]
     least = distance.at(LEAST)
-    machine, measure = machine_section(question, end), outputs or measure_of(question.spec)
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
         served=distance.verdict is Verdict.CERTIFIED,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
-        width=None if outputs is None else outputs.of(half_widths(end.enclosed), None),
+        width=None if outputs is None else outputs.of(half_widths(end.enclosed)),
         ultimate_radius=distance.judgement.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
-        demand=_demand(decisive, problem) if machine is None else need_of(machine, measure),
-        by_machine=machine is not None,
+        demand=_demand(decisive, problem),
     )
 
 
@@ -98,7 +95,7 @@ def _judged(question: Question, enclosed: Enclosed) -> Ending:
     options = question.options
     asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=False)
     keys = deciding(question)
-    problem = with_machine(enclosed) if HARDWARE.key in keys else enclosed.problem
+    problem = enclosed.problem
     sections = {
         key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
         for key in dict.fromkeys([*keys, DISTANCE.key])
@@ -117,16 +114,8 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def machine_section(question: Question, end: Ending) -> HardwareData | None:
-    """The section of certificate H, if that alone is what decides."""
-    if deciding(question) != (HARDWARE.key,) or not end.sections:
-        return None
-    found = next(section for section in end.sections if section.name is HARDWARE).data()
-    return found if isinstance(found, HardwareData) else None
-
-
 def _demand(pair: Pair | None, problem: TubeProblem) -> float:
-    """What a kind asks of the computer that adapts: Gamma |B|^2, or the sampling frequency; else the tube.
+    """What a kind asks of the computer that adapts: Gamma |B|^2; else the tube.
 
     In a tube of its own coordinates Gamma is of these, and they are of the metric: |B|^2 in them makes it comparable.
     """
@@ -134,4 +123,4 @@ def _demand(pair: Pair | None, problem: TubeProblem) -> float:
         return inf
     if pair.adaptation_rate is not None:
         return float(pair.adaptation_rate) * problem.constants.B.above**2
-    return float(problem.rho) if pair.sample_time is None else 1 / float(pair.sample_time)
+    return float(problem.rho)

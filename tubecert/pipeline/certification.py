@@ -11,22 +11,17 @@ from typing import Any
 import numpy as np
 
 from tubecert.certificate.result import Result
-from tubecert.claims.advice import MendPlan, TakeWindows
+from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Reason
-from tubecert.claims.gains import ConditionHolds
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
-from tubecert.kinds import HARDWARE, RATES
-from tubecert.kinds.table import kind_of, kinds_of
+from tubecert.kinds.table import KINDS, kind_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
-from tubecert.pipeline.windows import windowed
 from tubecert.search.coordinates import Wish, propose
-from tubecert.search.machines import PARTS
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
-from tubecert.spec.windows import more_windows
 from tubecert.stages.bounded import Bounded, bound
 from tubecert.stages.judged import Judged, deciding, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
@@ -36,13 +31,6 @@ from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tub
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
 
-_OF_THE_WHOLE = (
-    "initial_distance",
-    "bounded",
-    "wind_bound",
-    "gain_unmatched",
-    "gain_range",
-)  # windows do not help
 NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
 
 
@@ -54,7 +42,6 @@ def answer(question: Question) -> Stage | Stopped:
         tube,
         enclosed,
         bound,
-        _windowed,
         judge,
     )
     stage: Stage | Stopped = question
@@ -103,7 +90,6 @@ def tube(planned: Planned) -> TubeFound | Stopped:
         within=float(spec.within or 0),
         box=np.array(spec.safe_set, dtype=float),
         outputs=np.array([output.row for output in spec.outputs], dtype=float).reshape(-1, len(spec.states)),
-        fits=HARDWARE.key not in deciding(question),  # H has a level of its own in the tube
     )
     return find_tube(planned, propose(question.model, planned.plan, wish))
 
@@ -118,46 +104,17 @@ def judge(bounded: Bounded) -> Judged:
             continue
         tell_gains(bounded.question, recipe)
         proposals[recipe] = each.propose(problem, asked)
-    if bounded.machine is None or bounded.machine.asked.arithmetic is None:
-        return judge_all(bounded, proposals)
-    from tubecert.pipeline.rounding import rounded  # the exporter, only where it is needed
-
-    return judge_all(bounded, rounded(bounded, bounded.machine, proposals, asked))
-
-
-def _windowed(bounded: Bounded) -> Bounded:
-    return windowed(bounded, _asked(bounded.question))
+    return judge_all(bounded, proposals)
 
 
 def explain(judged: Judged) -> Explanation:
     """What the gains depend on, and why the verdict is what it is."""
-    problem, printed = judged.bounded.problem, [RATES.key] if judged.as_printed else []
-    explained = {
-        kind.key: _explained(judged, kind.key, PROPOSERS[kind.theorem.recipe]) for kind in kinds_of(problem)
-    }
-    told = [
-        reason
-        for key in dict.fromkeys([*printed, *judged.deciding])
-        for reason in reasons(judged.sections[key], explained[key])
-    ]
-    told = [_in_windows(judged, reason) for reason in told]
+    explained = {kind.key: _explained(judged, kind.key, PROPOSERS[kind.theorem.recipe]) for kind in KINDS}
+    told = [reason for key in judged.deciding for reason in reasons(judged.sections[key], explained[key])]
     return Explanation(
         reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded), *input_reasons(judged)],
         elasticities={key: _told(each.slopes) for key, each in explained.items() if each.slopes is not None},
     )
-
-
-def _in_windows(judged: Judged, reason: Reason) -> Reason:
-    """Where certificate H is not proven, and the plan has parts, that it might be in windows."""
-    claim, windows = reason.claim, more_windows(judged.question.spec)
-    of_machine = (
-        isinstance(claim, ConditionHolds)
-        and claim.section == HARDWARE.key
-        and claim.condition not in _OF_THE_WHOLE
-    )
-    if reason.verdict is Verdict.CERTIFIED or not of_machine or windows is None:
-        return reason
-    return replace(reason, relax=(*reason.relax, TakeWindows(windows=windows)))
 
 
 def _told(slopes: Mapping[str, float]) -> dict[str, float]:
@@ -166,18 +123,16 @@ def _told(slopes: Mapping[str, float]) -> dict[str, float]:
 
 
 def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:
-    """What explains the section of a kind; other machines are looked for where they are the question."""
-    if judged.question.brief or (proposer.machine and key not in judged.deciding):
+    """What explains the section of a kind."""
+    if judged.question.brief:
         return Explained()
-    spec, section = judged.question.spec, judged.sections[key]
-    adapted = spec.disturbance is not None and spec.disturbance.rate is not None
-    parts = [part for part in PARTS if not (adapted and part == "wind")]
+    section = judged.sections[key]
 
     def at(role: str) -> object:
         found = section.at(role)
         return None if found is None else found.recipe
 
-    return proposer.explain(judged.bounded.problem, at, parts)
+    return proposer.explain(judged.bounded.problem, at)
 
 
 def _asked(question: Question) -> Asked:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.findings import Finding, Location, Severity
-from tubecert.letters import ALL, HARDWARE, name_of
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
@@ -53,19 +52,6 @@ def missing_parts(spec: Spec) -> list[Finding]:
         remedy = f"`tubecert synth {spec.path}` finds one; then add --metric {found}. Or {remedy}"
     has_none = spec.metric is None and spec.synthesis is None
     return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]
-
-
-def not_covered(spec: Spec, conditions: str | None) -> list[Finding]:
-    """A kind that is asked to decide, and is not stated for an uncertain B; `conditions` stands for the file's."""
-    asked = conditions or spec.decides
-    if not spec.gained or asked is None or asked == ALL or name_of(asked) is HARDWARE:
-        return []
-    where = "system.B" if conditions else "conditions.decides"
-    message = (
-        "a parameter known by a range stands in B, and a certificate decides that is stated for a known B"
-    )
-    help = "let certificate H decide: conditions: {decides: hardware}, or --conditions hardware"
-    return [Finding(code="TC112", message=message, location=spec.location(where), help=help)]
 
 
 def moving_drift(spec: Spec) -> list[Finding]:

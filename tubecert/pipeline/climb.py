@@ -155,8 +155,7 @@ class Climb:
             return RateLimit(rate=rate, cause="overshoot" if _overshoots(row) else "gains")
         if row.idle:
             return RateLimit(rate=rate, cause="idle")
-        alike = row.verdict is best.verdict or not best.by_machine
-        factor = row.demand / best.demand if alike and 0 < best.demand < inf else None
+        factor = row.demand / best.demand if 0 < best.demand < inf else None
         if rate < best.rate:
             return RateLimit(rate=rate, cause="distance", factor=factor)
         grown = (row.input_gain or 0) * (best.rho or 0) > (best.input_gain or inf) * (row.rho or inf)

@@ -20,21 +20,14 @@ _FIRST: Final = ("lower", "upper", "h_x", "h", "h_t", "h_initial", "plan_defect"
 _SOUGHT: Final = (name for name in TABLE if name not in (*_FIRST, "initial_distance"))  # which has no search
 # in the order in which they are bounded; one that is zero, or declared, is not looked for
 _TUBE: Final = (*_FIRST, *_SOUGHT, "geodesics")
-_MACHINE: Final = (
-    *("feedback_slope", "feedback_curvature", "plan_tilt", "plan_speed", "input_rate", "drift_difference"),
-    *("drift_slope_metric", "drift_explained", "feedback_drift", "drift_rate"),
-    *("noise_size", "noise_metric", "noise_explained"),
-    *("drift_slope", "form_slope", "input_slope", "input_gain", "drift_metric", "curvature"),
-)
 
 
 @dataclass(slots=True)
 class Claims:
-    """Adds to every step how many claims are done, of all; None of all where windows are tried until they serve."""
+    """Adds to every step how many claims are done, of all."""
 
     shown: Progress
     names: tuple[str, ...]
-    known: bool = True
     done: int = field(default=0)
 
     def __call__(self, step: Step) -> None:
@@ -42,23 +35,21 @@ class Claims:
         name = PLAN if step.phase is Phase.PLAN else step.name
         if name in self.names:
             self.done = max(self.done, self.names.index(name))
-        self.shown(replace(step, done=self.done, of=len(self.names) if self.known else None))
+        self.shown(replace(step, done=self.done, of=len(self.names)))
 
 
 def counted(question: Question) -> Question:
     """The question with a progress that counts claims."""
     if question.progress is None:
         return question
-    claims = Claims(question.progress, claims_of(question.spec), known=question.spec.tube.windows is None)
-    return replace(question, progress=claims)
+    return replace(question, progress=Claims(question.progress, claims_of(question.spec)))
 
 
 def claims_of(spec: Spec) -> tuple[str, ...]:
     """What is proven in a certification, in its order, by the names that progress is told with."""
     widths = tuple(f"half width of {name}" for name in spec.states)
     limits = tuple(f"range of {name}" for name, _ in spec.limits)
-    machine = _MACHINE if spec.hardware is not None else ()
-    return (METRIC, PLAN, *_TUBE, *widths, *machine, *limits, *(kind.key for kind in KINDS))
+    return (METRIC, PLAN, *_TUBE, *widths, *limits, *(kind.key for kind in KINDS))
 
 
 def tell_gains(question: Question, recipe: type) -> None:

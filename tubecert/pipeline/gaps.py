@@ -16,17 +16,14 @@ from math import inf, isfinite, log, sqrt
 from typing import Final, TypeVar
 
 from tubecert.bounds.constants import TABLE, WIND, Constant
-from tubecert.bounds.machines import COVARIANT, HARDWARE
 from tubecert.conditions.alone import supremum
 from tubecert.conditions.decimals import round_down
-from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
-from tubecert.kinds import HARDWARE as KIND_H
 from tubecert.kinds.table import kind_of
 from tubecert.search.proposers import PROPOSERS
 from tubecert.search.scan import serves
-from tubecert.stages.bounded import Enclosed, enclose, unmet, with_machine
+from tubecert.stages.bounded import Enclosed, enclose, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.question import Question
 from tubecert.stages.tube import TubeFound
@@ -39,34 +36,23 @@ _CLOSER: Final = (3, 30)  # times, in one round
 _ROUNDS: Final = 12
 _AIM: Final = 0.9  # of what is left to gain
 _MOVED: Final = 0.1  # of what a constant was to come down by: with less, it is as low as it gets
-_SURE: Final = frozenset(  # close in any case, or known with the geodesics
-    {"lower", "upper", "initial_distance", "feedback_slope", "noise_metric", "symbols", "symbols_slope"}
-)
+_SURE: Final = frozenset({"lower", "upper", "initial_distance"})  # close in any case
 _OF_LIMITS: Final = frozenset(
     {"h", "feedback_gain"}
 )  # what inputs with limits are judged by beside the gains
-_MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
-    "drift_explained": ("drift_explained", "B_pinv", "f_x"),
-    "drift_rate": ("drift_rate", "B_pinv"),
-    "drift_difference_metric": ("drift_difference_metric", "drift_slope_metric"),
-    "plan_speed": ("plan_speed", "plan_defect"),
-}
 
 
 def enclosed(tube: TubeFound) -> Enclosed:
-    """Every constant over the tube: to the gap of the question, or each by its effect where that is asked for.
-
-    Windows of time have constants of their own, to the gap of the question; so has the tube around them.
-    """
+    """Every constant over the tube: to the gap of the question, or each by its effect where that is asked for."""
     question = tube.question
-    if not question.by_effect or question.spec.tube.windows is not None:
+    if not question.by_effect:
         return enclose(tube)
     return _refined(tube, log(1 + float(question.options.gap)) / 2)  # digits that are printed take the rest
 
 
 def _refined(tube: TubeFound, tolerance: float) -> Enclosed:
     spec = tube.question.spec
-    names = {*TABLE, *WIND, *HARDWARE, *COVARIANT} - _SURE - (_OF_LIMITS if spec.limits else set())
+    names = {*TABLE, *WIND} - _SURE - (_OF_LIMITS if spec.limits else set())
     gaps, fixed = dict.fromkeys(sorted(names), _COARSE), frozenset[str]()
     found = enclose(tube, gaps)
     for _ in range(_ROUNDS):
@@ -87,8 +73,7 @@ class _Known:
 
     def __init__(self, found: Enclosed, gaps: Mapping[str, Fraction], fixed: frozenset[str]) -> None:
         self.question, self.gaps, self.work = found.question, gaps, Counter(found.work)
-        self.by_machine = KIND_H.key in deciding(self.question)
-        self.problem = with_machine(found) if self.by_machine else found.problem
+        self.problem = found.problem
         self.falls_short = False  # whether there are no gains, and would be some with closer constants
         self.constants = {
             name: value for name, value in _constants(self.problem) if name in gaps and name not in fixed
@@ -104,14 +89,14 @@ class _Known:
         self.falls_short = all(map(isfinite, best)) and not all(map(isfinite, now))
         if not least or not all(map(isfinite, best)) or _apart(now, best) <= tolerance:
             return {}
-        if self.by_machine or not all(map(isfinite, now)):  # of a machine, each effect takes a second
+        if not all(map(isfinite, now)):
             return self._all_closer(least)
         effects = {
             name: _apart(now, _sizes(_lowered(self.problem, {name: low}), self.question))
             for name, low in least.items()
         }
         wanted = self._shared({name: effect for name, effect in effects.items() if effect > 0}, tolerance)
-        return {part: gap for name, own in wanted.items() for part, gap in self._to_gap(name, own)}
+        return self._to_gaps(wanted)
 
     def _shared(self, effects: Mapping[str, float], tolerance: float) -> dict[str, float]:
         """Gaps whose effects are the tolerance together, for about the least work; those that need not change left out.
@@ -137,10 +122,8 @@ class _Known:
 
     def least(self, name: str) -> float:
         """What a constant may come down to."""
-        value, gap = self.constants[name], 1.0
-        for part in _MADE_OF.get(name, (name,)):
-            gap *= 1 + float(self.gaps[part])
-        return max(value.below, value.above / gap) if isfinite(value.above) else value.above
+        value = self.constants[name]
+        return max(value.below, value.above / (1 + float(self.gaps[name]))) if isfinite(value.above) else inf
 
     def settled_in(self, then: _Known, closer: Mapping[str, Fraction]) -> frozenset[str]:
         """The constants that are as close as they get: they have not moved, or not as far as they were to."""
@@ -166,29 +149,23 @@ class _Known:
         return value.above / value.below - 1
 
     def _all_closer(self, least: Mapping[str, float]) -> dict[str, Fraction]:
-        wanted = {
-            part: gap
-            for name in least
-            for part, gap in self._to_gap(name, float(self.gaps[name]) / _CLOSER[1])
-        }
+        wanted = self._to_gaps({name: float(self.gaps[name]) / _CLOSER[1] for name in least})
         return {name: gap for name, gap in wanted.items() if gap >= _LEAST_UNDECIDED}
 
-    def _to_gap(self, name: str, gap: float) -> Iterator[tuple[str, Fraction]]:
-        """The gaps of a constant and of what it is made of, to come to one of about this size."""
-        for part in _MADE_OF.get(name, (name,)):
-            own = min(float(self.gaps[part]), self._reached(part))
+    def _to_gaps(self, wanted: Mapping[str, float]) -> dict[str, Fraction]:
+        """Gaps of about these sizes, each closer than what is known by a factor of `_CLOSER`."""
+        found = {}
+        for name, gap in wanted.items():
+            own = min(float(self.gaps[name]), self._reached(name))
             if own > _CLOSER[0] * _LEAST:
-                yield part, max(round_down(min(max(gap, own / _CLOSER[1]), own / _CLOSER[0]), 2), _LEAST)
+                found[name] = max(round_down(min(max(gap, own / _CLOSER[1]), own / _CLOSER[0]), 2), _LEAST)
+        return found
 
 
 def _constants(problem: TubeProblem) -> Iterator[tuple[str, Constant]]:
     """Every constant of a problem that is a supremum, by name."""
     yield from ((name, value) for name, value, _ in problem.constants.items() if TABLE[name].side == "above")
     yield from ((name, value) for name, value, _ in problem.beside())
-    if problem.machine is not None:
-        yield from ((name, value) for name, value, _ in problem.machine.constants.items())
-        bent = problem.machine.covariant
-        yield from () if bent is None else ((name, value) for name, value, _ in bent.items())
 
 
 def _lowered(problem: TubeProblem, least: Mapping[str, float]) -> TubeProblem:
@@ -205,26 +182,17 @@ def _lowered(problem: TubeProblem, least: Mapping[str, float]) -> TubeProblem:
     def beside(record: R, prefix: str) -> R:
         return of(record, [name.removeprefix(prefix) for name in WIND if name.startswith(prefix)], prefix)
 
-    machine, wind, residual, gain = problem.machine, problem.wind, problem.residual, problem.gain
-    if machine is not None:
-        bent = machine.covariant
-        machine = replace(
-            machine,
-            constants=of(machine.constants, HARDWARE),
-            covariant=None if bent is None else of(bent, COVARIANT),
-        )
+    wind, residual = problem.wind, problem.residual
     return replace(
         problem,
         constants=of(problem.constants, TABLE),
         wind=None if wind is None else replace(wind, constants=beside(wind.constants, "wind_")),
         residual=None if residual is None else beside(residual, "residual_"),
-        gain=None if gain is None else beside(gain, "gain_"),
-        machine=machine,
     )
 
 
 def _sizes(problem: TubeProblem, question: Question) -> tuple[float, ...]:
-    """What is to be small, of each kind that decides: gains, the sampling frequency, or the level that is reached."""
+    """What is to be small, of each kind that decides: gains, or the distance that is reached."""
     options = question.options
     asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=False)
     return tuple(size for key in deciding(question) for size in _sizes_of(problem, key, asked))
@@ -235,17 +203,8 @@ def _sizes_of(problem: TubeProblem, key: str, asked: Asked) -> tuple[float, ...]
     recipe = PROPOSERS[theorem.recipe].propose(problem, asked).decisive
     if recipe is None or not serves(problem, recipe):
         return (inf,)
-    if isinstance(recipe, HardwareRecipe):
-        largest = None if problem.machine is None else problem.machine.asked.largest
-        searched = {"sample_time": recipe.sample_time, "delay": recipe.delay, "noise": recipe.noise}
-        most = float(searched.get(largest or "", recipe.wind if largest == "wind" else Fraction(1)))
-        return float(recipe.level), 1 / most if most > 0 else inf
-    gains = (
-        float(getattr(recipe, name)) for name in ("bandwidth", "adaptation_rate") if hasattr(recipe, name)
-    )
-    time = getattr(recipe, "sample_time", None)
-    found = (*gains, *(() if time is None else (1 / float(time),)))
-    return found or (float(supremum(problem.floats())),)
+    names = [name for name in ("bandwidth", "adaptation_rate") if hasattr(recipe, name)]
+    return tuple(float(getattr(recipe, name)) for name in names) or (float(supremum(problem.floats())),)
 
 
 def _apart(now: tuple[float, ...], best: tuple[float, ...]) -> float:

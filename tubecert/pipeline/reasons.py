@@ -6,7 +6,6 @@ Out: the `Reason`s of a certificate.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from typing import Any
@@ -14,11 +13,8 @@ from typing import Any
 import numpy as np
 
 from tubecert.claims.advice import (
-    EaseHardware,
     HalveConstant,
-    HalveHardware,
     LeavePlanRoom,
-    LessenCause,
     RaiseBudget,
     ReduceRadii,
     ShrinkTube,
@@ -35,7 +31,7 @@ from tubecert.search.proposers import Explained
 from tubecert.stages.bounded import Bounded, Cleared
 from tubecert.stages.judged import Judged
 
-_OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
+_OF_PREDICTOR = ("26c", "distance")  # conditions that another predictor may satisfy
 _NOTABLE = 0.995  # a factor above it is not worth a word
 
 UNBOUNDED_RELAX: tuple[Relax, ...] = (RaiseBudget(), ShrinkTube())
@@ -45,10 +41,7 @@ def reasons(section: Section[Any], explained: Explained) -> list[Reason]:
     """Reasons of one kind: what its gains leave, or what is missing."""
     if section.verdict is Verdict.CERTIFIED:
         return [_certified(section, explained)]
-    easier = tuple(EaseHardware(part=part, value=value) for part, value in explained.eased.items())
-    short = _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
-    fills = tuple(LessenCause(cause=cause, share=share) for cause, share in explained.filled.items())
-    return [replace(short[0], relax=(*short[0].relax, *easier, *fills)), *short[1:]]
+    return _short(section.name.key, section.verdict, section.shortfalls, section.predictor_gain)
 
 
 def obstacle_reasons(bounded: Bounded) -> list[Reason]:
@@ -127,11 +120,8 @@ def _excess(own: LimitedInput, bound: InputBound) -> Fraction:
 
 
 def _certified(section: Section[Any], explained: Explained) -> Reason:
-    relax: tuple[Relax, ...] = (
-        *(HalveConstant(constant=name, factor=x) for name, x in explained.halved.items() if x < _NOTABLE),
-        *(HalveHardware(part=part, factor=x) for part, x in explained.halved_parts.items() if x < _NOTABLE),
-    )
-    return Reason(claim=section.claim(), verdict=section.verdict, relax=relax)
+    helps = [HalveConstant(constant=name, factor=x) for name, x in explained.halved.items() if x < _NOTABLE]
+    return Reason(claim=section.claim(), verdict=section.verdict, relax=tuple(helps))
 
 
 def _short(

@@ -38,7 +38,6 @@ from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
-from tubecert.letters import HARDWARE
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row
@@ -47,13 +46,9 @@ from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.pipeline.unfound import (
-    closest,
     equilibria,
-    lacking,
-    nearest,
     none_certified,
     remedies,
-    serving,
     tried,
 )
 from tubecert.pipeline.width import half_widths, measure_in
@@ -75,7 +70,6 @@ from tubecert.verdict import Verdict
 
 _RATES = 5  # of a table
 _GAP = Fraction(1, 5)  # to which constants are known where metrics are compared
-_GAP_OF_MACHINE = Fraction(1, 20)  # where they enter squared
 _BOXES = 100_000  # and what each claim may cost there
 
 Ask = Callable[[Spec, Options, Progress, Memory], Question]
@@ -271,15 +265,10 @@ class SynthesisRun:
         """How closely a metric is judged that is to be compared."""
         return replace(
             self.options,
-            gap=max(self.options.gap, _GAP_OF_MACHINE if self._by_machine else _GAP),
+            gap=max(self.options.gap, _GAP),
             budget=min(self.options.budget, _BOXES),
             metric=None,
         )
-
-    @property
-    def _by_machine(self) -> bool:
-        """Whether certificate H decides."""
-        return (self.options.conditions or self.spec.decides) in (HARDWARE.option, HARDWARE.key)
 
     @property
     def _watch(self) -> Progress:
@@ -349,25 +338,9 @@ class SynthesisRun:
         )
 
     def _none(self, failure: NoneCertified) -> Synthesised:
-        """Why none of the metrics certifies, first as it stands, then with what would, for the one that is nearest."""
+        """Why none of the metrics certifies."""
         small = isinstance(failure.slow, TubeInSafeSet)
-        found = self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
-        rows = self.rows.values()
-        by_machine = nearest(rows)
-        near = None if self.cut is not None else by_machine or closest(rows)
-        if near is None or found.reason is None:
-            return found
-        if self.told is not None:
-            self.told(found)
-        spec = read_back(self.spec, near.metric)
-
-        def asked(progress: Progress) -> Question:
-            return self.ask(spec, self._judging(), progress, self.memory)
-
-        machine = by_machine is not None
-        helps = lacking(asked(self._watch)) if machine else serving(asked, self.ask, self._watch)
-        reason = replace(found.reason, relax=(*found.reason.relax, *helps))
-        return replace(found, reason=reason)
+        return self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""

@@ -31,9 +31,8 @@ class Row:
 
     `verdict` is that of the kinds that decide, `claim` what failed; `served`: certificate B holds, whatever decides.
     `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form. `bandwidth` and
-    `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate or sampling frequency;
-    or, `by_machine`, how wide the tube is that certificate H proves, or by how much it does not. `width`: of the tube
-    in the outputs that were asked for; None: its radius counts.
+    `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate. `width`: of the tube in
+    the outputs that were asked for; None: its radius counts.
     """
 
     rate: Fraction
@@ -50,7 +49,6 @@ class Row:
     adaptation_rate: float | None = None
     bandwidth: float | None = None
     demand: float = inf
-    by_machine: bool = False
     metric: VerifiedMetric = field(repr=False)
 
     @property
@@ -61,7 +59,7 @@ class Row:
     @property
     def idle(self) -> bool:
         """Whether the filter that it needs is slower than its own contraction: what is gained beyond is not needed."""
-        return not self.by_machine and self.bandwidth is not None and self.bandwidth < self.rate
+        return self.bandwidth is not None and self.bandwidth < self.rate
 
     @property
     def far(self) -> bool:
@@ -71,8 +69,6 @@ class Row:
     def score(self, objective: str) -> tuple[float, ...]:
         """Smaller is better: certified, then by B alone, then not at all."""
         rank = 0 if self.verdict is Verdict.CERTIFIED else 1 if self.served else 2
-        if self.by_machine:
-            return (rank, self.demand, self.condition_number)
         if objective == "tube":
             size = self.rho if self.width is None else self.width
             # a slower metric has to be worth it

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
-from math import inf
 
 from tubecert.claims.advice import (
     AskForRateUpTo,
     HigherDegree,
     LowerRate,
-    NoKnobAlone,
     RaiseBudget,
     ShrinkSafeSet,
-    TurnKnob,
 )
 from tubecert.claims.failures import (
     NoneCertified,
     NothingFound,
 )
 from tubecert.claims.family import Relax
-from tubecert.claims.gains import ConditionHolds
-from tubecert.pipeline.advice import Ask, Ledger, advised
-from tubecert.pipeline.certification import answer, explain, result
-from tubecert.pipeline.deadline import OutOfTime
 from tubecert.pipeline.synthesised import Row
-from tubecert.progress import Progress
 from tubecert.spec import Spec
-from tubecert.stages.judged import Judged
-from tubecert.stages.question import Question
 from tubecert.synthesis.attempts import Attempt
 from tubecert.synthesis.family import suggested
 from tubecert.synthesis.ladder import Ladder
@@ -53,49 +43,6 @@ def none_certified(rows: Sequence[Row]) -> NoneCertified | None:
         slow_verdict=slow.verdict or Verdict.UNDECIDED,
         fast=fast_claim,
         fast_verdict=fast.verdict or Verdict.UNDECIDED,
-    )
-
-
-def nearest(rows: Iterable[Row]) -> Row | None:
-    """The metric with which a machine's loop comes nearest to a proof; None where certificate H does not decide."""
-    return min((row for row in rows if row.by_machine), key=lambda row: row.demand, default=None)
-
-
-def lacking(question: Question) -> tuple[Relax, ...]:
-    """What fills the level of a loop, and machines that would serve with its metric; nothing if time is up."""
-    try:
-        end = answer(question)
-    except OutOfTime:
-        return ()
-    return explain(end).reasons[0].relax if isinstance(end, Judged) else ()
-
-
-def closest(rows: Iterable[Row]) -> Row | None:
-    """The metric whose condition is missed by least; None where none says by how much."""
-    return max((row for row in rows if _margin(row) > -inf), key=_margin, default=None)
-
-
-def _margin(row: Row) -> float:
-    """What is left of the condition that fails, a share of what is allowed."""
-    claim = row.claim
-    if row.floor != "identity" or not isinstance(claim, ConditionHolds) or claim.margin is None:
-        return -inf
-    return -inf if claim.margin.below is None else claim.margin.below
-
-
-def serving(questioned: Callable[[Progress], Question], ask: Ask, told: Progress) -> tuple[Relax, ...]:
-    """What would certify with a metric, in numbers; nothing if time is up. Other rates have been tried."""
-    ledger = Ledger(told)
-    try:
-        end = answer(questioned(ledger))
-        found = advised(result(end), end, ledger, ask)
-    except OutOfTime:
-        return ()
-    relax = () if found.reason is None else found.reason.relax
-    return tuple(
-        each
-        for each in relax
-        if isinstance(each, NoKnobAlone) or (isinstance(each, TurnKnob) and each.knob != "rate")
     )
 
 

@@ -20,11 +20,8 @@ formula or rounding in the producer must not pass both.
 | `plans`, `enclosures`, `reasons`, `orientation` | their parts |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
-| `wind`, `machine` | claims about a disturbance, and about what certificate H needs to know |
-| `turning`, `relative`, `noise`, `clipping` | its parts |
-| `named` | any constant by its name, for a part of the plan |
-| `filtering`, `predictor`, `conditions`, `sampling`, `digital` | the theorems A, B, C and H at printed numbers |
-| `along`, `legs` | theorem HW: H in windows of the plan; theorems BW and CW: B and C |
+| `wind`, `unknown` | claims about a disturbance, and about parameters of which ranges are known |
+| `filtering`, `predictor`, `conditions` | the theorems A and B at printed numbers |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import (
-    covariant,
-    gains,
-    machine,
-    unknown,
-)
+from tubecert.recheck import unknown
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
@@ -23,7 +18,6 @@ from tubecert.recheck.document import digest
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.examination import SHARP
 from tubecert.recheck.place import Place
-from tubecert.recheck.recipe import Bent, MachineNumbers
 from tubecert.recheck.result import INFIMA, MEASURED, MetricSection, Result, Sections, TubeSection
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.terms import all_zero
@@ -100,7 +94,6 @@ class Case:
                 self._wind,
                 turns=not all(map(all_zero, self.place.fields.slopes(self.system.B))),
                 rest=rest[1],
-                gain=None if self.system.gained is None else self._ball(gains.CONSTANTS[0]),
             )
 
     @property
@@ -110,34 +103,7 @@ class Case:
         if wind is None:
             return None
         push, size, explained = (self._ball(name) for name in disturbed.CONSTANTS)
-        return WindNumbers(push, size, explained, None if wind.bound is None else exact(wind.bound))
-
-    @cached_property
-    def machine(self) -> MachineNumbers | None:
-        """The constants of a machine on their safe sides, if there is one."""
-        if self.result.specification.hardware is None:
-            return None
-        with ctx.workprec(SHARP):
-            own = {
-                item.name: self._ball(item.name)
-                for item in fields(MachineNumbers)
-                if item.name in self.constants
-            }
-        absent: dict[str, Ball | None] = dict.fromkeys(
-            (*machine.OF_CONSTANT_METRICS, *machine.OF_HELD_INPUTS, *machine.OF_MOVING)
-        )
-        if "input_rate" in self.constants and self.bound_if_any("input_rate") is None:
-            del own["input_rate"]  # u* jumps
-        return MachineNumbers(**(absent | own), bent=self._bent)  # type: ignore[arg-type]
-
-    @property
-    def _bent(self) -> Bent | None:
-        """The constants of a metric that is not constant, if they are stated and each has a bound."""
-        if any(
-            self.constants.get(name) is None or self.bound_if_any(name) is None for name in covariant.NAMES
-        ):
-            return None
-        return Bent(**{name: self._ball(name) for name in covariant.NAMES})
+        return WindNumbers(push, size, explained, exact(wind.bound))
 
     def _ball(self, name: str) -> Ball:
         """The upper end of a constant, not a number where it has none."""
@@ -175,6 +141,5 @@ class Case:
     @cached_property
     def numbers(self) -> tuple[object, ...]:
         """What every claim about gains depends on."""
-        # the defect in |.| is for certificate H alone
-        used = (*USED, "plan_defect", *(name for name in self.constants if name not in MEASURED))
+        used = (*USED, *(name for name in self.constants if name not in MEASURED))
         return *self.whole, self.place.rho, self.tube.rho_a, *(self.bound_if_any(name) for name in used)

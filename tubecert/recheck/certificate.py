@@ -8,17 +8,17 @@ verified.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from tubecert.recheck import covariant, gains, machine, unknown, wind
+from tubecert.recheck import unknown, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
-from tubecert.recheck.kinds.kind import VERDICTS, Kind
+from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.obstacles import read_cleared
 from tubecert.recheck.orientation import elasticities, run, synthesis
@@ -59,7 +59,6 @@ def read_result(node: Node) -> Result:
     """`result`; one that says `certified` must have every section."""
     own = node.closed(
         "verdict",
-        "formulas",
         "spec",
         "claim",
         "overrides",
@@ -91,17 +90,12 @@ def read_result(node: Node) -> Result:
     effort["budget"].count()
     specification = read_specification(spec["effective"])
     states = specification.plant.states
-    applying = tuple(kind for kind in KINDS if kind.applies(specification))
-    last = ("constants", "tube", *(kind.key for kind in applying), "decided_by", "elasticities")
-    for key in KEYS:
-        if key in own and key not in last:
-            raise own[key].refused("is not known in this place: the specification does not ask for it")
+    last = ("constants", "tube", *KEYS, "decided_by", "elasticities")
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)
     result = Result(
         verdict=verdict,
-        formulas=own["formulas"].word("corrected", "as-printed"),
         specification=specification,
         effective_hash=spec["effective_hash"].text(),
         claim=_claim(own["claim"], states, specification.plant.inputs),
@@ -111,28 +105,16 @@ def read_result(node: Node) -> Result:
         assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
-        recipes=_recipes(own["proof"], applying),
+        recipes=_recipes(own["proof"]),
         synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
         inputs=own.get("inputs", lambda item: tuple(map(read_limited, item.entries()))) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
-        sections=_sections(own, len(states), applying) if searched else None,
+        sections=_sections(own) if searched else None,
     )
-    _windows(node, result)
     return _complete(node, result) if verdict == "certified" else result
-
-
-def _windows(node: Node, result: Result) -> None:
-    """What is told of windows needs some that are asked for, and a tube of balls."""
-    sections = {} if result.sections is None else result.sections.by_key
-    if not any(section.windows for section in sections.values()):
-        return
-    if not result.specification.windows:
-        raise node.refused("has windows that its specification does not ask for")
-    if result.tube is not None and result.tube.coordinates is not None:
-        raise node.refused("has windows beside coordinates of the tube")
 
 
 def _complete(node: Node, result: Result) -> Result:
@@ -180,9 +162,8 @@ def _parameters(node: Node) -> dict[str, Range]:
 
 
 def _wind(node: Node) -> Wind:
-    own = node.closed(optional=("bound", "rate"))
-    bound = own.known("bound", Node.exact) if "bound" in own else None
-    return Wind(bound=bound, rate=own.get("rate", Node.exact))
+    own = node.closed("bound", optional=("rate",))
+    return Wind(bound=own["bound"].exact(), rate=own.get("rate", Node.exact))
 
 
 def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:
@@ -297,8 +278,7 @@ def _coordinates(node: Node, n: int) -> Rows:
 def _constants(node: Node, result: Members, spec: Specification) -> dict[str, Enclosure]:
     """Every constant there is, and no other; those that follow from gains only where such gains are printed.
 
-    Those of a disturbance and of a machine are there if and only if the specification has one; that the metric is
-    constant, as two of them ask, or not, as six of them, is examined with them.
+    Those of a disturbance and of unknown parameters are there if and only if the specification has these.
     """
     derived = (kind.derived(result[kind.key]) for kind in KINDS if kind.key in result)
     names = [*MEASURED, *(name for names in derived for name in names)]
@@ -306,17 +286,7 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
         names += wind.CONSTANTS
     if spec.plant.ranges:
         names += unknown.CONSTANTS
-    if spec.plant.gained is not None:
-        names += gains.CONSTANTS
-    if spec.hardware is not None:
-        names += [*machine.ALWAYS, *(machine.OF_HELD_INPUTS if spec.hardware.held else ())]
-        names += machine.OF_MOVING if spec.plant.varies else ()
-    groups = (machine.OF_CONSTANT_METRICS, covariant.NAMES) if spec.hardware is not None else ()
-    optional = [name for group in groups for name in group]
-    own = node.closed(*names, optional=optional)
-    if any(len({name in own for name in group}) > 1 for group in groups):
-        raise node.refused("has one constant of the metric without the others")
-    names += [name for name in optional if name in own]
+    own = node.closed(*names)
     n = len(result["safe_set"].mapping())
     return {name: _constant(own[name], n) for name in names}
 
@@ -337,12 +307,12 @@ def _constant(node: Node, n: int) -> Enclosure:
 # -- gains ---------------------------------------------------------------------------------------------------------
 
 
-def _sections(own: Members, n: int, kinds: Sequence[Kind[Any, Any]]) -> Sections:
-    elasticities(own["elasticities"], [kind.key for kind in kinds if kind.elastic], MEASURED)
-    read = {kind.key: kind.read(own[kind.key], n) for kind in kinds}
+def _sections(own: Members) -> Sections:
+    elasticities(own["elasticities"], [kind.key for kind in KINDS if kind.elastic], MEASURED)
+    read = {kind.key: kind.read(own[kind.key]) for kind in KINDS}
     return Sections(read, own["decided_by"].texts())
 
 
-def _recipes(node: Node, kinds: Sequence[Kind[Any, Any]]) -> dict[str, object]:
-    own = node.closed(optional=[kind.key for kind in kinds])
-    return {kind.key: kind.read_recipe(own[kind.key]) for kind in kinds if kind.key in own}
+def _recipes(node: Node) -> dict[str, object]:
+    own = node.closed(optional=KEYS)
+    return {kind.key: kind.read_recipe(own[kind.key]) for kind in KINDS if kind.key in own}

@@ -13,11 +13,8 @@ from tubecert.recheck import (
     claimed,
     clearances,
     consistency,
-    covariant,
-    gains,
     geodesics,
     inputs,
-    machine,
     metric,
     planned,
     start,
@@ -25,12 +22,11 @@ from tubecert.recheck import (
 )
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.case import Case
-from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width
+from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width, largest_push
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
-from tubecert.recheck.named import largest_push
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.result import INFIMA, Result
 from tubecert.recheck.specified.trajectory import Expressed, Planned
@@ -215,7 +211,7 @@ def _constants(case: Case) -> Iterator[Claim]:
 
 
 def _beside(case: Case) -> Iterator[Claim]:
-    """The constants of a disturbance and of a machine, as far as they are bounded."""
+    """The constants of a disturbance and of unknown parameters, as far as they are bounded."""
     place, over = case.place, case.over_tube
     beta, eps = case.bound_if_any("metric_input_gain"), None
     if case.system.wind is not None:
@@ -237,62 +233,27 @@ def _beside(case: Case) -> Iterator[Claim]:
                 (*over, limit),
                 lambda name=name, limit=limit: unknown.bounded(place, name, limit),  # type: ignore[misc]
             )
-    limit = None if case.system.gained is None else case.bound_if_any(gains.CONSTANTS[0])
-    if limit is not None:
-        yield Claim(
-            f"{gains.CONSTANTS[0]} <= {float(limit):.6g}",
-            (*over, limit),
-            lambda limit=limit: gains.bounded(place, limit),  # type: ignore[misc]
-        )
-    asked = case.result.specification.hardware
-    if asked is None:
-        return
-    noise = asked.noise if isinstance(asked.noise, tuple) else None
-    known = tuple(case.bound_if_any(name) for name in ("upper", "B_pinv", "f_x"))
-    for name in machine.NAMES:
-        limit = case.bound_if_any(name) if name in case.constants else None
-        if limit is not None:
-            yield Claim(
-                f"{name} <= {float(limit):.6g}",
-                (*over, limit, known),
-                lambda name=name, limit=limit: machine.bounded(place, name, limit, noise, case.bound_if_any),  # type: ignore[misc]
-            )
-
-    for name in covariant.NAMES:
-        limit = case.bound_if_any(name) if name in case.constants else None
-        if limit is not None:
-            yield Claim(
-                f"{name} <= {float(limit):.6g}",
-                (*over, limit),
-                lambda name=name, limit=limit: covariant.bounded(place, name, limit),  # type: ignore[misc]
-            )
 
 
 def _gains(case: Case) -> Iterator[Claim]:
     sections, recipes = case.sections, case.result.recipes
-    present = [kind for kind in KINDS if kind.key in sections.by_key]
-    radii = [r for kind in present for r in kind.projection_radii(sections.by_key[kind.key])]
+    radii = [r for kind in KINDS for r in kind.projection_radii(sections.by_key[kind.key])]
     ground = Ground(
         setting=case.setting,
         constants=case.constants,
         depends=case.numbers,
         projection_radius=radii[0] if radii else Fraction(0),
-        place=case.place,
-        around=case.over_tube,
-        specification=case.result.specification,
-        machine=case.machine,
     )
-    for kind in present:
-        section = sections.by_key[kind.key]
-        missing, own = kind.uncovered(case.setting), ground
+    for kind in KINDS:
+        section, own = sections.by_key[kind.key], ground
+        missing = kind.uncovered(case.setting)
         if missing is not None:
             yield ground.claim(
                 f"{kind.key}: it says that it covers no such disturbance",
                 (section,),
                 lambda section=section, missing=missing: _silent(section, missing),  # type: ignore[misc]
             )
-            rest = arb(0) if missing == "wind_not_covered" else case.setting.rest
-            own = replace(ground, setting=replace(case.setting, wind=None, rest=rest), silent=True)
+            own = replace(ground, setting=replace(case.setting, wind=None, rest=arb(0)), silent=True)
         yield from kind.claims(section, recipes.get(kind.key), own)
         yield from _inputs(case, kind, ground)
 

@@ -1,6 +1,6 @@
-"""Theorems A, B and C at printed numbers, on balls: every inequality of the theory, evaluated on the safe side.
+"""Theorems A and B at printed numbers, on balls: every inequality of the theory, evaluated on the safe side.
 
-Implements: theory (3.1)-(3.5), (26a)-(26c), (4.1)-(4.4), (4.6)-(4.9). Nothing here searches, but for Y: any Y that
+Implements: theory (3.1)-(3.5), (26a)-(26c), (4.1)-(4.4). Nothing here searches, but for Y: any Y that
 passes serves, and one is found by raising it to what it has to exceed.
 """
 
@@ -13,7 +13,7 @@ from fractions import Fraction
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
-from tubecert.recheck.filtering import Distance, paper_kernel, tight_kernel
+from tubecert.recheck.filtering import Distance, tight_kernel
 from tubecert.recheck.predictor import Gains, predictor
 from tubecert.recheck.system import System
 
@@ -53,12 +53,12 @@ USED = tuple(item.name for item in fields(Numbers))
 
 @dataclass(frozen=True, slots=True)
 class WindNumbers:
-    """What a disturbance does per |w|, as balls: smax(Theta E), |E|, |B^+ E|; None: `bound` is searched for."""
+    """What a disturbance does per |w|, as balls: smax(Theta E), |E|, |B^+ E|; and the bound of |w|."""
 
     push: Ball
     size: Ball
     explained: Ball
-    bound: Ball | None
+    bound: Ball
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,6 @@ class Setting:
     """Constants, radii and options of one certificate; `turns`: whether B depends on the state.
 
     `rest`: what unknown parameters do beside the inputs, which is a part of the plan's defect and drift in `n`.
-    `gain`: a bound of |Delta| of an uncertain B.
     """
 
     system: System
@@ -76,24 +75,17 @@ class Setting:
     wind: WindNumbers | None = None
     turns: bool = True
     rest: Ball = field(default_factory=lambda: arb(0))
-    gain: Ball | None = None
-
-    @property
-    def wind_bound(self) -> Ball:
-        """|w|; not a number where it is searched for."""
-        assert self.wind is not None
-        return arb("nan") if self.wind.bound is None else self.wind.bound
 
     @property
     def still(self) -> bool:
         """Whether nothing moves the state beside the inputs, zeta = 0 in theory 7.5."""
-        return bool(self.rest <= 0) and (self.wind is None or bool(self.wind.size * self.wind_bound <= 0))
+        return bool(self.rest <= 0) and (self.wind is None or bool(self.wind.size * self.wind.bound <= 0))
 
     @property
     def pushed(self) -> Ball:
         """delta, and beta_w |w| with it: what lengthens the distance beside h, (7.3)."""
         defect = self.n.plan_defect_metric
-        return defect if self.wind is None else defect + self.wind.push * self.wind_bound
+        return defect if self.wind is None else defect + self.wind.push * self.wind.bound
 
     @property
     def drifting(self) -> Ball:
@@ -103,7 +95,7 @@ class Setting:
     @property
     def blown(self) -> Ball:
         """|E| |w|, theory 7."""
-        return arb(0) if self.wind is None else self.wind.size * self.wind_bound
+        return arb(0) if self.wind is None else self.wind.size * self.wind.bound
 
     @property
     def beside(self) -> Ball:
@@ -113,7 +105,7 @@ class Setting:
     @property
     def taken(self) -> Ball:
         """|B^+ E| |w|: what an estimate takes for a part of h, (7.6), (7.9)."""
-        return arb(0) if self.wind is None else self.wind.explained * self.wind_bound
+        return arb(0) if self.wind is None else self.wind.explained * self.wind.bound
 
     @property
     def rate(self) -> Ball:
@@ -130,9 +122,9 @@ class Setting:
         """T, None for ever."""
         return None if self.system.horizon is None else exact(self.system.horizon)
 
-    def radius_serves(self, R_H: Fraction, *, clipped: bool = False) -> bool:
-        """R_H >= sqrt(1 + nu) Dh; R_H >= Dh where the estimate is clipped, (2.10)."""
-        layer = Fraction(0) if clipped or self.system.smooth is None else self.system.smooth
+    def radius_serves(self, R_H: Fraction) -> bool:
+        """R_H >= sqrt(1 + nu) Dh, (2.10)."""
+        layer = self.system.smooth or Fraction(0)
         return R_H > 0 and bool(exact(R_H * R_H) >= exact(1 + layer) * self.n.h * self.n.h)
 
 
@@ -165,8 +157,7 @@ def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
         + root(A) * n.feedback_gain * DB
     )
     DPsidot = A * (DB * Dgs + DB * n.M_x * Dxdot / root(A * a) + n.B_x * Dxdot)  # (3.5)
-    kernel = paper_kernel if s.kernel == "paper" else tight_kernel
-    k = kernel(2 * lam, omega, n.h, s1)
+    k = tight_kernel(2 * lam, omega, n.h, s1)
     return {
         "speed": Dxdot,
         "uncertainty_rate": s1,
@@ -220,12 +211,12 @@ def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
     """The bound of |xt| with a disturbance that enters it as zb (7.8).
 
     V = |xt|^2 + |s~|^2/Gamma has V' <= -q |xt|^2 + 2 zb |xt| + 2 (Dh + R) s1/Gamma, negative beyond the root r of
-    q r^2 - 2 zb r = 2 (Dh + R) s1/Gamma; so V <= r^2 + (Dh + R)^2/Gamma. If A_m = -g I and B is constant, the part of
-    xt in the range of B has an equation of its own, with B B^+ E w only.
+    q r^2 - 2 zb r = 2 (Dh + R) s1/Gamma; so V <= r^2 + (Dh + R)^2/Gamma. If B is constant, the part of xt in
+    the range of B has an equation of its own, with B B^+ E w only.
     """
     n, p, Gamma = setting.n, predictor(setting.system, gains), exact(gains.adaptation_rate)
     zb = setting.beside
-    if p.scalar and not setting.turns:
+    if not setting.turns:
         zb = smaller(setting.blown, n.B * setting.taken)
     both = n.h + R
     drag = zb / p.q

@@ -81,11 +81,6 @@ def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
     for name, most in spec.half_widths.items():
         widths = tube.half_widths
         yield widths is None or widths[name] <= most, f"tube.half_widths.{name} is more than was asked for"
-    A_m = spec.loop.A_m
-    scalar = A_m is None or all(
-        e == (A_m[0][0] if i == j else 0) for i, row in enumerate(A_m) for j, e in enumerate(row)
-    )
-    yield scalar or not shown, "A_m is no multiple of the identity, in coordinates that are not x"
 
 
 def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
@@ -146,7 +141,7 @@ def _bounds(result: Result) -> Iterator[tuple[bool, str]]:
 
 
 def verdict(result: Result) -> Outcome:
-    """The verdict is that of the sections that decide it, by the corrected formulas, and so are its reasons."""
+    """The verdict is that of the sections that decide it, and so are its reasons."""
     return _first(_verdict(result))
 
 
@@ -154,7 +149,6 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     sections, metric = result.sections, result.metric
     assert sections is not None
     assert metric is not None
-    yield result.formulas == "corrected", f"{_CLAIMS_ONLY} formulas is not `corrected`"
     yield metric.verdict == "certified", f"{_CLAIMS_ONLY} metric.verdict is not"
     deciding = sections.decided_by
     yield bool(deciding) and len(set(deciding)) == len(deciding), "decided_by is not a list of sections"
@@ -182,7 +176,7 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
         same = all(value == own.get(key) for key, value in reason.parameters.items() if key != "section")
         yield same, f"a reason repeats {named} otherwise than it is"
         yield reason.at is None, "a reason of what is certified names a point"
-        gains = set(reason.advice) <= {"halve_constant", "halve_hardware"}
+        gains = set(reason.advice) <= {"halve_constant"}
         yield gains, "a reason of what is certified advises what would serve"
 
 
@@ -201,12 +195,8 @@ def assumptions(result: Result, s: System) -> Outcome:
     """The list of what is assumed is that of this format, each with the parameters of the specification."""
     geodesics = None if result.metric is None else result.metric.geodesics
     wanted = _assumed(s, geodesics)
-    machine = result.specification.hardware
-    if machine is not None:
-        computes: dict[str, object] = {} if machine.arithmetic is None else {"arithmetic": machine.arithmetic}
-        if machine.arcs is not None:
-            computes |= {"nodes": machine.arcs.panels, "sweeps": machine.arcs.passes}
-        wanted.append(Assumption("machine_as_given", computes))
+    if result.specification.hardware is not None:
+        wanted.append(Assumption("hardware_left_out", {}))
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:
             return stated(

@@ -28,7 +28,7 @@ from tubecert.recheck.metric import (
     upper_bound,
 )
 from tubecert.recheck.norms import norms
-from tubecert.recheck.pencils import GainBelow, LeastGain, SlopesBelow
+from tubecert.recheck.pencils import GainBelow, SlopesBelow
 from tubecert.recheck.place import Place
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
@@ -52,11 +52,12 @@ from tubecert.recheck.wind import added_to, least_sum
 _ROUND_UP = 1 + Fraction(
     1, 10**15
 )  # the end of a ball as the float next to it: off by 2^-53 of itself at most
+_COARSE = Fraction(1001, 1000)  # a product of two floats and a root are off by less
 _SOME = 2_000  # before the tube is examined part by part of the plan
 
 
 def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) -> Outcome:
-    """Whether the constant `name` is at most `limit` (`lower`, `input_gain_least`: at least).
+    """Whether the constant `name` is at most `limit` (`lower`: at least).
 
     `largest` is a bound of smax(Theta B) over the tube, None if none is claimed.
     """
@@ -64,7 +65,7 @@ def bounded(place: Place, name: str, limit: Fraction, largest: Fraction | None) 
         return lower_bound(place.system, limit, place.tube(), place.budget, place.fields.unit)
     if name == "upper":
         return upper_bound(place.system, limit, place.tube(), place.budget, place.fields.unit)
-    if limit < 0 and name != "contraction_excess":  # an eigenvalue: all others are norms, gains and lengths
+    if limit < 0:  # all are norms, gains and lengths
         return stated(False, "it is negative")
     if name == "feedback_gain":
         if largest is None:
@@ -116,17 +117,6 @@ def feedback_gain(place: Place, limit: Fraction, largest: Fraction) -> Outcome:
     if vanish([e for row in place.system.F for e in row]):
         return stated(True, "")
     return prove(GainBelow(place.system, limit, largest), place.tube(), place.budget)
-
-
-def _input_gain_least(place: Place, limit: Fraction) -> Outcome:
-    if not limit:
-        return stated(True, "")
-    return prove(LeastGain(place.system, limit), place.tube(), place.budget)
-
-
-def _excess(place: Place, limit: Fraction) -> Outcome:
-    s = place.system
-    return prove(PositiveDefinite(plus(scaled(limit, s.W), s.F, -1), s.W), place.tube(), place.budget)
 
 
 def _input_on_plan(place: Place, limit: Fraction) -> Outcome:
@@ -323,12 +313,17 @@ _CLAIMS: dict[str, Callable[[Place, Fraction], Outcome]] = {
     "drift_on_plan": _drift,
     "plan_defect": _plan_defect,
     "plan_defect_metric": _plan_defect_metric,
-    "input_gain_least": _input_gain_least,
-    "contraction_excess": _excess,
 }
 
 OVER_TUBE = ("lower", "upper", *_CLAIMS, "feedback_gain")
 """The constants that are suprema over the tube or the plan; those of the start are claims of `start`."""
+
+
+def largest_push(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
+    """smax(Theta B) <= |B| sqrt(A); None where one of them is not bounded."""
+    if B is None or upper is None:
+        return None
+    return Fraction(float(B) * float(upper) ** 0.5) * _COARSE if upper > 0 else Fraction(0)
 
 
 def contained(place: Place) -> Outcome:

@@ -20,7 +20,7 @@ from tubecert.findings import Finding, Location
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.spelling import LONGEST, spelled
 
-FORMAT = "tubecert-certificate/2"
+FORMAT = "tubecert-certificate/3"
 MOST_BYTES = 64_000_000
 _VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
 _DEEPEST = 60

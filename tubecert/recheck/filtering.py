@@ -44,11 +44,6 @@ def tight_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
     return always
 
 
-def paper_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
-    """K(c) (2.18); not a number at w = c."""
-    return s0 / abs(c - w) + s1 / (c * w)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distance:
     """D(t) of (2.15); `horizon` None is for ever."""

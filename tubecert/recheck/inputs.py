@@ -15,7 +15,7 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.kinds.bounds import all_of, at_most
 from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
-from tubecert.recheck.kinds.table import KEYS, KINDS
+from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.numbers import Range
@@ -43,12 +43,11 @@ class Limited:
     least: Enclosure
     greatest: Enclosure
     bounds: Mapping[str, InputBound]
-    windows: Mapping[str, tuple[str, ...]]
 
 
 def read_limited(node: Node) -> Limited:
     """One of `result.inputs`."""
-    own = node.closed("input", "limits", "verdict", "plan", "bounds", optional=("windows",))
+    own = node.closed("input", "limits", "verdict", "plan", "bounds")
     low, high = own["limits"].pair()
     plan = own["plan"].closed("least", "greatest")
     bounds = own["bounds"].closed(optional=KEYS)
@@ -59,17 +58,7 @@ def read_limited(node: Node) -> Limited:
         least=enclosure(plan["least"]),
         greatest=enclosure(plan["greatest"]),
         bounds={key: found for key in KEYS if (found := bounds.get(key, _bound)) is not None},
-        windows=own.get("windows", _windows) or {},
     )
-
-
-def _windows(node: Node) -> dict[str, tuple[str, ...]]:
-    own = node.closed(optional=KEYS)
-    return {key: found for key in KEYS if (found := own.get(key, _verdicts)) is not None}
-
-
-def _verdicts(node: Node) -> tuple[str, ...]:
-    return tuple(each.word(*VERDICTS) for each in node.entries())
 
 
 def _bound(node: Node) -> InputBound:
@@ -103,36 +92,11 @@ def agrees(
             yield proven, f"{own.name} is bounded by {key}, which is not certified"
             inside = key not in deciding or (low <= bound.least and bound.greatest <= high)
             yield inside, f"{own.name} is not within its limits by {key}"
-            told = by is not None and _follows(own, bound, ranges(key, by))
-            yield told, f"the bound of {own.name} by {key} is not what it consists of"
-        for key, along in own.windows.items():
-            yield (
-                along == _along(own, sections.get(key)),
-                f"{own.name}: the verdicts in the windows of {key} are not what the ranges there give",
-            )
+            yield _follows(own, bound), f"the bound of {own.name} by {key} is not what it consists of"
 
 
-def _along(own: Limited, section: Section | None) -> tuple[str, ...]:
-    """The verdict on the limits in each window of a section; the ranges there are examined with the kind."""
-    low, high = own.limits
-    found = () if section is None else section.windows
-    ranges = [window.inputs[own.name] for window in found if own.name in window.inputs]
-    return tuple("certified" if low <= a and b <= high else "undecided" for a, b in ranges)
-
-
-def ranges(key: str, section: Section) -> Mapping[str, Range] | None:
-    """Where inputs stay, if the section of a kind states it itself: this is examined with the kind."""
-    return next(kind.ranges(section) for kind in KINDS if kind.key == key)
-
-
-def _follows(own: Limited, bound: InputBound, stated: Mapping[str, Range] | None) -> bool:
-    """Whether a bound contains the range that is stated, or leaves room for u* on the plan and all that is added.
-
-    (4.13).
-    """
-    if stated is not None:
-        found = stated.get(own.name)
-        return found is not None and bound.least <= found[0] and found[1] <= bound.greatest
+def _follows(own: Limited, bound: InputBound) -> bool:
+    """Whether a bound leaves room for u* on the plan and all that is added, (4.13)."""
     least, greatest, added = own.least.below, own.greatest.above, bound.feedback + bound.adaptation
     if least is None or greatest is None or min(bound.feedback, bound.adaptation) < 0:
         return False
@@ -157,7 +121,6 @@ def added(shares: Shares | None, bounds: Mapping[str, InputBound]) -> Outcome:
 
 
 def _outcomes(shares: Shares, bounds: Mapping[str, InputBound]) -> Iterator[Outcome]:
-    for name, bound in bounds.items():
+    for bound in bounds.values():
         yield at_most(shares.feedback, bound.feedback, "what feedback adds")
-        most = shares.clipped.get(name, shares.adaptation)
-        yield stated(most <= bound.adaptation, "adaptation may add more: R_H")
+        yield stated(shares.adaptation <= bound.adaptation, "adaptation may add more: R_H")

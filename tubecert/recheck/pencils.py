@@ -25,11 +25,10 @@ from tubecert.recheck.balls import (
 from tubecert.recheck.boxes import Box, Field, Found
 from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.monomials import Combinations
-from tubecert.recheck.program import Program
 from tubecert.recheck.quotients import cancelled
 from tubecert.recheck.statements import PositiveDefinite, definite_on, square, weights
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import Rows, names, plus, scaled, times, turned, unit_matrix, variable
+from tubecert.recheck.terms import Rows, names, plus, variable
 
 _APART, _BENT, _EVEN = 0.25, 0.65, 0.1  # of what is left of a limit: by size, by curvature, to all alike
 _INSIDE = 1 - 2.0**-30  # of what is left of a limit: sums of floats stay within it
@@ -264,46 +263,3 @@ def _together(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]
         else:
             apart.append((lo, hi))
     return [*apart, (0.0, top)] if top > 0 else list(ranges)
-
-
-class LeastGain:
-    """smin(Theta B) >= limit, where W > 0: then B'M B >= B'Y + Y'B - Y'W Y for any Y.
-
-    Y = M B at the centre of the box is a proposal, with which nothing is lost there.
-    """
-
-    def __init__(self, s: System, limit: Fraction) -> None:
-        self._n, self._m = n, m = len(s.states), len(s.inputs)
-        self._names = [f"y{i}_{j}#" for i in range(n) for j in range(m)]
-        Y = [[variable(name) for name in self._names[i * m : (i + 1) * m]] for i in range(n)]
-        half = times(turned(s.B), Y)
-        square = times(turned(Y), times(s.W, Y))
-        S = plus(plus(half, turned(half)), plus(square, scaled(limit**2, unit_matrix(m))), -1)
-        self._test = PositiveDefinite(S, values=dict.fromkeys(self._names, arb(0)))
-        self.variables = self._test.variables
-        self._system = Program([e for rows in (s.W, s.B) for row in rows for e in row], self.variables)
-        self._square = exact(limit**2)
-
-    def over(self, box: Box) -> Found:
-        """The bound from below, on the whole box."""
-        W, B = self._matrices([arb(0.5 * lo + 0.5 * hi) for lo, hi in box])
-        try:
-            Y = [arb(float(y.mid())) for y in W.solve(B).entries()]
-        except ZeroDivisionError:
-            return Found(False)
-        return self._test.with_values(dict(zip(self._names, Y, strict=True))).over(box)
-
-    def broken(self, point: Sequence[Ball]) -> bool:
-        """B'M B - limit^2 at a point."""
-        W, B = self._matrices(point)
-        try:
-            gram = (B.transpose() * W.solve(B)).tolist()
-        except ZeroDivisionError:
-            return False
-        for i in range(self._m):
-            gram[i][i] = gram[i][i] - self._square
-        return is_indefinite(gram)
-
-    def _matrices(self, point: Sequence[Ball]) -> tuple[arb_mat, arb_mat]:
-        entries, split = self._system.run(point), self._n * self._n
-        return arb_mat(self._n, self._n, entries[:split]), arb_mat(self._n, self._m, entries[split:])

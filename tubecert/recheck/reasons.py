@@ -12,7 +12,6 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure, maybe
-from tubecert.recheck.kinds.hardware_section import OF_GAINS, SHARES
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specified.numbers import Numbers
@@ -110,20 +109,6 @@ def _texts(node: Node) -> object:
 
 
 _SIDE = _word("lower", "upper")
-_PART = _word("sample_time", "delay", "noise", "wind")
-_CAUSE = _word(*SHARES, *OF_GAINS)
-_KNOB = _word(
-    "epsilon",
-    "rho_a",
-    "half_widths",
-    "rate",
-    "start",
-    "uncertainty",
-    "wind",
-    "knots",
-    "defect",
-    "gap",
-)
 _NONE: Form = ({}, {})
 
 _CLAIMS: Mapping[str, Form] = {
@@ -156,7 +141,7 @@ _CLAIMS: Mapping[str, Form] = {
     ),
     "gains_suffice": (
         {"section": Node.text, "margins": _margins},
-        {"binds": Node.text, "below_twice_rate": Node.flag, "predictor_gain": Node.decimal},
+        {"binds": Node.text, "predictor_gain": Node.decimal},
     ),
     "condition_holds": (
         {"section": Node.text, "condition": Node.text},
@@ -222,18 +207,6 @@ _REMEDIES: Mapping[str, Form] = {
 
 _RELAX: Mapping[str, Form] = {
     "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
-    "halve_hardware": ({"part": _PART, "factor": Node.number}, {}),
-    "ease_hardware": ({"part": _PART, "value": Node.decimal}, {}),
-    "take_windows": ({"windows": Node.count}, {}),
-    "lessen_cause": ({"cause": _CAUSE, "share": Node.number}, {}),
-    "turn_knob": (
-        {"knob": _KNOB, "now": Node.decimal, "value": Node.decimal},
-        {"input": Node.text, "term": Node.text},
-    ),
-    "no_knob_alone": (
-        {"tried": lambda node: [_KNOB(item) for item in node.entries()]},
-        {"epsilon": Node.decimal, "half_widths": Node.decimal, "uncertainty": Node.decimal},
-    ),
     "mend_plan": (
         {
             "defect": Node.number,
@@ -273,13 +246,10 @@ _ASSUMPTIONS: Mapping[str, Form] = {
     "perfect_state": _NONE,
     "first_order_filter": _NONE,
     "for_all_time": _NONE,
-    "machine_as_given": (
-        {},
-        {"arithmetic": _word("single", "double"), "nodes": Node.count, "sweeps": Node.count},
-    ),
+    "hardware_left_out": _NONE,
     "up_to_horizon": ({"horizon": Node.decimal}, {}),
     "uncertainty_as_declared": _NONE,
     "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),
     "parameters_within": _NONE,
-    "wind_within": ({}, {"bound": Node.decimal, "rate": Node.decimal}),
+    "wind_within": ({"bound": Node.decimal}, {"rate": Node.decimal}),
 }

@@ -38,10 +38,8 @@ MEASURED = (
     "initial_distance",
     "plan_defect",
     "plan_defect_metric",
-    "input_gain_least",
-    "contraction_excess",
 )
-INFIMA = ("lower", "input_gain_least")  # constants whose lower side is used
+INFIMA = ("lower",)  # constants whose lower side is used
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +53,9 @@ class Plans:
 
 @dataclass(frozen=True, slots=True)
 class Wind:
-    """Every disturbance that is claimed about: |w| (None: what a section states) and, where it is known, |w'|."""
+    """Every disturbance that is claimed about: |w| and, where it is known, |w'|."""
 
-    bound: Fraction | None
+    bound: Fraction
     rate: Fraction | None
 
 
@@ -147,7 +145,6 @@ class Result:
     """What was proven: for a verdict other than `certified` as far as the certification came."""
 
     verdict: str
-    formulas: str
     specification: Specification
     effective_hash: str
     claim: Claim

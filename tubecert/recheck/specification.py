@@ -15,18 +15,14 @@ from tubecert.recheck.specified.hardware import MACHINE, Disturbance, Hardware, 
 from tubecert.recheck.specified.idle import IDLE, read_idle
 from tubecert.recheck.specified.loop import Loop, read_loop
 from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
-from tubecert.recheck.specified.numbers import Numbers, Range, ends, positive
+from tubecert.recheck.specified.numbers import Range, ends, positive
 from tubecert.recheck.specified.plant import Plant, Uncertainty, read_plant, read_uncertainty
 from tubecert.recheck.specified.start import Start, read_start
 from tubecert.recheck.specified.trajectory import (
     AnyPlan,
-    Expressed,
-    Resting,
     Trajectory,
     read_trajectory,
 )
-from tubecert.recheck.specified.windows import KEY as WINDOWS
-from tubecert.recheck.specified.windows import read_windows
 from tubecert.recheck.times import period_of
 
 
@@ -46,7 +42,6 @@ class Specification:
     loop: Loop
     obstacles: tuple[Obstacle, ...]
     limits: dict[str, Range]  # by input, of some of them
-    windows: Numbers  # where they begin and end, in s; empty without
     hardware: Hardware | None
     disturbance: Disturbance | None
     hash: str
@@ -72,7 +67,6 @@ def read_specification(node: Node) -> Specification:
     _version(own["tubecert"])
     own["name"].text()
     plant = read_plant(own["system"], own["safe_set"])
-    n = len(plant.states)
     tube = _tube(own["tube"], plant)
     hardware, disturbance = read_machine(own, plant.states)
     trajectory = read_trajectory(own["trajectory"], plant)
@@ -86,27 +80,21 @@ def read_specification(node: Node) -> Specification:
         rho_a=tube.get("rho_a", positive),
         coordinates="coordinates" in tube,
         half_widths=tube.get("half_widths", _widths) or {},
-        loop=read_loop(own["adaptation"], own["conditions"], n),
+        loop=read_loop(own["adaptation"], own["conditions"]),
         obstacles=tuple(read_obstacle(item, plant.states) for item in own["obstacles"].entries())
         if "obstacles" in own
         else (),
         limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
-        windows=tube.get(WINDOWS, lambda item: read_windows(item, trajectory, hardware, disturbance)) or (),
         hardware=hardware,
         disturbance=disturbance,
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
     )
     read_idle(own, plant)
-    written = isinstance(found.trajectory, (Resting, Expressed))
     if plant.varies:
         _moving(own, found)
-    if plant.gained is not None and found.windows:
-        raise own["tube"].refused("has windows beside an uncertain B")
-    if hardware is not None and hardware.arcs is not None and (found.windows or plant.gained is not None):
-        raise own["system"].refused("has computed geodesics beside windows or an uncertain B")
-    if plant.gained is not None and (hardware is None or not written):
-        raise own["system"].refused("has an uncertain B, without hardware or a plan that is written down")
+    if plant.gained is not None:
+        raise own["system"].refused("has a B that is not known, which no theorem covers")
     if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
     return found
@@ -130,11 +118,9 @@ def _version(node: Node) -> None:
 
 def _tube(node: Node, plant: Plant) -> Members:
     """Radii in x, radii in coordinates that the certificate states, or half-widths, which have such coordinates."""
-    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths", "gap", WINDOWS))
+    own = node.closed(optional=("epsilon", "rho_a", "coordinates", "half_widths", "gap"))
     own.get("gap", lambda item: item.word("auto"))
     own.get("coordinates", lambda item: item.word("auto"))
-    if WINDOWS in own and ("coordinates" in own or "half_widths" in own):
-        raise own[WINDOWS].refused("is there beside coordinates of the tube")
     if "half_widths" not in own:
         own.require("epsilon", "rho_a")
         return own

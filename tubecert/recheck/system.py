@@ -19,7 +19,7 @@ from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.specified.metric import Metric
-from tubecert.recheck.specified.numbers import Numbers, Range, Rows
+from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
 from tubecert.recheck.terms import (
@@ -52,15 +52,13 @@ class System:
     x0: Numbers | None
     within: Fraction | None
     box: dict[str, Range] | None
-    A_m: Rows | None  # None: auto
+    predictor_gain: Fraction | None  # None: auto
     smooth: Fraction | None
-    kernel: str
     horizon: Fraction | None
     duties: tuple[Owed, ...]  # of f, B, W and E, on the safe set
     wind: Disturbance | None = None
     ranges: dict[str, Range] = field(default_factory=dict)  # of parameters of the plant's drift,
     unknown: Matrix | None = None  # which is this, (n, 1), in place of f
-    gained: Matrix | None = None  # the plant's B, if they stand in it
     moving: tuple[Term, ...] = ()  # f and what it owes, if t occurs in them
     lengths: dict[str, Numbers] = field(default_factory=dict)  # what has a half-width, each as a row times x
 
@@ -168,15 +166,13 @@ def system_of(spec: Specification) -> System:
         x0=spec.start.at,
         within=spec.start.within,
         box=spec.start.box,
-        A_m=loop.A_m,
+        predictor_gain=loop.predictor_gain,
         smooth=loop.smooth,
-        kernel=loop.kernel,
         horizon=spec.trajectory.horizon,
         duties=(*spec.plant.duties, *metric.duties, *(() if wind is None else wind.duties)),
         wind=wind,
         ranges=spec.plant.ranges,
         unknown=None if spec.plant.unknown is None else upright(spec.plant.unknown),
-        gained=spec.plant.gained,
         moving=spec.plant.moving,
         lengths=spec.plant.lengths,
     )

@@ -12,7 +12,6 @@ from functools import cached_property
 
 from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.gains import gain, joined
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.metric import adjugate, determinant, stated
 from tubecert.recheck.place import Place
@@ -57,11 +56,9 @@ def unknown(place: Place) -> Unknown | None:
 
 
 def joins(place: Place) -> Matrix | None:
-    """What of it is a part of h, (m, 1); None if f is known. Of a B that is not known `gains.joined` of all of it."""
-    found, own = unknown(place), gain(place)
-    if found is None or own is None:
-        return None if found is None else found.reached
-    return joined(place, own, found.whole)
+    """What of it is a part of h, (m, 1); None if f is known."""
+    found = unknown(place)
+    return None if found is None else found.reached
 
 
 def bounded(place: Place, name: str, limit: Fraction) -> Outcome:

@@ -13,7 +13,6 @@ from functools import cached_property
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Domain, Outcome, prove
-from tubecert.recheck.gains import gain
 from tubecert.recheck.metric import adjugate, determinant, stated
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.hardware import Disturbance
@@ -32,11 +31,6 @@ class Blown:
 
     wind: Disturbance
     fields: Fields
-
-    @cached_property
-    def whole(self) -> Matrix:
-        """E, (n, k)."""
-        return self.fields.vector(self.wind.E)
 
     @cached_property
     def explained(self) -> Matrix:
@@ -125,15 +119,7 @@ def adapted(place: Place) -> Matrix | None:
     wind = place.system.wind
     if wind is None or wind.rate is None:
         return None
-    if wind.bound is None:
-        raise ValueError("a disturbance with a rate needs a bound")
-    return scaled(wind.bound, _made(place))
-
-
-def _made(place: Place) -> Matrix:
-    """What of E is a part of h: B^+ E, by the B of the plant."""
-    own = gain(place)
-    return blown(place).explained if own is None else times(own.inverse, blown(place).whole)
+    return scaled(wind.bound, blown(place).explained)
 
 
 def added_to(place: Place, name: str) -> list[Matrix]:
@@ -147,7 +133,7 @@ def added_to(place: Place, name: str) -> list[Matrix]:
     elif name == "h":
         found = [more]
     else:
-        found = [scaled(wind.rate, _made(place))]
+        found = [scaled(wind.rate, blown(place).explained)]
     return [a for a in found if not all_zero(a)]
 
 

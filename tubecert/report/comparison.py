@@ -226,9 +226,7 @@ def _names(paths: Sequence[str]) -> list[str]:
 
 def _differences(results: Sequence[Result]) -> dict[str, tuple[Tree, ...]]:
     """The keys, by path, whose values are not the same in all; None where a specification has no such key."""
-    found = dict(_differing_in([result.spec.effective.data for result in results], ""))
-    formulas = tuple(str(result.formulas) for result in results)
-    return found | ({"formulas": formulas} if len(set(formulas)) > 1 else {})
+    return dict(_differing_in([result.spec.effective.data for result in results], ""))
 
 
 def _differing_in(values: Sequence[Tree], path: str) -> Iterator[tuple[str, tuple[Tree, ...]]]:

@@ -12,7 +12,6 @@ from itertools import groupby, pairwise
 from math import log, sqrt
 
 from tubecert.digits import short
-from tubecert.letters import RATES
 from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
 from tubecert.report.figures_gains import STYLES
 from tubecert.report.page import Figure
@@ -23,7 +22,6 @@ from tubecert.verdict import Verdict
 
 _COLORS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
 _PARTS = ("epsilon", "rho_a", "rho_r")  # of rho, which is drawn
-_PRINTED = "m3"  # formulas that prove nothing
 _STRIP = 40  # height of the scale of colours below a heat map
 _LEGEND = {
     **{str(verdict): str(verdict) for verdict in Verdict},
@@ -66,8 +64,6 @@ def _value(row: Row, quantity: Quantity) -> float | None:
         return None
     if not quantity.section:
         return None if row.value("rho_r") is None else found.number
-    if quantity.section == RATES.key and grid.printed_in(row.point.settings):
-        return found.number  # which is told: they prove nothing
     return found.number if row.value(f"{quantity.section}.verdict") == Verdict.CERTIFIED else None
 
 
@@ -81,7 +77,6 @@ class _Curve:
     quantity: Quantity
     values: tuple[float | None, ...]
     words: str
-    printed: bool
 
 
 def _curves(table: SweepTable, axis: grid.Axis, words: Sequence[grid.Axis]) -> Iterator[Figure]:
@@ -118,10 +113,9 @@ def _drawn(parts: Sequence[tuple[str, list[Row]]], members: Sequence[Quantity], 
         own: dict[tuple[float | None, ...], _Curve] = {}
         for word, rows in parts:
             values = tuple(_value(row, each) for row in rows)
-            printed = bool(rows) and grid.printed_in(rows[0].point.settings) and each.section == RATES.key
             if values not in own and any(value is not None for value in values):
                 name = _told_apart(each, label)
-                own[values] = _Curve(quantity=each, values=values, words=f"{name}, {word}", printed=printed)
+                own[values] = _Curve(quantity=each, values=values, words=f"{name}, {word}")
         if len(own) == 1:
             own = {key: replace(one, words=_told_apart(each, label)) for key, one in own.items()}
         found += own.values()
@@ -150,20 +144,13 @@ def _curve(
             chart.box((ends[0], chart.y.low), (ends[1], chart.y.high), f"cell {row.verdict}")
     for index, each in enumerate(curves):
         style = STYLES.get(each.quantity.section, "") if each.quantity.section else f"m{index % 3 + 1}"
-        style = _PRINTED if each.printed else style
         for known, part in groupby(
             zip(places, each.values, strict=True), key=lambda point: point[1] is not None
         ):
             if known:
                 _line(chart, [(x, y) for x, y in part if y is not None], style)
         legend.append((style, each.words))
-    caption = "Every dot is a certificate" + (
-        ", but for those as printed, which prove nothing."
-        if any(each.printed for each in curves)
-        else "."
-        if words
-        else "; shaded: the verdict is not certified."
-    )
+    caption = "Every dot is a certificate" + ("." if words else "; shaded: the verdict is not certified.")
     return Figure(key=f"sweep-{name}", title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
 
 

@@ -9,17 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result
 from tubecert.report import planned
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_tube import is_near, view
-from tubecert.report.machine import proven
 from tubecert.report.outline import widths
 from tubecert.report.page import Figure
-from tubecert.report.windows import deciding
 
 _HEIGHT = 190
 
@@ -73,7 +69,7 @@ def state_figures(result: Result) -> list[Figure]:
             name=name,
             unit=units.get(name, ""),
             curve=curve,
-            band=None if known is None else _state_band(result, name, known[name], curve),
+            band=None if known is None else _around(curve, known[name], known[name]),
             limits=_range(result.safe_set[name]),
             words=words,
         )
@@ -93,7 +89,7 @@ def input_figures(result: Result) -> list[Figure]:
             name=name,
             unit=units.get(name, ""),
             curve=curve,
-            band=_input_band(result, name, own.get(name), curve),
+            band=_input_band(result, own.get(name), curve),
             limits=_range(own[name].limits) if name in own else None,
             words=("limits", "proven range in the loop", "plan"),
         )
@@ -102,30 +98,6 @@ def input_figures(result: Result) -> list[Figure]:
         )
     ]
     return [drawing.figure("tube") for drawing in drawings]
-
-
-def _state_band(
-    result: Result, name: str, width: float, curve: Sequence[Point]
-) -> tuple[list[Point], list[Point]]:
-    """The half-width around x*, window by window where what decides has windows."""
-    windows = deciding(result)
-    if not windows or not all(name in window.half_widths for window in windows):
-        return _around(curve, width, width)
-    parts = [
-        _around(
-            _within(curve, float(each.begin), float(each.end)), each.half_widths[name], each.half_widths[name]
-        )
-        for each in windows
-    ]
-    below, above = ([point for part in parts for point in part[side]] for side in (0, 1))
-    return below, above
-
-
-def _within(curve: Sequence[Point], begin: float, end: float) -> list[Point]:
-    """The part of a curve between two times."""
-    t, v = zip(*curve, strict=True)
-    ends = [(at, float(np.interp(at, t, v))) for at in (begin, end)]
-    return [ends[0], *(point for point in curve if begin < point[0] < end), ends[1]]
 
 
 def _range(ends: tuple[Fraction, Fraction]) -> Point:
@@ -137,20 +109,11 @@ def _around(curve: Sequence[Point], below: float, above: float) -> tuple[list[Po
 
 
 def _input_band(
-    result: Result, name: str, own: InputData | None, curve: Sequence[Point]
+    result: Result, own: InputData | None, curve: Sequence[Point]
 ) -> tuple[list[Point], list[Point]] | None:
-    """The range in each window; around u* by what feedback and adaptation add at most; else that of H at any time."""
-    if windows := [each for each in deciding(result) if name in each.inputs]:
-        ends = [(each, float(t)) for each in windows for t in (each.begin, each.end)]
-        return [(t, each.inputs[name][0]) for each, t in ends], [
-            (t, each.inputs[name][1]) for each, t in ends
-        ]
+    """Around u* by what feedback and adaptation add at most; None where nothing is proven."""
     found = [] if own is None else [own.bounds[key] for key in result.decided_by if key in own.bounds]
-    if own is not None and found:
-        below = own.plan.least.below - min(each.least for each in found)
-        return _around(curve, below, max(each.greatest for each in found) - own.plan.greatest.above)
-    machine = proven(result)
-    if machine is None or name not in machine.inputs or result.decided_by != (machine.name.key,):
+    if own is None or not found:
         return None
-    low, high = machine.inputs[name]
-    return [(t, low) for t, _ in curve], [(t, high) for t, _ in curve]
+    below = own.plan.least.below - min(each.least for each in found)
+    return _around(curve, below, max(each.greatest for each in found) - own.plan.greatest.above)

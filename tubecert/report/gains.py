@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from tubecert.certificate.result import Result
-from tubecert.conditions.hardware import LEVEL
 from tubecert.digits import exact, percent
-from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import Pair
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS
@@ -34,35 +32,22 @@ class Gains:
     def text(self, *, titled: bool = False) -> str:
         """The gains for the verdict line, with their certificate's name if there are several."""
         omega = self.pair.bandwidth
-        none = "no filter" if self.section == HARDWARE.key else "feedback alone"
-        parts = [none if omega is None else f"omega = {exact(omega)} rad/s"]
+        parts = ["feedback alone" if omega is None else f"omega = {exact(omega)} rad/s"]
         if self.pair.adaptation_rate is not None:
             parts.append(f"Gamma = {exact(self.pair.adaptation_rate)}")
-        if self.pair.sample_time is not None:
-            parts.append(f"Ts = {exact(self.pair.sample_time)} s")
         return (f"{NAMES[self.section]} " if titled else "") + ", ".join(parts)
 
     def words(self) -> str:
         """The gains in a sentence."""
-        if self.pair.bandwidth is None and self.section == HARDWARE.key:
-            return "on this machine, without a filter"
         if self.pair.bandwidth is None:
             return "its feedback and no adaptation"
-        if self.section == HARDWARE.key:
-            return f"on this machine and with a filter bandwidth of {exact(self.pair.bandwidth)} rad/s"
         loop = f"a filter bandwidth of {exact(self.pair.bandwidth)} rad/s"
-        if self.pair.sample_time is not None:
-            return f"{loop} and adaptation every {exact(self.pair.sample_time)} s"
         return f"{loop} and an adaptation rate of {exact(self.pair.adaptation_rate)}"
 
     @property
     def slack(self) -> str:
         """The margin in per cent, with the condition that has the least where there are several."""
         margins = {condition: margin.below for condition, margin in self.pair.margins.items()}
-        if (
-            self.section == HARDWARE.key
-        ):  # the level is as low as it can be: what matters is what of dbar it leaves
-            return percent(margins.get(LEVEL))
         tightest = min(margins, key=lambda condition: margins[condition], default="")
         least = margins.get(tightest)
         known = least if least is not None and isfinite(least) else None

@@ -20,8 +20,6 @@ from tubecert.coordinates import inverse
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, ExpressionError, free_symbols, parse, symbol
-from tubecert.kinds import HARDWARE
-from tubecert.report.machine import proven
 
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
@@ -51,22 +49,15 @@ class Outline:
 
 
 def widths(result: Result) -> dict[str, float] | None:
-    """The half-width of every state by what decides the verdict, in the order of the states; None if none is known."""
-    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
-    found = (
-        machine.half_widths
-        if machine is not None
-        else None
-        if result.tube is None
-        else result.tube.half_widths
-    )
+    """The half-width of every state, in the order of the states; None if none is known."""
+    found = None if result.tube is None else result.tube.half_widths
     if not found:
         return None
     return {name: found[name] for name in result.spec.effective.system.states}
 
 
 def tube_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
-    """What the state stays in, by what decides the verdict; None where there is no tube."""
+    """What the state stays in; None where there is no tube."""
     tube = result.tube
     if tube is None:
         return None
@@ -75,9 +66,7 @@ def tube_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
         return Outline(turn=_root(level**2 * W[np.ix_(pair, pair)]))
     names, known = result.spec.effective.system.states, widths(result)
     sides = None if known is None else (known[names[pair[0]]], known[names[pair[1]]])
-    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
-    radius = float(tube.rho) if machine is None or machine.radius is None else machine.radius
-    return Outline(turn=_ball(tube, radius, pair), sides=sides)
+    return Outline(turn=_ball(tube, float(tube.rho), pair), sides=sides)
 
 
 def domain_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
@@ -87,10 +76,7 @@ def domain_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
 
 
 def _level(result: Result, tube: TubeData) -> float | None:
-    """The distance that is not reached: what H proves where it decides, else dbar = sqrt(a) rho."""
-    machine = proven(result) if result.decided_by == (HARDWARE.key,) else None
-    if machine is not None and machine.level is not None:
-        return float(machine.level)
+    """The distance that is not reached, dbar = sqrt(a) rho."""
     a = None if result.metric is None else result.metric.lower
     return None if a is None or tube.rho_r is None or a.below <= 0 else math.sqrt(a.below) * float(tube.rho)
 

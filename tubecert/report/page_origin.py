@@ -113,7 +113,6 @@ def provenance(certificate: Certificate) -> Iterator[Block]:
         ("specification, as read", Cell(text=result.spec.effective_hash, kind="code")),
         ("specification, the file", Cell(text=result.spec.file_hash, kind="code")),
         ("format", Cell(text=certificate.format)),
-        ("formulas", Cell(text=result.formulas)),
     ]
     facts.append(("effort", Cell(text=_list(to_json(result.effort)))))
     if run.command:

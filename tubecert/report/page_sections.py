@@ -17,7 +17,6 @@ from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
-from tubecert.report.machine import proven as proven_machine
 from tubecert.report.mathml import matrix, named
 from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import (
@@ -35,12 +34,10 @@ from tubecert.report.page import (
     Words,
 )
 from tubecert.report.page_conditions import conditions
-from tubecert.report.page_machine import machine_blocks
 from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
-from tubecert.report.windows import of_gains_blocks
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
@@ -92,8 +89,6 @@ def _tiles(result: Result) -> Iterator[Tile]:
             yield Tile(
                 symbol="Γ", value=exact(row.pair.adaptation_rate), unit="", words=f"adaptation rate{who}"
             )
-        if row.pair.sample_time is not None:
-            yield Tile(symbol="Ts", value=exact(row.pair.sample_time), unit="s", words=f"sample time{who}")
 
 
 _MOST_TILES = 4  # half-widths that are shown first
@@ -115,8 +110,6 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
         yield Section(key="why", title="Not certified", blocks=reasons)
     if result.sections:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
-    if machine := tuple(machine_blocks(result)):
-        yield Section(key="machine", title="Machine", blocks=machine)
     if blocks := tuple(_filled(result)):
         yield Section(key="fills", title="What fills the tube", blocks=blocks)
     if blocks := tuple(_tube(result)):
@@ -169,7 +162,7 @@ def gains_table(result: Result) -> Table | None:
     found = list(rows(result))
     if not found:
         return None
-    columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "Ts (s)", "margin left")
+    columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "margin left")
     note = (
         "Each row was proven on its own: do not take ω from one row and Γ from another. The row marked * "
         "decides the verdict."
@@ -189,8 +182,6 @@ def _gains(result: Result) -> Iterator[Block]:
     yield from (Words(text=line) for line in sections.less_by_distance(result))
     yield from (Words(text=line) for line in sections.beyond_its_theorem(result))
     yield from (Words(text=line) for line in sections.without_adaptation(result))
-    if (limit := sections.sample_time_limit(result)) is not None:
-        yield Words(text=f"However large the bandwidth, C needs a sample time below {down(limit)} s.")
     yield from _reasons(result, certified=True)
     if curves := tuple(gain_figures(result)):
         yield Figures(figures=curves)
@@ -237,7 +228,6 @@ def _tube(result: Result) -> Iterator[Block]:
         yield from _drawn(result)
     if figures := tuple(state_figures(result)):
         yield Figures(figures=figures)
-    yield from of_gains_blocks(result)
 
 
 def _drawn(result: Result) -> Iterator[Block]:
@@ -257,10 +247,7 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
         )
         yield "epsilon, by state", Cell(text=reach.in_states(result, tube, tube.epsilon, "epsilon"))
     known = widths(result)
-    if known and known != tube.half_widths:
-        yield "proven half-widths", Cell(text=reach.half_widths(result, known))
-        yield "constants bounded over", Cell(text=reach.half_widths(result, tube.half_widths or {}))
-    elif known:
+    if known:
         yield "half-widths", Cell(text=reach.half_widths(result, known))
         for line in reach.asked_for(result, known):
             words, _, rest = line.partition(": ")
@@ -277,7 +264,7 @@ def _inputs(result: Result) -> Iterator[Block]:
         yield _input_table(result)
     if figures := tuple(input_figures(result)):
         yield Figures(figures=figures)
-        if not result.inputs and proven_machine(result) is None:
+        if not result.inputs:
             yield Words(text=_NO_LIMITS)
 
 

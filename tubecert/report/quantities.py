@@ -23,7 +23,6 @@ Value = Fraction | float | str | None
 _SYMBOLS = {
     "bandwidth": "ω (rad/s)",
     "adaptation_rate": "Γ",
-    "sample_time": "Ts (s)",
     "ultimate_radius": "in the long run",
     "rate": "rate λ (1/s)",
     "rho_a": "rho_a",

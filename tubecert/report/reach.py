@@ -11,11 +11,8 @@ from rich.text import Text
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
-from tubecert.kinds import HARDWARE
-from tubecert.report import windows
 from tubecert.report.claimed import family_words, horizon, radius
 from tubecert.report.gains import NAMES
-from tubecert.report.machine import proven as hardware_proven
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
 
@@ -48,7 +45,7 @@ def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
         lines.append(
             f"{name} {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
         )
-    lines += [*windows.lines(result), *excursion(result), *clearances(result)]
+    lines += [*excursion(result), *clearances(result)]
     found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
     return [*map(Text, lines), *map(Text, found)]
 
@@ -99,18 +96,16 @@ def excursion(result: Result) -> Iterator[str]:
 
 
 def is_radius(result: Result) -> bool:
-    """Whether the radius of the tube is a length in the states, and is what is proven."""
-    decides = hardware_proven(result) is not None and result.decided_by == (HARDWARE.key,)
-    return not decides and (result.tube is None or result.tube.coordinates is None)
+    """Whether the radius of the tube is a length in the states."""
+    return result.tube is None or result.tube.coordinates is None
 
 
 def extent(result: Result) -> str:
     """How far the state may be from the plan: the radius, or the half-widths of a tube measured by the metric."""
-    tube, own = result.tube, hardware_proven(result)
+    tube = result.tube
     if is_radius(result) or tube is None or tube.half_widths is None:
         return f"{up(radius(result))} {_unit(result)}".rstrip()
-    decides = own is not None and result.decided_by == (HARDWARE.key,)
-    return f"the half-widths {half_widths(result, own.half_widths if own and decides else tube.half_widths)}"
+    return f"the half-widths {half_widths(result, tube.half_widths)}"
 
 
 def _unit(result: Result) -> str:
@@ -157,8 +152,6 @@ def input_lines(result: Result, own: InputData) -> Iterator[str]:
             f"{own.input} {stays} {reaches}{where}; {limits}: {used(own, key)} used (the plan is in {plan}, feedback "
             f"adds {up(bound.feedback)}{adapts})"
         )
-        if (when := windows.nearest(own, windows.windows_of(result.sections.get(key)))) is not None:
-            yield f"{own.input} by window{where}: {when}"
     if not told:
         yield f"{own.input} is in {plan} on the plan; {limits}; nothing is proven of it in the loop"
     if own.verdict is Verdict.REFUTED:

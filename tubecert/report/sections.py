@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -13,17 +13,14 @@ from rich.text import Text
 
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Bound, MetricData, Result, TubeData
-from tubecert.claims.assumptions import MachineAsGiven
-from tubecert.claims.family import Assumption, Reason
+from tubecert.claims.assumptions import HardwareLeftOut
+from tubecert.claims.family import Reason
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
-from tubecert.kinds import ALONE, DISTANCE, HARDWARE, RATES, SAMPLED
+from tubecert.kinds import ALONE, DISTANCE, RATES
 from tubecert.kinds.alone import AloneData
-from tubecert.kinds.sampled import SampledData
 from tubecert.report.claimed import point
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.layout import plain_table
-from tubecert.report.machine import lines as machine_lines
-from tubecert.report.machine import section_of
 from tubecert.report.reach import input_lines, safe_set, tube_lines
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
@@ -47,8 +44,6 @@ def of(result: Result, *, verbose: bool) -> Iterator[Section]:
         yield "Not certified", failed
     if result.sections:
         yield "Gains", _gains(result)
-    if section_of(result) is not None:
-        yield "Machine", [Text(line) for line in machine_lines(result)]
     if holding:
         yield "What limits them", [_reason(result, item) for item in holding]
     if result.tube is not None:
@@ -89,7 +84,7 @@ def _gains(result: Result) -> list[RenderableType]:
     found = list(rows(result))
     body: list[RenderableType] = []
     if found:
-        table = plain_table("certificate", "gains", "verdict", ">omega", ">Gamma", ">Ts", "margin left")
+        table = plain_table("certificate", "gains", "verdict", ">omega", ">Gamma", "margin left")
         before = ""
         for row in found:
             table.add_row(
@@ -105,7 +100,7 @@ def _gains(result: Result) -> list[RenderableType]:
             body.append(
                 Text(
                     "Each row was proven on its own: do not take omega from one row and Gamma from another. The row "
-                    "marked * decides the verdict. omega is in rad/s, Ts in s. Gains are the least that are proven, so "
+                    "marked * decides the verdict. omega is in rad/s. Gains are the least that are proven, so "
                     "a margin of next to nothing is no sign of danger.",
                     style="dim",
                 )
@@ -116,7 +111,7 @@ def _gains(result: Result) -> list[RenderableType]:
     body += [Text(f"{title}: no gains were found") for title in missing]
     lines = (*less_by_distance(result), *beyond_its_theorem(result), *without_adaptation(result))
     body += [Text(line) for line in lines]
-    return body + _limit(result)
+    return body
 
 
 def less_by_distance(result: Result) -> Iterator[str]:
@@ -174,21 +169,9 @@ def _is_one(value: object) -> bool:
     return isinstance(value, str)
 
 
-def gain_columns(row: Gains) -> tuple[Fraction | None, Fraction | None, Fraction | None]:
-    """Bandwidth, adaptation rate and sample time."""
-    return row.pair.bandwidth, row.pair.adaptation_rate, row.pair.sample_time
-
-
-def sample_time_limit(result: Result) -> float | None:
-    """What no sample time reaches, whatever the bandwidth."""
-    section = result.sections.get(SAMPLED.key)
-    return section.sample_time_limit if isinstance(section, SampledData) else None
-
-
-def _limit(result: Result) -> list[Text]:
-    """What no bandwidth can go beyond."""
-    limit = sample_time_limit(result)
-    return [] if limit is None else [Text(f"However large the bandwidth, C needs Ts < {down(limit)} s.")]
+def gain_columns(row: Gains) -> tuple[Fraction | None, Fraction | None]:
+    """Bandwidth and adaptation rate."""
+    return row.pair.bandwidth, row.pair.adaptation_rate
 
 
 # -- tube and metric
@@ -261,16 +244,6 @@ def gap(item: Bound) -> str:
 # -- assumptions
 
 
-def _computes(stated: Sequence[Assumption]) -> str:
-    """How the controller of a machine computes."""
-    found = next((each.arithmetic for each in stated if isinstance(each, MachineAsGiven)), None)
-    return (
-        "it computes exactly"
-        if found is None
-        else f"it computes in {found} precision, whose rounding is covered"
-    )
-
-
 def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
     stated, declared = result.assumptions, result.declared
     believed = [
@@ -283,18 +256,10 @@ def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
         return [table]
     test = None if result.metric is None else result.metric.unique_geodesics
     proven = test is not None and test.holds
-    if result.decided_by == (HARDWARE.key,):
-        brief = (
-            "the machine is as stated: it samples on time, its inputs follow after exactly the delay, its measurements "
-            f"are as good as stated, {_computes(stated)}; the uncertainty and the wind are as specified"
-        )
-        return [
-            Text(line)
-            for line in [f"{brief} ({len(stated)} in all, -v shows them)", *believed[: len(declared)]]
-        ]
     geodesics = "exact geodesics (their uniqueness is proven)" if proven else "exact and unique geodesics"
     brief = (
         f"exact continuous-time control, full state, no noise, delay or saturation; {geodesics}; filter "
         f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
     )
-    return [Text(line) for line in [brief, *(believed if declared else [])]]
+    left_out = [assumed(item) for item in stated if isinstance(item, HardwareLeftOut)]
+    return [Text(line) for line in [brief, *left_out, *(believed if declared else [])]]

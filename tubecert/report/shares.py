@@ -4,7 +4,7 @@ In: `result` of a certificate. Out: shares, each an upper bound by outward-round
 and the printed recipe. No claim rests on them.
 
 At the edge of the tube contraction shortens the distance by lambda dbar per second. The causes lengthen it by what
-they are told here (theory 4, 4a, 4b, 7, and 8 for H); what is left is for the start, until the filter has learned the
+they are told here (theory 4, 4a, 7); what is left is for the start, until the filter has learned the
 uncertainty, and for the margin.
 """
 
@@ -20,12 +20,9 @@ from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import FIELDS, Numbers
-from tubecert.conditions.sampled import SampledRecipe, ages
 from tubecert.conditions.theorem import Recipe
-from tubecert.conditions.wind import taken, turning
+from tubecert.conditions.wind import taken
 from tubecert.enclosure.interval import Interval
-from tubecert.kinds.hardware import HardwareData
-from tubecert.report.machine import Share, shares
 from tubecert.verdict import Verdict
 
 _LEAST = 5e-5  # a smaller share is not told
@@ -36,11 +33,18 @@ _CAUSES: Mapping[str, str] = {
     "uncertainty": "the uncertainty, which nothing compensates",
     "bias": "the filter's lag behind the uncertainty",
     "adaptation": "the error of the adaptation",
-    "sampling": "the estimate's age: it is renewed once per sample",
     "wind_estimate": "wind that the estimate takes for uncertainty",
 }
 _START = "the start, until the filter has learned the uncertainty"
 _START_ALONE = "the start, until the feedback has made it good"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Share:
+    """What a cause takes of the tube, at most."""
+
+    cause: str
+    share: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +56,7 @@ class Filled:
 
 
 def filled(result: Result) -> list[Filled]:
-    """Every kind that is certified and whose causes are known: 0, B, C, H."""
+    """Every kind that is certified and whose causes are known: 0 and B."""
     found = (Filled(key=key, shares=tuple(_of_kind(result, key))) for key in result.sections)
     return [each for each in found if each.shares]
 
@@ -61,10 +65,6 @@ def _of_kind(result: Result, key: str) -> list[Share]:
     section, recipe = result.sections[key], result.proof.of.get(key)
     if section.verdict is not Verdict.CERTIFIED or recipe is None:
         return []
-    if isinstance(recipe, (DistanceRecipe, SampledRecipe)) and recipe.windows:
-        return []  # what fills one window does not fill another
-    if isinstance(section, HardwareData):
-        return [] if section.budget is None else shares(section.budget)
     pair = section.decisive(asked=result.asked)
     n = _numbers(result)
     if n is None or pair is None:
@@ -90,23 +90,11 @@ def _pushes(result: Result, n: Numbers[Interval], recipe: Recipe) -> Iterator[tu
             yield "bias", n.beta * Interval.of(S)
             yield "adaptation", n.beta * (Interval.of(e) - taken(n))
             yield "wind_estimate", n.beta * taken(n)
-        case SampledRecipe(speed=Y):
-            yield from _of_samples(n, recipe, Interval.of(Y))
         case _:
             return
     yield "plan", n.delta
     yield "parameters", _constant(result, "residual_push") or Interval.of(0)
     yield "wind", n.wind_push if n.wind_push is not None else Interval.of(0)
-
-
-def _of_samples(n: Numbers[Interval], recipe: SampledRecipe, Y: Interval) -> Iterator[tuple[str, Interval]]:
-    Ts, omega = Interval.of(recipe.sample_time), Interval.of(recipe.bandwidth)
-    age = ages(Ts, omega, Interval.of(recipe.predictor_gain))
-    s1 = n.Dht + n.Dhx * Y
-    turned = n.DBpx * n.DB if n.DBpx.hi * n.DB.hi < n.DBp.hi * n.DBx.hi else n.DBp * n.DBx
-    yield "bias", n.beta * s1 * age.w
-    yield "sampling", n.beta * age.m * (s1 + turned * n.Dh * Y + turning(n) * Y)
-    yield "wind_estimate", n.beta * taken(n)
 
 
 def _numbers(result: Result) -> Numbers[Interval] | None:
@@ -116,17 +104,15 @@ def _numbers(result: Result) -> Numbers[Interval] | None:
     if len(named) != len(known) or result.metric is None or result.tube is None:
         return None
     tube = result.tube
-    zero = Interval.of(0)
     wind = result.claim.wind
-    size = None if wind is None or wind.bound is None else Interval.of(Fraction(wind.bound))
+    size = None if wind is None else Interval.of(Fraction(wind.bound))
     return Numbers(
         **named,
-        R=zero,
+        R=Interval.of(0),
         lam=Interval.of(result.metric.rate),
         rho=Interval.of(tube.rho),
         rho_a=Interval.of(tube.rho_a),
         rho_r=Interval.of(tube.rho - tube.rho_a),
-        offset=zero,
         horizon=None,
         wind_push=_times(_constant(result, "wind_push"), size),
         wind_speed=_times(_constant(result, "wind_size"), size),

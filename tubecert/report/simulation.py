@@ -43,7 +43,6 @@ _WORDS: Final = {
     "u": "|u|",
     "xtilde": "|xtilde|",
     "sigma_error": "|sigma_hat - h|",
-    "estimate": "|q - h|",
     "speed": "|x'|",
 }
 
@@ -140,10 +139,8 @@ def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[Renderab
         yield "VIOLATION", list(broken)
     stopped = [_stopped(part, item) for part in parts for item in part.comparison.stopped[:3]]
     stopped += [_unresolved(part, item) for part in parts for item in part.comparison.unresolved[:3]]
-    loops = [own.loop for own in data.loops]
-    cautions = [Text(f"{loop.controller}: {loop.caution}") for loop in loops if loop.caution is not None]
-    if stopped or cautions:
-        yield "Stopped, or no result" if stopped else "Unstable", [*cautions, *stopped]
+    if stopped:
+        yield "Stopped, or no result", list(stopped)
     yield (
         f"Loops under the uncertainty {data.uncertainty}, 0 <= t <= {short(data.horizon)} s",
         [_loops(data)],
@@ -159,7 +156,7 @@ def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[Renderab
     if data.obstacles.plan:
         yield "Obstacles (least distance; negative: collision)", [_obstacles(data)]
     if verbose:
-        yield "Gains", [_gains(loop, loop.gains) for loop in loops if loop.gains is not None]
+        yield "Gains", [_gains(own.loop, own.loop.gains) for own in data.loops if own.loop.gains is not None]
 
 
 def _when(item: ViolationData) -> str:
@@ -209,10 +206,6 @@ def _gain_words(loop: LoopData) -> str:
     words = ["no filter" if gains.bandwidth is None else f"omega {short(gains.bandwidth)}"]
     if gains.adaptation_rate is not None:
         words.append(f"Gamma {short(gains.adaptation_rate)}")
-    if gains.sample_time is not None:
-        words.append(f"Ts {short(gains.sample_time)}")
-    if loop.control_rate is not None:
-        words.append(f"held at {short(loop.control_rate)} Hz")
     return ", ".join(words)
 
 

@@ -32,8 +32,8 @@ _INSIDE = 0.97  # of the room in the safe set: samples may miss the widest place
 class Wish:
     """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance.
 
-    Those of the states are followed by those of the `outputs` (k, n). `fits`: a tube that would leave the safe set
-    through a state for which nothing is asked is made as much narrower.
+    Those of the states are followed by those of the `outputs` (k, n). A tube that would leave the safe set through a
+    state for which nothing is asked is made as much narrower.
     `apart` (n,) is x(0) - x*(0); where any start within a radius is allowed, that is `within`. `box` (n, 2) is the safe
     set.
     """
@@ -44,7 +44,6 @@ class Wish:
     within: float
     box: Array
     outputs: Array
-    fits: bool = True
 
     def start(self, S: Array) -> float:
         """How far the start is from the plan's, in z."""
@@ -62,7 +61,7 @@ class Wish:
         beyond = [
             _INSIDE * float(free) / float(width)
             for asked, free, width in zip(self.asked[:n], room, widths[:n], strict=True)
-            if self.fits and asked is None and 0 < free < level * width
+            if asked is None and 0 < free < level * width
         ]
         return min([level, *beyond])
 

@@ -17,7 +17,7 @@ from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.obstacles import reach
-from tubecert.conditions.predictor import Predictor, predictor
+from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.wind import felt, is_felt, pushed, taken
@@ -41,10 +41,8 @@ def best_gain(n: Numbers[Array], omega: Array, Y: Array) -> Array:
 
 
 def _predictor(problem: TubeProblem, n: Numbers[Array], omega: Array, Y: Array) -> Predictor[Array]:
-    if problem.A_m is None:
-        return Predictor.of_gain(best_gain(n, omega, Y), omega)
     g = problem.predictor_gain
-    return predictor(problem.A_m, omega, None if g is None else np.asarray(float(g)))
+    return Predictor.of_gain(best_gain(n, omega, Y) if g is None else np.asarray(float(g)), omega)
 
 
 @quiet
@@ -78,7 +76,7 @@ def least_rate(
 def _rate_beside(n: Numbers[Array], omega: Array, Y: Array, p: Predictor[Array], e: Array) -> Array:
     """The Gamma for which (7.9) gives e, infinite where none does: a quadratic equation for 1/Gamma."""
     room = (e - taken(n)) / (n.DBpx * Y + n.DBp * (omega + p.shifted))
-    drag, hs = felt(n, p) / p.q, n.Dh + n.R
+    drag, hs = felt(n) / p.q, n.Dh + n.R
     c = 2 * hs * (n.Dht + n.Dhx * Y) / p.q
     K, A = hs**2 + c, room**2 - 2 * drag**2
     linear = A * K + 2 * drag**2 * c
@@ -103,15 +101,14 @@ def recipes_at(
     problem: TubeProblem,
     bandwidths: Sequence[Fraction],
     rates: Sequence[Fraction],
-    gains: Sequence[Fraction | None],
+    gains: Sequence[Fraction],
     inflation: float = 1e-9,
 ) -> list[DistanceRecipe]:
     """Recipes at given gains: the least fixed point Y, e, S in floats, inflated, as decimals."""
     R_H = problem.projection_radius
     n = problem.floats(R_H)
     omega, Gamma = (np.array([float(x) for x in xs]) for xs in (bandwidths, rates))
-    given = [float(g) for g in gains if g is not None]
-    p = predictor(problem.A_m, omega, np.array(given) if given else None)
+    p = Predictor.of_gain(np.array([float(g) for g in gains]), omega)
     e = np.zeros_like(omega)
     for _ in range(400):
         # Y is closed for a given e, so that only the error itself is iterated
@@ -142,7 +139,7 @@ def recipes_served(
     problem: TubeProblem,
     bandwidths: Sequence[Fraction],
     rates: Sequence[Fraction],
-    gains: Sequence[Fraction | None],
+    gains: Sequence[Fraction],
 ) -> list[DistanceRecipe]:
     """The best recipes found at given pairs of gains; where they serve at all, their inequalities have room."""
     for inflation in (1e-9, 1e-6, 1e-3):
@@ -153,14 +150,14 @@ def recipes_served(
     return recipes
 
 
-def recipe_at(problem: TubeProblem, omega: Fraction, Gamma: Fraction, g: Fraction | None) -> DistanceRecipe:
+def recipe_at(problem: TubeProblem, omega: Fraction, Gamma: Fraction, g: Fraction) -> DistanceRecipe:
     """The best recipe found at one pair of gains."""
     return recipes_served(problem, [omega], [Gamma], [g])[0]
 
 
-def printed_gain(problem: TubeProblem, n: Numbers[Array], omega: Fraction, e: float) -> Fraction | None:
+def printed_gain(problem: TubeProblem, n: Numbers[Array], omega: Fraction, e: float) -> Fraction:
     """The predictor gain at a printed bandwidth: the one given, or the best one to 4 digits."""
-    if problem.A_m is not None:
+    if problem.predictor_gain is not None:
         return problem.predictor_gain
     w = np.asarray(float(omega))
     g = float(best_gain(n, w, theorem_b.least_speed(n, w, np.asarray(e))))
@@ -169,14 +166,13 @@ def printed_gain(problem: TubeProblem, n: Numbers[Array], omega: Fraction, e: fl
 
 def printed_rates(
     problem: TubeProblem, bandwidths: Sequence[Fraction]
-) -> list[tuple[Fraction, Fraction, Fraction | None]]:
+) -> list[tuple[Fraction, Fraction, Fraction]]:
     """(omega, Gamma, g) at printed bandwidths: g first, then Gamma for the printed g, rounded up."""
     n = problem.floats(problem.projection_radius)
     omega = np.array([float(w) for w in bandwidths])
     e = least_rate(problem, n, omega)[1]
     gains = [printed_gain(problem, n, w, float(e[i])) for i, w in enumerate(bandwidths)]
-    given = [float(g) for g in gains if g is not None]
-    Gamma = least_rate(problem, n, omega, np.array(given) if given else None)[0]
+    Gamma = least_rate(problem, n, omega, np.array([float(g) for g in gains]))[0]
     return [
         (w, round_up(max(float(G) * (1 + _SLACK), 1e-12), DIGITS), g)
         for w, G, g in zip(bandwidths, Gamma, gains, strict=True)
@@ -199,13 +195,12 @@ def least_at(problem: TubeProblem, omega: Fraction) -> DistanceRecipe | None:
     return None
 
 
-def recipe_from(problem: TubeProblem, omega: float, high: float = np.inf) -> DistanceRecipe | None:
-    """The recipe at the first printed bandwidth that serves; more digits only if 4 overshoot `high`."""
+def recipe_from(problem: TubeProblem, omega: float) -> DistanceRecipe | None:
+    """The recipe at the first printed bandwidth that serves; more digits only where 4 do not."""
     if not np.isfinite(omega):
         return None
     for digits in (DIGITS, 5, 6, 8, 12):
-        w = round_up(omega * (1 + _SLACK), digits)
-        if float(w) <= high and (recipe := least_at(problem, w)) is not None:
+        if (recipe := least_at(problem, round_up(omega * (1 + _SLACK), digits))) is not None:
             return recipe
     return None
 
@@ -265,7 +260,7 @@ def propose_distance(problem: TubeProblem, asked: Asked) -> Proposal[DistanceRec
         return replace(whole, decisive=decisive, role="asked", around=_around(problem, decisive))
     if asked.bandwidth is None:
         return whole
-    g = asked.bandwidth if problem.A_m is None else problem.predictor_gain
+    g = problem.predictor_gain or asked.bandwidth
     return replace(whole, hopeless=recipe_at(problem, asked.bandwidth, _ENDLESS, g))
 
 

@@ -42,7 +42,7 @@ def elasticities_26(problem: TubeProblem, least: RateRecipe | None) -> dict[str,
     if least is None:
         return {}
     n, lanes = _perturbed(problem)
-    s = RateSearch(problem=problem, n=n, terms=rate_terms(problem, n))
+    s = RateSearch(problem=problem, n=n, terms=rate_terms(n))
     omega = np.full(lanes, float(least.bandwidth))
     return _slopes(needed_rate(s, omega, gains_along(s, omega)))
 

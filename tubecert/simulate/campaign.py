@@ -243,7 +243,7 @@ def follow(
 
 def _uncertainty(setting: Setting, loop: Loop, seed: int, replay: int | None) -> tuple[Array, Disturbance]:
     """Start (n,) and h of the run that is drawn: the specification's own, or those of a random run."""
-    kind = setting.class_of(loop)
+    kind = setting.uncertainty
     if replay is not None:
         found = case(setting, kind, seed, replay)
         return found.start, disturbance_of(setting, kind, [found])
@@ -270,7 +270,7 @@ def _attack(
     if sample is not None and not sample.interrupted:
         try:
             found = attack(setting, loop, seed, report)
-            one = disturbance_of(setting, setting.class_of(loop), [found])
+            one = disturbance_of(setting, setting.uncertainty, [found])
             worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
             measured = compare(setting, worst, loop.promise)
         except KeyboardInterrupt:

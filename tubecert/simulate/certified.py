@@ -6,7 +6,7 @@ Nothing is believed that the hash does not cover; nothing is proven here either 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Final
@@ -17,17 +17,11 @@ from tubecert.bounds.constants import WIND
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
-from tubecert.conditions.hardware import HardwareRecipe
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
-from tubecert.kinds import HARDWARE
 from tubecert.kinds.data import SectionData
-from tubecert.kinds.distance import DistanceData
-from tubecert.kinds.hardware import HardwareData
-from tubecert.kinds.sampled import SampledData
-from tubecert.kinds.windows import WindowData
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.inputs import InputRange, proven_ranges
 from tubecert.spec import Spec, load_text
@@ -37,7 +31,6 @@ from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import sentence
 
-GAIN: Final = "gain_error"
 _UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 
 
@@ -49,43 +42,17 @@ class Values(dict[str, float]):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Own:
-    """What certificate H proves, and its tube; `clip` is low and high, per input, None for a ball.
-
-    `levels`: of windows, until when in s, and the level there; empty for one level.
-    """
-
-    recipe: HardwareRecipe
-    radius: float
-    half_widths: tuple[float, ...]
-    clip: tuple[tuple[float, float], ...] | None
-    levels: tuple[tuple[float, float], ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Narrow:
-    """A window of B or C until `end` in s: d(x*, x) < level, |x - x*| < radius, and |x_i - x_i*| by state."""
-
-    end: float
-    level: float
-    radius: float
-    half_widths: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """What one kind of certificate states: whether it is certified, by which recipe, and the radius in the long run.
 
     `recipe` are the numbers that it proves its claim with, by their names in `proof`; `ranges` what is proven of
-    inputs that have limits. `windows`: what certificates B and C prove in each, where they have any.
+    inputs that have limits.
     """
 
     certified: bool
     recipe: Values
     ultimate: float | None
     ranges: tuple[InputRange, ...] = ()
-    own: Own | None = None
-    windows: tuple[Narrow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,17 +88,6 @@ class Certified:
         """The safe side of a constant."""
         return self.constants[name]
 
-    @property
-    def raised(self) -> float:
-        """What the feedback of a machine is multiplied by: 1/(1 - D_b), 1 where B is known (theory 8.10)."""
-        return 1 / (1 - self.constants.get(GAIN, 0.0))
-
-    @property
-    def machine(self) -> Own | None:
-        """What certificate H proves, if it does."""
-        found = self.proven(HARDWARE.key)
-        return None if found is None else found.own
-
     def proven(self, section: str) -> Section | None:
         """A section, if there is one and it is certified."""
         found = self.sections.get(section)
@@ -146,7 +102,7 @@ def adopted(spec: Spec, result: Result) -> Spec:
     compared(spec, result).require(spec, "the certificate")
     other = load_text(result.spec.effective.at_rest(_UNUSED), "certificate")
     spec = as_set(spec, result.overrides)
-    spec = replace(spec, tube=replace(other.tube, windows=spec.tube.windows))
+    spec = replace(spec, tube=other.tube)
     if result.overrides.metric is None and spec.metric is not None:
         return spec
     return replace(spec, metric=other.metric, synthesis=other.synthesis)
@@ -213,9 +169,7 @@ def read_numbers(result: Result) -> Certified:
             {name: item.above for name, item in result.constants.items() if item.above is not None}
         ),
         sections={
-            name: replace(
-                _section(result, recipe, result.sections.get(name)), ranges=proven_ranges(result, name)
-            )
+            name: replace(_section(recipe, result.sections.get(name)), ranges=proven_ranges(result, name))
             for name, recipe in result.proof.of.items()
         },
         beside=_acting(result),
@@ -228,42 +182,15 @@ def _acting(result: Result) -> Acting:
         [found.get(name, 0.0) for name in WIND if name.startswith(kind)] for kind in ("wind_", "residual_")
     )
     wind = result.claim.wind
-    size = 0.0 if wind is None or wind.bound is None else float(Fraction(wind.bound))
+    size = 0.0 if wind is None else float(Fraction(wind.bound))
     push, speed, taken = (size * value for value in blown)
     return Acting(push=push + left[0], size=speed + left[1], taken=taken)
 
 
-def _section(result: Result, recipe: Recipe, found: SectionData | None) -> Section:
+def _section(recipe: Recipe, found: SectionData | None) -> Section:
     numbers = {item.name: getattr(recipe, item.name) for item in fields(recipe)}
-    certified = found is not None and found.verdict is Verdict.CERTIFIED
     return Section(
-        certified=certified and result.formulas == "corrected",
+        certified=found is not None and found.verdict is Verdict.CERTIFIED,
         recipe=Values({name: float(x) for name, x in numbers.items() if isinstance(x, Fraction)}),
         ultimate=None if found is None else found.ultimate_radius,
-        own=_own(result, found, recipe)
-        if isinstance(found, HardwareData) and isinstance(recipe, HardwareRecipe)
-        else None,
-        windows=tuple(_narrow(result, found.windows))
-        if isinstance(found, (DistanceData, SampledData))
-        else (),
-    )
-
-
-def _narrow(result: Result, windows: Sequence[WindowData]) -> Iterator[Narrow]:
-    for each in windows:
-        if each.level is not None and each.radius is not None:
-            widths = tuple(each.half_widths[name] for name in result.spec.effective.system.states)
-            yield Narrow(end=float(each.end), level=float(each.level), radius=each.radius, half_widths=widths)
-
-
-def _own(result: Result, found: HardwareData, recipe: HardwareRecipe) -> Own | None:
-    """What certificate H states; None if it states nothing."""
-    if found.radius is None:
-        return None
-    return Own(
-        recipe=recipe,
-        radius=found.radius,
-        half_widths=tuple(found.half_widths[name] for name in result.spec.effective.system.states),
-        clip=tuple((float(low), float(high)) for low, high in found.clip) or None,
-        levels=tuple((float(w.end), float(w.level)) for w in found.windows if w.level is not None),
     )

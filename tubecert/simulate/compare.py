@@ -28,7 +28,7 @@ from tubecert.simulate.setting import Setting
 
 USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
-SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "estimate", "speed")
+SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,30 +201,12 @@ def _violations(
     for name, values, bound, size in beyond(runs, promise.ranges):
         excess = np.where(usable, values - bound - (slack - 1) * size, -np.inf)
         found += _broken(name, excess, values, np.full(runs.lanes, bound), np.full(runs.lanes, np.nan))
-    found += _inputs_over_time(promise, runs, slack - 1, usable)
     if promise.decay is not None:
         found += _over_time("D(t)", runs.distance, promise.decay(runs.t), runs.t, room * setting.reach)
     for item in runs.failures:
         if item.lane in _left_before(setting, runs):
             peak = float(runs.worst.deviation.value[item.lane])
             found.append(Violation(name="tube", lane=item.lane, time=item.t, value=peak, bound=setting.rho))
-    return found
-
-
-def _inputs_over_time(
-    promise: Promise, runs: Runs, room: Array, usable: NDArray[np.bool_]
-) -> list[Violation]:
-    """Inputs beyond the range of their window, at the output times of runs whose inputs are kept."""
-    found: list[Violation] = []
-    kept = runs.k.shape[1] == len(runs.t)  # of many runs, only the extremes are
-    for own in promise.ranges:
-        if not (own.windows and kept):
-            continue
-        low, high = own.over(runs.t)
-        allowed = np.where(usable, room, np.inf)[:, None] * (own.greatest - own.least)
-        u = runs.u[:, :, own.column]
-        found += _over_time(f"input {own.name} in its window", u, high, runs.t, allowed)
-        found += _over_time(f"input -{own.name} in its window", -u, -low, runs.t, allowed)
     return found
 
 

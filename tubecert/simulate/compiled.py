@@ -37,7 +37,7 @@ _COMMON: dict[str, object] = {
     **({"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}),
 }
 KERNELS = (
-    "program", "small", "layout", "loops", "geodesic", "feedback", "fast", "computer", "machine",
+    "program", "small", "layout", "loops", "geodesic", "feedback", "fast",
     "stepping", "walking", "compiled", "parts", "pointed",
 )  # fmt: skip
 

@@ -89,8 +89,6 @@ def generator(fast: Fast, B: Array) -> tuple[Array, Array]:
     if terms.adapts:
         L[y.xtilde, y.sigma_hat] = B  # (0.6) ... + B sigma_hat
         L[y.sigma_hat, y.xtilde] = -fast.Gamma * B.T @ fast.P  # (0.7) sigma_hat' = -Gamma B'P xtilde
-    if terms.samples:
-        L[y.xtilde, y.s_hat] = np.eye(fast.at.n)  # (4.5) ... + s_hat
     return L, E
 
 
@@ -202,8 +200,6 @@ def _rate(fast: Any, sliding: bool, y: Any, h: Any, B: Any, dy: Any) -> None:
             rate.xtilde[i] = dot(fast.A[i], now.xtilde) - dot(B[i], h)  # (0.6) - (0.1): A_m xtilde - B h ...
             if fast.forces > fast.at.m:
                 rate.xtilde[i] -= h[fast.at.m + i]  # ... - E w
-        if terms.samples:
-            rate.xtilde[i] += now.s_hat[i]  # (4.5) ... + s_hat
         if terms.adapts:
             rate.xtilde[i] += dot(B[i], now.sigma_hat)  # (0.6) ... + B sigma_hat
             weighed = dot(fast.P[i], now.xtilde)

@@ -2,8 +2,6 @@
 
 The feedback (0.5) is the smallest k with phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where
 phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*) + 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E and phi_1 = 2 B'M gamma_s(1).
-
-What acts is at the state x; a machine (`machine`) computes at what it measures, with the same functions.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from tubecert.simulate.compiled import compiled, folded
 from tubecert.simulate.geodesic import FOUND, Curve, Metric, connect, metric
 from tubecert.simulate.problem import Beside, Disturbance
 from tubecert.simulate.program import Program, assemble, execute
-from tubecert.simulate.small import boxed, clip, dot
+from tubecert.simulate.small import clip, dot
 
 INFEASIBLE = 10
 _ROUNDING = 1e-12
@@ -32,7 +30,7 @@ _THIN = 0.05  # of the layer: where a wind that aims turns round
 class Field(NamedTuple):
     """f (n,), B (n, m), the base of h (m,), E (n, k), row by row, and r (n,) as one program; metric, rate in 1/s.
 
-    The program is one of t, x and the parameters of which ranges are known; if these stand in B, that B comes last.
+    The program is one of t, x and the parameters of which ranges are known.
     """
 
     program: Program
@@ -43,7 +41,7 @@ class Field(NamedTuple):
 class Force(NamedTuple):
     """The disturbance of every lane (`problem.Disturbance`), the centre taken into the phases.
 
-    `amplitude` (N, W, m), `wave` (N, W, n), `frequency` and `phase` (N, W), `push` and `radius` (N,), `box` (2, m).
+    `amplitude` (N, W, m), `wave` (N, W, n), `frequency` and `phase` (N, W), `push` and `radius` (N,).
     """
 
     amplitude: Array
@@ -52,7 +50,6 @@ class Force(NamedTuple):
     phase: Array
     push: Array
     radius: Array
-    box: Array
     beside: Beside
     layer: float
 
@@ -84,23 +81,18 @@ class Model(NamedTuple):
 class Point(NamedTuple):
     """Working memory and results of `evaluate`.
 
-    `plant`: f and B at the state; `seen`: where a machine looks; h (m,) at the state, k (m,), `push` = B'M gamma_s(1)
-    (m,); E (n, k), w (k,) and `wind` = E w (n,). `signal` (2, m): a h that moves along a line (`problem.Beside`), its
-    value and its slope since the time `since` (1,). `gain` (n, m) is the plant's B less B; empty if B is known.
+    `plant`: f and B at the state; h (m,) there, k (m,), `push` = B'M gamma_s(1) (m,); E (n, k), w (k,) and `wind` = E w
+    (n,).
     """
 
     memory: Array
     plant: Model
-    seen: Model
     h: Array
     k: Array
     push: Array
     E: Array
     w: Array
     wind: Array
-    signal: Array
-    since: Array
-    gain: Array
     curve: Curve
 
 
@@ -112,24 +104,18 @@ def field(
     h = [ZERO] * m if base is None else list(base)
     outputs = [*model.f, *(e for row in model.B for e in row), *h, *(e for row in E for e in row)]
     outputs += [row[0] for row in rest]
-    outputs += [e for row in model.gained for e in row]
     program, memory = assemble(outputs, (TIME, *model.states, *dict(model.parameters)))
     space, curve = metric(model, degree)
     sizes = n, m, len(E[0]) if E else 0
-    return Field(program, space, float(model.rate)), point(memory, curve, sizes, uncertain=bool(model.gained))
+    return Field(program, space, float(model.rate)), point(memory, curve, sizes)
 
 
-def point(memory: Array, curve: Curve, sizes: tuple[int, int, int], *, uncertain: bool = False) -> Point:
-    """Fresh results around the memory of a program and of a geodesic, for n states, m inputs and k winds.
-
-    `uncertain`: whether the plant has a B of its own.
-    """
+def point(memory: Array, curve: Curve, sizes: tuple[int, int, int]) -> Point:
+    """Fresh results around the memory of a program and of a geodesic, for n states, m inputs and k winds."""
     n, m, k = sizes
-    gain = np.zeros((n, m) if uncertain else (0, m))
-    plant, seen = (Model(np.zeros(n), np.zeros((n, m))) for _ in range(2))
     h, push, feedback = (np.zeros(m) for _ in range(3))
     wind = np.zeros((n, k)), np.zeros(k), np.zeros(n)
-    return Point(memory, plant, seen, h, feedback, push, *wind, np.zeros((2, m)), np.zeros(1), gain, curve)
+    return Point(memory, Model(np.zeros(n), np.zeros((n, m))), h, feedback, push, *wind, curve)
 
 
 def force(d: Disturbance) -> Force:
@@ -141,7 +127,6 @@ def force(d: Disturbance) -> Force:
         phase=_dense(d.phase - d.wave @ d.centre),
         push=_dense(d.push),
         radius=_dense(d.radius),
-        box=_dense(d.box),
         beside=Beside(*map(_dense, d.beside)),
         layer=float(d.layer),
     )
@@ -152,11 +137,8 @@ def _dense(part: Array) -> Array:
 
 
 @folded
-def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point) -> tuple[int, float]:
-    """(status, d(x*, x)^2) at a moment; f, B, h, k and the wind go into `point`.
-
-    Without `whole` the geodesic and k are left out, unless something pushes the lane along it.
-    """
+def evaluate(field: Field, force: Force, now: Moment, point: Point) -> tuple[int, float]:
+    """(status, d(x*, x)^2) at a moment; f, B, h, k and the wind go into `point`."""
     n, m = point.plant.B.shape
     theta = force.beside.theta
     for l in range(theta.shape[1]):
@@ -168,18 +150,13 @@ def evaluate(field: Field, force: Force, now: Moment, whole: bool, point: Point)
     for i in range(n):
         for l in range(point.w.shape[0]):
             point.E[i, l] = point.memory[field.program.outputs[place + m + i * point.w.shape[0] + l]]
-    status, energy = FOUND, 0.0
-    if whole or force.push[now.lane] != 0.0 or force.beside.aim[now.lane] > 0.0:
-        status, energy = steer(field, now.plan, now.x, point.plant, point)
+    status, energy = steer(field, now.plan, now.x, point.plant, point)
     _disturb(force, now, point)
     _blow(force, now, point)
     rest = place + m + point.E.size
     if theta.shape[1] > 0 and field.program.outputs.shape[0] > rest:
         for i in range(n):
             point.wind[i] += point.memory[field.program.outputs[rest + i]]
-            for j in range(m if point.gain.shape[0] > 0 else 0):
-                own = point.memory[field.program.outputs[rest + n + i * m + j]]
-                point.gain[i, j] = own - point.plant.B[i, j]
     return status, energy
 
 
@@ -232,7 +209,7 @@ def _feedback(decay: float, plan: Reference, model: Model, point: Point) -> int:
 
 @folded
 def _disturb(force: Force, now: Moment, point: Point) -> None:
-    """Adds the lane's waves, push and signal to its base h, and keeps that in its set (`problem.Disturbance`)."""
+    """Adds the lane's waves and push to its base h, and keeps that in its ball (`problem.Disturbance`)."""
     h, lane = point.h, now.lane
     for w in range(force.phase.shape[1]):
         angle = force.frequency[lane, w] * now.t + dot(now.x, force.wave[lane, w]) + force.phase[lane, w]
@@ -243,10 +220,6 @@ def _disturb(force: Force, now: Moment, point: Point) -> None:
         share = force.push[lane] / np.sqrt(dot(point.push, point.push) + force.layer * force.layer)
         for j in range(h.shape[0]):
             h[j] += share * point.push[j]
-    if force.beside.ramp[lane] > 0.0:
-        for j in range(h.shape[0]):
-            h[j] += point.signal[0, j] + (now.t - point.since[0]) * point.signal[1, j]
-    boxed(h, force.box)
     clip(h, force.radius[lane])
 
 

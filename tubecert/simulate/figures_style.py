@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 COLORS: Final = {
     "l1": "#0072B2",
-    "sampled": "#009E73",
-    "hardware": "#56B4E9",
     "ccm": "#D55E00",
     "reference": "#CC79A7",
     "nominal": "#7F7F7F",
@@ -26,8 +24,6 @@ COLORS: Final = {
 TUBE: Final = "#E69F00"
 NAMES: Final = {
     "l1": "L1 adaptive",
-    "sampled": "L1, sampled adaptation",
-    "hardware": "on its hardware",
     "ccm": "CCM alone",
     "reference": "reference system",
     "nominal": "CCM, no uncertainty",

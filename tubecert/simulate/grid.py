@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
-from tubecert.simulate.computer import Computer
 from tubecert.simulate.fast import Fast, exact_flows
 from tubecert.simulate.feedback import Reference
 from tubecert.simulate.layout import layout
-from tubecert.simulate.machine import EVENTS, Machine
-from tubecert.simulate.problem import LoopProblem, unbounded
-from tubecert.simulate.program import Index
+from tubecert.simulate.problem import LoopProblem
 from tubecert.simulate.replanning import Replanned
 from tubecert.simulate.stepping import Grid
 from tubecert.spec import Knots
@@ -27,49 +21,14 @@ _FEWEST_STEPS = 64
 MOST_STEPS = 4_000_000
 
 
-def corners(problem: LoopProblem) -> tuple[Array, Index]:
-    """Times (C,) that must be ends of steps, and what happens at them: numbers of `EVENTS` (4, C), or -1."""
+def corners(problem: LoopProblem) -> Array:
+    """Times (C,) that must be ends of steps."""
     end = problem.horizon
-    kinds = instants(problem)
     kinks = _kinks(problem.plan)
-    every = np.concatenate([[0.0, end], problem.times, kinks[kinks < end], *kinds])
-    every = np.unique(np.minimum(every, end))
+    every = np.unique(np.minimum(np.concatenate([[0.0, end], problem.times, kinks[kinks < end]]), end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
-    events = np.full((len(EVENTS), len(t)), -1)
-    for row, times in zip(events, kinds, strict=True):
-        row[nearest(t, times)] = np.arange(len(times))
-    return t, events
-
-
-def instants(problem: LoopProblem) -> list[Array]:
-    """Of each of `EVENTS` the times in [0, horizon]."""
-    period, machine = sample_period(problem), problem.machine
-    if machine is not None and problem.terms.measures:
-        rates = [(*machine.adaptation,), (*machine.feedback,)]
-        return [_ticks(problem, Ts, after) for Ts, delay in rates for after in (0.0, delay)]
-    return [_ticks(problem, period, 0.0), *[np.zeros(0)] * 3]
-
-
-def measurements(problem: LoopProblem) -> int:
-    """How often a machine measures."""
-    if problem.machine is None or not problem.terms.measures:
-        return 0
-    _, events = corners(problem)
-    return int(((events[EVENTS.index("sample")] >= 0) | (events[EVENTS.index("look")] >= 0)).sum())
-
-
-def _ticks(problem: LoopProblem, period: float | None, delay: float) -> Array:
-    """Times a delay after the samples of a period."""
-    if period is None:
-        return np.zeros(0)
-    end = problem.horizon
-    if end / period > MOST_STEPS:
-        raise ValueError(
-            f"a sample time of {near(period)} s needs more than {MOST_STEPS} samples in {near(end)} s"
-        )
-    ticks = np.arange(math.floor(end / period * (1 + 1e-12)) + 1) * period + delay
-    return np.asarray(ticks[ticks <= end * (1 + 1e-12)])
+    return np.asarray(t)
 
 
 def _kinks(plan: Plan) -> Array:
@@ -102,21 +61,9 @@ def nearest(t: Array, wanted: Array) -> Array:
     return np.asarray(right - (wanted - t[right - 1] < t[right] - wanted))
 
 
-def sample_period(problem: LoopProblem) -> float | None:
-    """Time between samples of the computer in s; None if there is none."""
-    if problem.control_rate is not None:
-        return 1.0 / problem.control_rate
-    if problem.terms.samples and problem.gains is not None:
-        return problem.gains.sample_time
-    return None
-
-
-IDLE = Computer(False, 0.0, 1, 1.0, 0.0, 1.0)  # loops with a computer and without one are compiled once
-
-
 def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     """The steps of a level, each level with twice as many as the one before, and their distinct lengths (Q,)."""
-    t, events = corners(problem)
+    t = corners(problem)
     spans = np.diff(t)
     counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
     if counts.sum() > MOST_STEPS:
@@ -127,14 +74,12 @@ def steps(problem: LoopProblem, level: int) -> tuple[Grid, Array]:
     length = np.repeat(np.array([float(f"{span:.10g}") for span in spans / counts]), counts)
     distinct, which = np.unique(length, return_inverse=True)
     exact_length = np.repeat(spans / counts, counts)
-    output, event = np.full(len(start) + 1, -1), np.full((len(EVENTS), len(start) + 1), -1)
-    event[:, first] = events
+    output = np.full(len(start) + 1, -1)
     output[first[nearest(t, problem.times)]] = np.arange(len(problem.times))
     grid = Grid(
         start=np.append(start, problem.horizon),
         length=np.append(exact_length, 0.0),
         which=np.append(which, 0),
-        event=event,
         output=output,
         plan=course(problem, start, exact_length),
     )
@@ -169,7 +114,7 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
         terms=problem.terms,
         at=at,
         forces=at.m + (at.n if problem.E or problem.rest else 0),
-        A=np.zeros((at.n, at.n)) if gains is None else gains.A_m(at.n),
+        A=np.zeros((at.n, at.n)) if gains is None else -gains.predictor_gain * np.eye(at.n),
         P=np.eye(at.n) if problem.P is None else problem.P,
         Gamma=1.0 if gains is None or gains.adaptation_rate is None else gains.adaptation_rate,
         omega=1.0 if gains is None else gains.bandwidth,
@@ -180,49 +125,7 @@ def fast_part(problem: LoopProblem, lengths: Array, level: int) -> Fast:
         forced=np.zeros((1, 3, at.size, at.m)),
         turn=0.5**level,
     )
-    if not problem.adaptive or problem.control_rate is not None or not model.constant_input:
+    if not problem.adaptive or not model.constant_input:
         return found
     B = np.array([[float(e.fraction) for e in row] for row in model.B])
     return exact_flows(found, B, lengths)
-
-
-def machine(problem: LoopProblem) -> Machine | None:
-    """The machine of the loop, if there is one."""
-    own, m = problem.machine, len(problem.model.inputs)
-    if own is None or not problem.terms.measures:
-        return None
-    return Machine(
-        Ts=own.sample_time,
-        th=-math.expm1(-own.bandwidth * own.sample_time),
-        waiting=1 + math.ceil(own.feedback[1] / own.feedback[0]),
-        predicts=own.predict,
-        plays=not own.held,
-        box=unbounded(m) if own.box is None else own.box,
-        radius=own.radius,
-        raised=own.raised,
-    )
-
-
-def computer(problem: LoopProblem) -> Computer | None:
-    """The computer of the loop, or one that never samples; None beside a machine.
-
-    ValueError if the sample time is no multiple of the control period.
-    """
-    gains, rate = problem.gains, problem.control_rate
-    if sample_period(problem) is None:
-        return IDLE if machine(problem) is None else None
-    dt = 0.0 if rate is None else 1.0 / rate
-    every, weight, growth = 1, 0.0, 1.0
-    if gains is not None and problem.terms.samples:
-        Ts, g = gains.sample_time, gains.predictor_gain
-        assert Ts is not None
-        assert isinstance(g, float | int)
-        if rate is not None:
-            every = round(Ts * rate)
-            if every < 1 or abs(Ts * rate - every) > 1e-6 * every:
-                raise ValueError(
-                    f"the sample time {near(Ts)} s must be a multiple of the control period {near(dt)} s"
-                )
-        weight, growth = g / math.expm1(g * Ts), math.exp(g * Ts)
-    decay = math.exp(-gains.bandwidth * dt) if gains is not None else 1.0
-    return Computer(rate is not None, dt, every, decay, weight, growth)

@@ -10,84 +10,32 @@ from numpy.typing import NDArray
 
 from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
-from tubecert.kinds.distance import DistanceData
-from tubecert.kinds.hardware import HardwareData
-from tubecert.kinds.sampled import SampledData
-from tubecert.kinds.windows import WindowData
 from tubecert.simulate.runs import Runs
 from tubecert.spec import Spec
-
-_MEETS = 1e-9  # s: times of the output are floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InTime:
-    """A range from `begin` to `end`, in s."""
-
-    begin: float
-    end: float
-    least: float
-    greatest: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputRange:
-    """An input, by name and column, and a range that it keeps to.
-
-    `windows`: from and until when, in s, and the range between; empty where it is the same at all times.
-    """
+    """An input, by name and column, and a range that it keeps to."""
 
     name: str
     column: int
     least: float
     greatest: float
-    windows: tuple[InTime, ...] = ()
-
-    def over(self, t: Array) -> tuple[Array, Array]:
-        """Both ends at times t (K,); where two windows meet, what either allows."""
-        low, high = np.full(len(t), self.least), np.full(len(t), self.greatest)
-        for k, at in enumerate(t):
-            there = [w for w in self.windows if w.begin - _MEETS <= at <= w.end + _MEETS]
-            if there:
-                low[k], high[k] = min(w.least for w in there), max(w.greatest for w in there)
-        return low, high
 
 
 def proven_ranges(result: Result, key: str) -> tuple[InputRange, ...]:
-    """What a certificate proves of every input with limits, in the loop of a kind; H of every input."""
+    """What a certificate proves of every input with limits, in the loop of a kind."""
     columns = {name: column for column, name in enumerate(result.spec.effective.system.inputs)}
-    found = result.sections.get(key)
-    if isinstance(found, HardwareData):
-        return tuple(
-            InputRange(
-                name=name,
-                column=columns[name],
-                least=least,
-                greatest=greatest,
-                windows=_in_windows(name, found.windows),
-            )
-            for name, (least, greatest) in found.inputs.items()
-        )
     return tuple(
         InputRange(
             name=own.input,
             column=columns[own.input],
             least=own.bounds[key].least,
             greatest=own.bounds[key].greatest,
-            windows=_in_windows(own.input, found.windows)
-            if isinstance(found, (DistanceData, SampledData))
-            else (),
         )
         for own in result.inputs
         if key in own.bounds
-    )
-
-
-def _in_windows(name: str, windows: Sequence[WindowData]) -> tuple[InTime, ...]:
-    return tuple(
-        InTime(begin=float(w.begin), end=float(w.end), least=w.inputs[name][0], greatest=w.inputs[name][1])
-        for w in windows
-        if name in w.inputs
     )
 
 

@@ -27,7 +27,6 @@ _AGREEING = 0.02  # of the horizon: two levels that stop a lane this near to eac
 _LIVED = 16  # steps that a lane must have come: what stops it earlier may be nothing but their length
 _PATIENCE = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
 _DOUBTFUL = 7  # the level from which on a run that does not converge is given up
-_DOUBTFUL_HELD = 4  # the same where a computer holds the input: what is between its samples is smooth
 
 
 def integrate(
@@ -63,13 +62,10 @@ class Ladder:
     """The levels of one problem, built when first needed and kept for its next batch of lanes."""
 
     def __init__(self, problem: LoopProblem, base: tuple[Expression, ...] | None) -> None:
-        from tubecert.simulate import grid
         from tubecert.simulate.feedback import field
 
         self.problem = problem
         self.field, self.point = field(problem.model, base, problem.E, problem.rest, problem.degree)
-        self.computer, self.machine = grid.computer(problem), grid.machine(problem)
-        self.holds = self.machine is not None or (self.computer is not None and self.computer.holds)
         self._levels: dict[int, Lane] = {}
 
     def level(self, number: int, disturbance: Disturbance) -> Lane:
@@ -85,11 +81,7 @@ class Ladder:
                 field=self.field,
                 force=acting,
                 fast=grid.fast_part(self.problem, lengths, number),
-                computer=self.computer,
-                machine=self.machine,
-                holds=self.holds,
-                plays=not self.holds or (self.machine is not None and self.machine.plays),
-                flows=self.problem.adaptive and not self.holds,
+                flows=self.problem.adaptive,
                 limit=self.problem.limit,
                 grid=steps,
             )
@@ -106,15 +98,10 @@ class _Lanes:
     """Lanes on their way down the levels."""
 
     def __init__(self, problem: LoopProblem, starts: Array, disturbance: Disturbance) -> None:
-        from tubecert.simulate.grid import measurements
         from tubecert.simulate.layout import layout
         from tubecert.simulate.stepping import output
 
-        self.problem, self.starts, self.disturbance = (
-            problem,
-            starts,
-            disturbance.undecided(measurements(problem)),
-        )
+        self.problem, self.starts, self.disturbance = problem, starts, disturbance
         self.ladder = ladder(problem, disturbance.base)
         self.N, n = starts.shape
         self.found = output(self.N, len(problem.times), layout(n, len(problem.model.inputs)))
@@ -135,7 +122,6 @@ class _Lanes:
                     raise
                 break  # no more steps: the error estimates say how far it came
             finer = run(lane, self.ladder.point, self.starts[lanes], len(self.problem.times))
-            self.disturbance.beside.decided[lanes] = lane.force.beside.decided
             self.steps[lanes] = len(lane.grid.start) - 1
             done = self._compare(lanes, finer, number, tolerance, lane.grid.start)
             lanes = lanes[~done]
@@ -174,7 +160,7 @@ class _Lanes:
 
     def _hopeless(self, lanes: NDArray[np.intp], number: int) -> NDArray[np.bool_]:
         """Whether smaller steps do not help: a change that stays, or a lane that is stopped at every level."""
-        if number < (_DOUBTFUL_HELD if self.ladder.holds else _DOUBTFUL):
+        if number < _DOUBTFUL:
             return np.zeros(len(lanes), dtype=bool)
         changes, failed = self.changes[lanes], self.failed[lanes]
         now, then = changes[:, number], changes[:, number - _PATIENCE]
@@ -237,10 +223,9 @@ def run(own: Lane, point: Point, starts: Array, outputs: int) -> Output:
     N, at = len(starts), own.fast.at
     out, stop = stepping.output(N, outputs, at), np.zeros(1)
     chunk = max(1, min(_CHUNK, -(-N // _cores())))
-    waiting = 1 if own.machine is None else own.machine.waiting
 
     def work(first: int, last: int) -> None:
-        stepping.run(first, last, own, starts, stepping.work(own.fast, point, stop, waiting), out)
+        stepping.run(first, last, own, starts, stepping.work(own.fast, point, stop), out)
 
     work(0, 0)  # compiles, in a thread that Ctrl-C ends
     pool = ThreadPoolExecutor(_cores())

@@ -3,9 +3,8 @@
 | block | shape | what | theory |
 |---|---|---|---|
 | `xtilde` | (n,) | xhat - x, the error of the predictor | (0.6) |
-| `sigma_hat` | (m,) | the estimate of h | (0.7), (4.5) |
+| `sigma_hat` | (m,) | the estimate of h | (0.7) |
 | `u_a` | (m,) | the filter's output | (0.8) |
-| `s_hat` | (n,) | the estimate of B h that is held between samples | (4.5) |
 | `v` | (n,) | int B u_a since the start of the step: all that the slow part needs of y | |
 """
 
@@ -26,7 +25,6 @@ class Layout(NamedTuple):
     m: int
     sigma_hat: int
     u_a: int
-    s_hat: int
     v: int
     size: int
 
@@ -37,13 +35,12 @@ class Blocks(NamedTuple):
     xtilde: Any
     sigma_hat: Any
     u_a: Any
-    s_hat: Any
     v: Any
 
 
 def layout(n: int, m: int) -> Layout:
     """The layout for n states and m inputs."""
-    return Layout(n, m, *accumulate((n, m, m, n, n)))
+    return Layout(n, m, *accumulate((n, m, m, n)))
 
 
 @inlined
@@ -52,8 +49,7 @@ def blocks(y: Any, at: Any) -> Any:
     return Blocks(
         y[: at.sigma_hat],
         y[at.sigma_hat : at.u_a],
-        y[at.u_a : at.s_hat],
-        y[at.s_hat : at.v],
+        y[at.u_a : at.v],
         y[at.v : at.size],
     )
 

@@ -8,8 +8,6 @@ The plant is the same for all of them, x' = f + B(u + h) with u = u* + k + u_a, 
 | `knows` | the estimate is h itself, else sigma_hat | 3, the reference system |
 | `predicts` | xtilde' = A_m xtilde - B h + what follows | (0.6) less (0.1) |
 | `adapts` | ... + B sigma_hat, and sigma_hat' = Gamma Proj(sigma_hat, -B'xtilde) | (0.6), (0.7) |
-| `samples` | ... + s_hat, which is held between samples as sigma_hat is | (4.5) |
-| `measures` | none: a machine holds k and u_a = -sigma_hat between its instants | (H.3)-(H.5) |
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-Controller = Literal["nominal", "ccm", "reference", "l1", "sampled", "hardware"]
+Controller = Literal["nominal", "ccm", "reference", "l1"]
 
 
 class Terms(NamedTuple):
@@ -27,13 +25,6 @@ class Terms(NamedTuple):
     knows: bool = False
     predicts: bool = False
     adapts: bool = False
-    samples: bool = False
-    measures: bool = False
-
-    @property
-    def estimates(self) -> bool:
-        """Whether the loop estimates h."""
-        return self.predicts or self.measures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +41,5 @@ DESIGNS: Final[dict[Controller, Design]] = {
     "ccm": Design(terms=Terms()),
     "reference": Design(terms=Terms(filters=True, knows=True)),
     "l1": Design(terms=Terms(filters=True, predicts=True, adapts=True), needs=("adaptation_rate",)),
-    "sampled": Design(terms=Terms(filters=True, predicts=True, samples=True), needs=("sample_time",)),
-    "hardware": Design(terms=Terms(measures=True)),
 }
 CONTROLLERS: Final[tuple[Controller, ...]] = tuple(DESIGNS)

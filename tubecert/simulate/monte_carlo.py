@@ -116,14 +116,14 @@ def monte_carlo(
         tell()
         executor.map(partial(along, setting, loop, seed), batches, ready)
     parts = [found[place] for place in takewhile(found.__contains__, range(len(batches)))]
-    kind = setting.class_of(loop)
+    kind = setting.uncertainty
     cases = tuple(case(setting, kind, seed, number) for number in range(sum(part.lanes for part in parts)))
     return Sample(runs=joined(parts), cases=cases, asked=count) if parts else None
 
 
 def along(setting: Setting, loop: Loop, seed: int, numbers: Sequence[int]) -> Runs:
     """The runs of some numbers, without what only drawings need."""
-    kind = setting.class_of(loop)
+    kind = setting.uncertainty
     cases = [case(setting, kind, seed, number) for number in numbers]
     return _slim(_run(setting, kind, with_times(loop.problem, TIMES), cases, setting.tolerance))
 
@@ -159,7 +159,7 @@ def attack(setting: Setting, loop: Loop, seed: int, report: Progress | None = No
     The evolution's own runs are known up to ten times the tolerance: what they find is a proposal.
     """
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
-    problem, kind = with_times(loop.problem, 2), setting.class_of(loop)
+    problem, kind = with_times(loop.problem, 2), setting.uncertainty
     size = genes_of_case(setting, kind)
     population = _POPULATION_IF_DEAR if setting.dear else _POPULATION
     genes, worst = rng.random((population, size)), np.full(population, -np.inf)

@@ -30,9 +30,8 @@ class Worst:
     u: Peak  # |u* + k + u_a|
     k: Peak
     xtilde: Peak  # |S xtilde|
-    sigma_error: Peak  # |sigma_hat - h|; for "sampled" |sigma_hat - h| of the held estimate
+    sigma_error: Peak  # |sigma_hat - h|
     h: Peak
-    estimate: Peak  # |q - h| of a machine, at its samples, before q is clipped
     speed: Peak  # |S x'|
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
@@ -22,9 +21,9 @@ from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulate.certified import Certified, certified_plan, read_numbers
 from tubecert.simulate.loops import Controller
-from tubecert.simulate.problem import LoopProblem, unbounded
+from tubecert.simulate.problem import LoopProblem
 from tubecert.simulate.promise import Promise
-from tubecert.simulate.uncertainty import Class, Sources, class_of, noises
+from tubecert.simulate.uncertainty import Class, Sources, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
@@ -36,15 +35,11 @@ _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one.
-
-    `caution` says what is wrong with it before it is simulated, if anything is.
-    """
+    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
 
     problem: LoopProblem
     origin: str
     promise: Promise | None
-    caution: str = ""
 
     def along(self, plan: Plan) -> Loop:
         """The same around another plan."""
@@ -58,7 +53,7 @@ class Loop:
     @property
     def tested(self) -> bool:
         """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
-        return self.problem.terms.estimates
+        return self.problem.terms.predicts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,8 +61,8 @@ class Setting:
     """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
 
     `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind. `uncertainty` is the
-    class of every loop but that of a machine, whose class is `on_machine`. `dear`: every run takes so many steps that
-    they are attacked with runs that are less accurate, and with fewer.
+    class of what may act. `dear`: every run takes so many steps that they are attacked with runs that are less
+    accurate, and with fewer.
     """
 
     spec: Spec
@@ -81,7 +76,6 @@ class Setting:
     within: float
     spread: Array
     uncertainty: Class
-    on_machine: Class | None
     E: Matrix
     rest: Matrix
     h: tuple[Expression, ...] | None
@@ -104,10 +98,6 @@ class Setting:
         """The same around another plan of the family that is certified; the state starts on it, or `within` of it."""
         start = _start_of(plan)
         return replace(self, plan=plan, x0=start, centre=start)
-
-    def class_of(self, loop: Loop) -> Class:
-        """What may act on a loop."""
-        return self.on_machine if loop.problem.terms.measures and self.on_machine else self.uncertainty
 
     @property
     def rho(self) -> float:
@@ -163,7 +153,6 @@ def setting_of(
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
         uncertainty=class_of(certified, n, m, _beside(certified, model)),
-        on_machine=_class_on_machine(spec, certified, model, centre),
         E=_wind(model, result),
         rest=_rest(model, result),
         h=None if wanted is None else tuple(term.expression for term in wanted),
@@ -171,40 +160,14 @@ def setting_of(
     )
 
 
-def _class_on_machine(
-    spec: Spec, certified: Certified, model: ControlAffineModel, centre: Array
-) -> Class | None:
-    """The class of certificate H, with its noise and wind; None if H is not certified."""
-    own, hardware = certified.machine, spec.hardware
-    if own is None or hardware is None:
-        return None
-    pinv = np.linalg.pinv(certified.S @ inputs_at(model, centre)) @ certified.S
-    noise = [float(q) for q in hardware.noise] if isinstance(hardware.noise, tuple) else 1.0
-    sources = Sources(
-        pace=certified.rate,
-        k=len(model.E[0]) if model.E else 0,
-        wind=float(own.recipe.wind),
-        table=noises(float(own.recipe.noise) * np.array(noise), pinv),
-        noise_rate=math.inf if hardware.noise_rate is None else float(hardware.noise_rate),
-        signal=class_of(certified).rate_at(float(own.recipe.speed)),
-        box=unbounded(len(spec.inputs)) if own.clip is None else np.array(own.clip).T,
-        ranges=_ranges(model),
-    )
-    return class_of(certified, len(spec.states), len(spec.inputs), sources)
-
-
 def _beside(certified: Certified, model: ControlAffineModel) -> Sources | None:
-    """What acts beside h on loops that see everything; None if nothing does."""
+    """What acts beside h; None if nothing does."""
     if not model.E and not model.parameters:
         return None
     return Sources(
         pace=certified.rate,
         k=len(model.E[0]) if model.E else 0,
         wind=float(model.wind_bound or 0),
-        table=np.zeros((1, len(model.states))),
-        noise_rate=math.inf,
-        signal=0.0,
-        box=unbounded(len(model.inputs)),
         ranges=_ranges(model),
     )
 
@@ -218,7 +181,7 @@ def _rest(model: ControlAffineModel, result: Result) -> Matrix:
     """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
     if not model.drift:
         return ()
-    matched = Beside(_fields(model, result)).matched
+    matched = column(Beside(_fields(model, result)).known)
     unknown = combine(1, column(model.drift), -1, column(model.f))
     return combine(1, unknown, -1, multiply(model.B, matched))
 
@@ -237,17 +200,6 @@ def _wind(model: ControlAffineModel, result: Result) -> Matrix:
     fields = _fields(model, result)
     reached = multiply(fields.B_pinv, fields.of_vector(model.E))
     return combine(1, model.E, -1, multiply(model.B, reached))
-
-
-def inputs_at(model: ControlAffineModel, x: Array) -> Array:
-    """B (n, m) at a state (n,)."""
-    m = len(model.inputs)
-    values = [*x, *np.zeros(m)]
-    return (
-        Tape([e for row in model.B for e in row], (*model.states, *model.inputs))
-        .run_floats(values, ())
-        .reshape(-1, m)
-    )
 
 
 def _start_of(plan: Plan) -> Array:

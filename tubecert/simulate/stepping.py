@@ -14,12 +14,10 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.compiled import compiled, entry, folded, inlined
-from tubecert.simulate.computer import Computer, Registers, sample
 from tubecert.simulate.fast import Fast, Inner, advance, inner
 from tubecert.simulate.feedback import Field, Force, Moment, Point, Reference, evaluate, point
 from tubecert.simulate.geodesic import FOUND, copied, forget
 from tubecert.simulate.layout import Layout, blocks
-from tubecert.simulate.machine import SAMPLE, Machine, Notes, attend, begin, carry, notes
 from tubecert.simulate.pointed import pointed
 from tubecert.simulate.program import Index
 from tubecert.simulate.small import copy, dot
@@ -27,41 +25,31 @@ from tubecert.simulate.small import copy, dot
 DIVERGED = 20
 STOPPED = 21
 _FAR = 1e6
-PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h", "estimate", "speed")
-_DISTANCE, _DEVIATION, _U, _K, _XTILDE, _SIGMA_ERROR, _H, _ESTIMATE, _SPEED = range(9)  # their places
+PEAKS = ("distance", "deviation", "u", "k", "xtilde", "sigma_error", "h", "speed")
+_DISTANCE, _DEVIATION, _U, _K, _XTILDE, _SIGMA_ERROR, _H, _SPEED = range(8)  # their places
 START, MIDDLE, END = range(3)  # of a step: the places of its plans
 
 
 class Grid(NamedTuple):
     """Steps: `start` and `length` (S + 1,) in s, the last of length 0.
 
-    `which` (S + 1,) is the number of the length, `output` that of the output time at which the step starts, or -1, and
-    `event` (4, S + 1) those of what a computer or machine does there (`machine.EVENTS`). `plan`: x* (S + 1, 3, n),
-    f(x*) + B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m) at start, middle and end of every step.
+    `which` (S + 1,) is the number of the length, `output` that of the output time at which the step starts, or -1.
+    `plan`: x* (S + 1, 3, n), f(x*) + B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m) at start, middle and end of every step.
     """
 
     start: Array
     length: Array
     which: Index
-    event: Index
     output: Index
     plan: Reference
 
 
 class Lane(NamedTuple):
-    """Everything that a compiled lane reads.
-
-    `holds`: the whole controller is held between the samples of the computer or machine; `plays`: but for u*; `flows`:
-    the fast part moves between the samples. A lane is stopped where |x - x*| exceeds `limit`.
-    """
+    """Everything that a compiled lane reads; `flows`: there is a fast part. It is stopped where |x - x*| > `limit`."""
 
     field: Field
     force: Force
     fast: Fast
-    computer: Computer | None
-    machine: Machine | None
-    holds: bool
-    plays: bool
     flows: bool
     limit: float
     grid: Grid
@@ -79,7 +67,7 @@ class Work(NamedTuple):
     """What a compiled lane writes to while it runs.
 
     `x` (n,) at the start of the step, `state` (n,) where a stage is. `y`, `end` (Y,): the fast part at the start and at
-    the end of a flow. `u` (m,): the input that acts, but for a u_a that flows. `sizes` (9,): what the peaks are taken
+    the end of a flow. `u` (m,): the input that acts, but for a u_a that flows. `sizes` (8,): what the peaks are taken
     of. `stop` (1,): not 0 if all lanes shall end now.
     """
 
@@ -91,8 +79,6 @@ class Work(NamedTuple):
     sizes: Array
     stop: Array
     stages: Stages
-    kept: Registers
-    notes: Notes
     point: Point
     inner: Inner
 
@@ -100,7 +86,7 @@ class Work(NamedTuple):
 class Output(NamedTuple):
     """What N lanes leave behind at K output times; nan where they did not come.
 
-    x and xtilde (N, K, n), k, u_a, sigma_hat and h (N, K, m), distance (N, K). `peak` and `peak_time` (N, 9): the
+    x and xtilde (N, K, n), k, u_a, sigma_hat and h (N, K, m), distance (N, K). `peak` and `peak_time` (N, 8): the
     largest values and when they were met; `least` and `greatest` (N, m): of the inputs; `status` and `ended` (N,): why
     (0: it was not) and when a lane was stopped.
     """
@@ -120,7 +106,7 @@ class Output(NamedTuple):
     ended: Array
 
 
-def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
+def work(fast: Fast, shared: Point, stop: Array) -> Work:
     """Fresh working memory of one thread; that of an evaluation is copied, `stop` (1,) is shared."""
     at, forces = fast.at, fast.forces
     n, m, Y = at.n, at.m, at.size
@@ -134,9 +120,7 @@ def work(fast: Fast, shared: Point, stop: Array, waiting: int = 1) -> Work:
         sizes=np.zeros(len(PEAKS)),
         stop=stop,
         stages=Stages(np.zeros((4, forces)), np.zeros((4, n, m)), np.zeros((4, n))),
-        kept=Registers(np.zeros(m), np.zeros(n), np.zeros((m, m))),
-        notes=notes(n, m, waiting),
-        point=point(shared.memory.copy(), copied(shared.curve), sizes, uncertain=shared.gain.shape[0] > 0),
+        point=point(shared.memory.copy(), copied(shared.curve), sizes),
         inner=inner(at, forces),
     )
 
@@ -177,7 +161,6 @@ def _run(first: int, last: int, own: Lane, starts: Array, work: Work, out: Outpu
         copy(work.x, starts[lane])
         work.y[:] = 0.0
         forget(work.point.curve.bend)
-        begin(own.force, lane, work)
         for s in range(own.grid.start.shape[0]):
             status = _step(own, lane, s, work, out)
             if status == STOPPED:
@@ -205,46 +188,31 @@ def _step(own: Lane, lane: int, s: int, work: Work, out: Output) -> int:
         if not _near(work.state, plan.x, own.limit):
             return DIVERGED
         now = Moment(lane, t + share, work.state, plan)
-        whole = stage == 0 or not own.holds
-        status, energy = evaluate(own.field, own.force, now, whole, work.point)
-        if status == FOUND and stage == 0:
-            work.sizes[_DISTANCE] = np.sqrt(max(energy, 0.0))
-            status = _begin(own, s, now, work, out)
+        status, energy = evaluate(own.field, own.force, now, work.point)
         if status != FOUND:
             return int(status)
+        if stage == 0:
+            work.sizes[_DISTANCE] = np.sqrt(max(energy, 0.0))
+            _begin(own, s, now, work, out)
         for j in range(work.u.shape[0]):
-            work.u[j] = work.kept.u[j] if own.holds else work.point.k[j]
-            work.u[j] += plan.u[j] if own.plays else 0.0
-        _keep(stage, work.point, work.u, plan.u, work.stages)
+            work.u[j] = work.point.k[j] + plan.u[j]
+        _keep(stage, work.point, work.u, work.stages)
         if stage == 0:
             _hurry(own, lane, t, work, out)
     if own.flows:
         _polynomials(work.stages, 4, work.inner)
         advance(fast, length, 2 * grid.which[s] + END - 1, work.y, work.inner, 0, work.end)
     _finish(work.x, work.stages.slope, work.y, work.end, length, v, own.flows)
-    carry(own.machine, own, s, work)
     return FOUND
 
 
 @inlined
-def _begin(own: Lane, s: int, now: Moment, work: Work, out: Output) -> int:
-    """What happens at the start of a step, and what the lane leaves behind there; why it is stopped, if it is."""
-    fast, point, y, status = own.fast, work.point, work.y, FOUND
-    if fast.terms.measures:  # what acts jumps at the instants of a machine: both sides count
-        if s > 0:
-            _what_acts(own, now.plan, work)
-            _measure_sizes(own, now, work)
-            _peaks(now, work, out)
-        status = attend(own.machine, own, s, now, work)
-    elif own.grid.event[SAMPLE, s] >= 0:
-        sample(fast, own.computer, own.grid.event[SAMPLE, s], now, point, y, work.kept)
-    if own.holds:
-        _what_acts(own, now.plan, work)
+def _begin(own: Lane, s: int, now: Moment, work: Work, out: Output) -> None:
+    """What the lane leaves behind at the start of a step."""
     _measure_sizes(own, now, work)
     _peaks(now, work, out)
     if own.grid.output[s] >= 0:
-        _record(fast, now, own.grid.output[s], work, out)
-    return status
+        _record(own.fast, now, own.grid.output[s], work, out)
 
 
 @folded
@@ -279,11 +247,8 @@ def _finish(x: Array, slope: Array, y: Array, end: Array, length: float, v: int,
 
 
 @folded
-def _keep(stage: int, point: Point, u: Array, known: Array, stages: Stages) -> None:
-    """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows.
-
-    Of a plant with a B of its own, f + B u* + B(x, theta)(u - u* + h) + E w, (H.32), u* being `known`.
-    """
+def _keep(stage: int, point: Point, u: Array, stages: Stages) -> None:
+    """h and B of the stage, and its slope f + B(u + h) + E w, where u is without a u_a that flows."""
     n, m = point.plant.B.shape
     for i in range(n):
         stages.slope[stage, i] = point.plant.f[i]
@@ -291,8 +256,6 @@ def _keep(stage: int, point: Point, u: Array, known: Array, stages: Stages) -> N
             stages.h[stage, j], stages.B[stage, i, j] = point.h[j], point.plant.B[i, j]
             stages.slope[stage, i] += point.plant.B[i, j] * (u[j] + point.h[j])
         stages.slope[stage, i] += point.wind[i]
-        for j in range(m if point.gain.shape[0] > 0 else 0):
-            stages.slope[stage, i] += point.gain[i, j] * (u[j] - known[j] + point.h[j])
         if stages.h.shape[1] > m:
             stages.h[stage, m + i] = point.wind[i]
 
@@ -327,14 +290,6 @@ def _through(a: float, b: float, c: float, d: float, stage: int) -> tuple[float,
 
 
 @compiled
-def _what_acts(own: Lane, plan: Reference, work: Work) -> None:
-    """k becomes what acts while u is held: with u* and u_a it adds up to that."""
-    u_a = blocks(work.y, own.fast.at).u_a
-    for j in range(own.fast.at.m):
-        work.point.k[j] = work.kept.u[j] - u_a[j] - (0.0 if own.plays else plan.u[j])
-
-
-@compiled
 def _length(P: Array, a: Array, b: Array) -> float:
     """|S (a - b)|."""
     square = 0.0
@@ -351,7 +306,7 @@ def _measure_sizes(own: Lane, now: Moment, work: Work) -> None:
     y, error = blocks(work.y, fast.at), 0.0
     for j in range(fast.at.m):
         work.u[j] = now.plan.u[j] + k[j] + y.u_a[j]
-        if fast.terms.predicts or fast.terms.measures:
+        if fast.terms.predicts:
             error += (y.sigma_hat[j] - h[j]) ** 2
     sizes[_DEVIATION] = _length(fast.P, now.x, now.plan.x)
     sizes[_U], sizes[_SIGMA_ERROR] = np.sqrt(dot(work.u, work.u)), np.sqrt(error)
@@ -359,7 +314,7 @@ def _measure_sizes(own: Lane, now: Moment, work: Work) -> None:
     square = 0.0
     for i in range(fast.at.n):
         square += y.xtilde[i] * dot(fast.P[i], y.xtilde)
-    sizes[_XTILDE], sizes[_ESTIMATE] = np.sqrt(max(square, 0.0)), work.notes.error[0]
+    sizes[_XTILDE] = np.sqrt(max(square, 0.0))
 
 
 @compiled

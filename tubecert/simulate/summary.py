@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from tubecert.simulate.campaign import Attack, Campaign, Drawn, Members
 from tubecert.simulate.clearance import Clearance
 from tubecert.simulate.compare import Comparison, Use
@@ -25,7 +23,6 @@ from tubecert.simulate.told import (
     FollowedData,
     GainsData,
     LoopData,
-    MachineGainsData,
     MembersData,
     ObstaclesData,
     RandomData,
@@ -87,32 +84,19 @@ def _loop(loop: Loop) -> LoopData:
         gains_are=loop.origin,
         covered=loop.promise is not None,
         tested=loop.tested,
-        control_rate=loop.problem.control_rate,
         gains=_gains(loop),
-        caution=loop.caution or None,
     )
 
 
 def _gains(loop: Loop) -> GainsData | None:
-    gains, machine = loop.problem.gains, loop.problem.machine
-    if machine is not None:
-        return MachineGainsData(
-            bandwidth=_finite(machine.bandwidth),
-            adaptation_rate=None,
-            sample_time=machine.sample_time,
-            delay=machine.delay,
-            feedback_time=machine.feedback_time,
-            projection_radius=_finite(machine.radius),
-            predictor_gain=None,
-        )
+    gains = loop.problem.gains
     if gains is None:
         return None
     return GainsData(
         bandwidth=gains.bandwidth,
         adaptation_rate=gains.adaptation_rate,
-        sample_time=gains.sample_time,
         projection_radius=gains.projection_radius,
-        predictor_gain=np.asarray(gains.predictor_gain).tolist(),
+        predictor_gain=gains.predictor_gain,
     )
 
 
@@ -154,9 +138,7 @@ def _adversary(item: Attack, setting: Setting) -> AdversaryData | None:
             phase=member.phase.tolist(),
             push=member.push,
         ),
-        beside=None
-        if beside is None
-        else {name: part[0].tolist() for name, part in beside.items() if name != "most"},
+        beside=None if beside is None else {name: part[0].tolist() for name, part in beside.items()},
     )
 
 

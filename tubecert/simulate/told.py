@@ -19,17 +19,8 @@ class GainsData:
 
     bandwidth: float | None
     adaptation_rate: float | None
-    sample_time: float | None
     projection_radius: float | None
-    predictor_gain: float | list[list[float]] | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MachineGainsData(GainsData):
-    """Those of the loop of certificate H, with its times in s."""
-
-    delay: float
-    feedback_time: float | None
+    predictor_gain: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +31,7 @@ class LoopData:
     gains_are: str
     covered: bool
     tested: bool
-    control_rate: float | None = None
     gains: GainsData | None = None
-    caution: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,17 +18,12 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.certified import Certified
-from tubecert.simulate.problem import Beside, Disturbance, nothing_beside, unbounded
+from tubecert.simulate.problem import Beside, Disturbance, nothing_beside
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
-_WAVING, _STRAIGHT = (
-    0.25,
-    0.75,
-)  # genes: h is a sum of waves below, a signal with a direction of its own above
-_STEADY: Final = 0.2  # below, a signal or wind never turns round
+_STEADY: Final = 0.2  # below, a wind never turns round
 _ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
-_CANDIDATES: Final = 16  # of the noise at a sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +31,7 @@ class Class:
     """Bounds of |h|, |h_x|, |h_t| and |h(0, x(0))|, n states, m inputs.
 
     `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known.
-    `sources` are those of noise, wind and signals, if there are any.
+    `sources` are those of wind and unknown parameters, if there are any.
     """
 
     h: float
@@ -55,20 +50,12 @@ class Class:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sources:
-    """What acts beside h, within its bounds: |w| <= `wind` for a w of k entries, and noise from `table` (Q, n).
-
-    `noise_rate` bounds |n_k - n_(k-1)| per second. Where `signal` is positive, |dh/dt| along the loop is at most
-    that (s1 of theorem H, whose proof needs no more of h), and h stays in the `box` (2, m). `pace` in 1/s is lambda.
-    """
+    """What acts beside h: |w| <= `wind` for a w of k entries, parameters in `ranges` (p, 2); `pace` lambda, 1/s."""
 
     pace: float
     k: int
     wind: float
-    table: Array
-    noise_rate: float
-    signal: float
-    box: Array
-    ranges: Array  # (p, 2), of parameters
+    ranges: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -197,69 +184,36 @@ def genes_of(kind: Class) -> int:
 
 
 def genes_beside(kind: Class) -> int:
-    """How many of them are about noise, wind and signals."""
-    return 0 if kind.sources is None else 8 + kind.m + kind.sources.k + len(kind.sources.ranges)
+    """How many of them are about wind and unknown parameters."""
+    return 0 if kind.sources is None else 3 + kind.sources.k + len(kind.sources.ranges)
 
 
 def beset(member: Member, kind: Class, genes: Array) -> Member:
-    """The member with the noise, wind and signal that `genes` in [0, 1] describe; a signal replaces its waves."""
-    if kind.sources is None:
-        return member
-    beside = _beside(kind, kind.sources, genes)
-    waves, push = (member.amplitude, member.push) if beside.ramp[0] == 0 else (member.amplitude * 0.0, 0.0)
-    return replace(member, amplitude=waves, push=push, beside=beside)
+    """The member with the wind and the parameters that `genes` in [0, 1] describe."""
+    return member if kind.sources is None else replace(member, beside=_beside(kind.sources, genes))
 
 
 def usual(kind: Class, sources: Sources) -> Beside:
-    """Random noise, and a wind that blows outward, beside an h that is given."""
+    """A wind that blows outward and does not turn, beside an h that is given."""
     genes = np.full(genes_beside(kind), 0.5)
-    genes[[0, 4, 6]] = 0.0  # no signal; a wind that does not turn; noise at random
-    return _beside(kind, sources, genes)
+    genes[1] = 0.0
+    return _beside(sources, genes)
 
 
-def _beside(kind: Class, sources: Sources, genes: Array) -> Beside:
-    signal = sources.signal > 0 and genes[0] > _WAVING
-    first, last = 8 + kind.m, 8 + kind.m + sources.k
-    along, blows = _unit(genes[8:first]), _unit(genes[first:last]) if sources.k else np.zeros(0)
+def _beside(sources: Sources, genes: Array) -> Beside:
+    """Genes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
+    last = 3 + sources.k
+    blows = _unit(genes[3:last]) if sources.k else np.zeros(0)
     low, high = sources.ranges[:, 0], sources.ranges[:, 1]
-    turns = [(sources.pace * 10 ** (4 * fast - 1) if fast > _STEADY else 0.0) for fast in genes[[1, 4]]]
-    phases = [2 * np.pi * genes[2], 2 * np.pi * genes[5] if turns[1] else np.pi / 2]
+    turns = sources.pace * 10 ** (4 * genes[1] - 1) if genes[1] > _STEADY else 0.0
     lane = Beside(
-        ramp=np.array(sources.signal * _ROUND if signal else 0.0),
-        begin=along * kind.h_initial * _ROUND,
-        along=along * float(genes[0] > _STRAIGHT),
-        turning=np.array([turns[0], phases[0]]),
         wind=np.array(sources.wind * _ROUND),
-        aim=np.array(int(2.999 * genes[3])),
+        aim=np.array(int(2.999 * genes[0])),
         blowing=blows,
-        gusting=np.array([turns[1], phases[1]]),
-        choice=np.array(int(2.999 * genes[6])),
-        period=np.array(int(10 ** (3 * genes[7]))),
-        table=sources.table,
-        most=np.array(sources.noise_rate),
+        gusting=np.array([turns, 2 * np.pi * genes[2] if turns else np.pi / 2]),
         theta=low + (high - low) * np.clip(_ENDS * (genes[last:] - 0.5) + 0.5, 0.0, 1.0),
-        decided=np.zeros((0, 1 + kind.m)),
     )
     return Beside(*(part[None] for part in lane))
-
-
-def noises(noise: float | Array, B_pinv: Array) -> Array:
-    """Noise (Q, n) of a ball in the states, or of a box: what B^+ (m, n) makes most of, then all directions.
-
-    One row where there is none: nothing is to be chosen then.
-    """
-    n = B_pinv.shape[1]
-    if not np.any(noise):
-        return np.zeros((1, n))
-    rng = np.random.default_rng(0)
-    if np.ndim(noise):
-        table = np.where(rng.random((_CANDIDATES, n)) < 0.5, -1.0, 1.0)
-        table[0] = np.where(B_pinv[np.argmax(np.abs(B_pinv) @ noise)] < 0, -1.0, 1.0)
-    else:
-        table = _directions(rng, _CANDIDATES, n)
-        table[0] = np.linalg.svd(B_pinv)[2][0]
-    table[1] = -table[0]
-    return np.asarray(table * noise * _ROUND)
 
 
 def _pushed(kind: Class, share: float, layer: float) -> tuple[float, float, float, float]:
@@ -307,11 +261,10 @@ def _begun(member: Member, kind: Class, offset: Array) -> Member:
 
 
 def assembled(members: Sequence[Member], kind: Class, centre: Array, layer: float) -> Disturbance:
-    """One lane for each member; only signals, and h in a box, are clipped, since every member is in the class."""
-    rows = [member.beside or nothing_beside(1, kind.n, kind.m) for member in members]
+    """One lane for each member; what it adds up to is clipped beside a wind only: every member is in the class."""
+    rows = [member.beside or nothing_beside(1) for member in members]
     return Disturbance(
         beside=Beside(*map(np.concatenate, zip(*rows, strict=True))),
-        box=unbounded(kind.m) if kind.sources is None else kind.sources.box,
         base=None,
         amplitude=np.array([member.amplitude for member in members]),
         frequency=np.array([member.frequency for member in members]),

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from tubecert.expression import ZERO, Lookup, constant, full_text, number_text, symbol, to_text
-from tubecert.spec.hardware import LARGEST, ONE_SAMPLE
+from tubecert.spec.hardware import ONE_SAMPLE
 from tubecert.spec.load import VERSION
 from tubecert.spec.lookup import SLOPES
 from tubecert.spec.types import (
@@ -42,14 +42,10 @@ def canonical(spec: Spec) -> dict[str, Any]:
         "initial_state": _initial_state(spec),
         "tube": _tube(spec.tube),
         "adaptation": {
-            "A_m": "auto" if spec.adaptation.A_m == "auto" else _matrix(spec.adaptation.A_m),
+            "A_m": "auto" if (g := spec.adaptation.predictor_gain) is None else number_text(-g),
             "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
         },
-        "conditions": {
-            name: value
-            for name, value in (("kernel", spec.kernel), ("decides", spec.decides))
-            if value is not None
-        },
+        "conditions": {} if spec.decides is None else {"decides": spec.decides},
     }
     if spec.metric is not None:
         data["metric"] = _metric(spec)
@@ -66,10 +62,12 @@ def canonical(spec: Spec) -> dict[str, Any]:
     if spec.simulation is not None:
         data["simulation"] = _simulation(spec.simulation)
     if spec.hardware is not None:
-        data["hardware"] = hardware_data(spec, spec.hardware)
+        data["hardware"] = _hardware(spec, spec.hardware)
     if (wind := spec.disturbance) is not None:
-        bound = LARGEST if wind.bound is None else number_text(wind.bound)
-        data["disturbance"] = {"E": [_texts(row) for row in wind.E], "bound": bound, **_given(rate=wind.rate)}
+        data["disturbance"] = {
+            "E": [_texts(row) for row in wind.E],
+            **_given(bound=wind.bound, rate=wind.rate),
+        }
     return data
 
 
@@ -194,9 +192,6 @@ def _tube(tube: Tube) -> dict[str, Any]:
         data["half_widths"] = _given(**dict(tube.half_widths))
     if tube.gap is not None:
         data["gap"] = tube.gap
-    if tube.windows is not None:
-        own = tube.windows
-        data["windows"] = str(own) if isinstance(own, int) else [number_text(t) for t in own]
     return data
 
 
@@ -209,31 +204,15 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     return shown | {"disc": {"center": _numbers(obstacle.center), **_given(radius=obstacle.radius)}}
 
 
-def hardware_data(spec: Spec, machine: Hardware) -> dict[str, Any]:
-    """The section `hardware`, with every key."""
-
-    def sought(value: Fraction | None, word: str = LARGEST) -> str:
-        return word if value is None else number_text(value)
-
+def _hardware(spec: Spec, own: Hardware) -> dict[str, Any]:
     data: dict[str, Any] = {
-        "sample_time": sought(machine.sample_time),
-        "delay": sought(machine.delay, ONE_SAMPLE if machine.one_sample else LARGEST),
-        "noise": _given(**dict(zip(spec.states, machine.noise, strict=True)))
-        if isinstance(machine.noise, tuple)
-        else sought(machine.noise),
-        "feedforward": "held" if machine.held else "continuous",
-        "predict": "true" if machine.predict else "false",
-        "bandwidth": sought(machine.bandwidth, "auto"),
-        **_given(noise_rate=machine.noise_rate),
+        "delay": ONE_SAMPLE if own.delay is None else number_text(own.delay),
+        "noise": _given(**dict(zip(spec.states, own.noise, strict=True)))
+        if isinstance(own.noise, tuple)
+        else number_text(own.noise),
+        **_given(sample_time=own.sample_time, noise_rate=own.noise_rate),
     }
-    if machine.arithmetic is not None:
-        data["arithmetic"] = machine.arithmetic
-    if machine.geodesic is not None:
-        own = machine.geodesic
-        data["geodesic"] = {"nodes": str(own.nodes), "sweeps": str(own.sweeps)}
-    if machine.feedback_time is not None:
-        data["feedback_rate"] = number_text(1 / machine.feedback_time)
-    return data
+    return data if own.arithmetic is None else data | {"arithmetic": own.arithmetic}
 
 
 def _simulation(wanted: Simulation) -> dict[str, Any]:
@@ -244,7 +223,7 @@ def _simulation(wanted: Simulation) -> dict[str, Any]:
         "h": _texts(wanted.h or ()),
         "runs": None if wanted.runs is None else str(wanted.runs),
         "seed": None if wanted.seed is None else str(wanted.seed),
-        **_given(duration=wanted.duration, control_rate=wanted.control_rate),
+        **_given(duration=wanted.duration),
     }
     return {key: value for key, value in data.items() if value}
 

@@ -13,37 +13,12 @@ from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.instead import same_as
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import (
-    Arithmetic,
-    Disturbance,
-    Hardware,
-    Largest,
-    Picard,
-    Term,
-    TermMatrix,
-    Vector,
-)
+from tubecert.spec.types import Arithmetic, Disturbance, Hardware, Term, TermMatrix, Vector
 
-KEYS: Final = (
-    "rate",
-    "sample_time",
-    "delay",
-    "noise",
-    "noise_rate",
-    "feedforward",
-    "feedback_rate",
-    "predict",
-    "bandwidth",
-    "arithmetic",
-    "geodesic",
-    "limits",
-)
-LARGEST: Final = "largest"
+KEYS: Final = ("rate", "sample_time", "delay", "noise", "noise_rate", "arithmetic", "limits")
 EXACT: Final = "exact"
 _ARITHMETICS: Final[Mapping[str, Arithmetic]] = {"single": "single", "double": "double"}
 ONE_SAMPLE: Final = "one sample"
-MAX_NODES: Final = 256
-MAX_SWEEPS: Final = 32
 MAX_COLUMNS: Final = 32
 
 
@@ -54,16 +29,9 @@ def read_disturbance(field: Field | None, names: Names) -> Disturbance | None:
         return None
     before = len(field.reader.findings)
     E = _shape(entries["E"], names) if "E" in entries else _identity(field, names)
-    unbounded = "bound" in entries and _is(entries["bound"], LARGEST)
     bound = _size(entries, "bound", names)
     rate = _size(entries, "rate", names)
-    if unbounded and rate is not None:
-        entries["rate"].fail(
-            codes.RANGE,
-            "disturbance.rate beside bound: largest",
-            "give the bound, or leave the rate out: what is adapted to depends on how large it is",
-        )
-    if E is None or len(field.reader.findings) > before or (bound is None and not unbounded):
+    if E is None or bound is None or len(field.reader.findings) > before:
         return None
     return Disturbance(E=E, bound=bound, rate=rate)
 
@@ -96,34 +64,12 @@ def _identity(field: Field, names: Names) -> TermMatrix:
     return tuple(tuple(entry(i == j) for j in n) for i in n)
 
 
-def read_hardware(field: Field | None, disturbance: Field | None, names: Names) -> Hardware | None:
-    """The machine; None if the section is absent or unsound. One number of it, or the wind, may be `largest`."""
-    wind = _within(disturbance, "bound")
-    wind = wind if _is(wind, LARGEST) else None
-    if field is None:
-        if wind is not None:
-            wind.fail(
-                codes.MISSING_KEY,
-                "the largest disturbance is that of a machine",
-                "add hardware: {rate: ...}, or give a number",
-            )
-        return None
-    entries = field.mapping(optional=KEYS)
-    if entries is None:
+def read_hardware(field: Field | None, names: Names) -> Hardware | None:
+    """The computer and the sensors; None if the section is absent or unsound."""
+    entries = None if field is None else field.mapping(optional=KEYS)
+    if field is None or entries is None:
         return None
     before = len(field.reader.findings)
-    sought = {
-        key: entries[key] for key in ("sample_time", "delay", "noise") if _is(entries.get(key), LARGEST)
-    }
-    unknown: list[Largest] = [key for key in ("sample_time", "delay", "noise") if key in sought]
-    if wind is not None:
-        unknown.append("wind")
-    if len(unknown) > 1:
-        last = sought.get(unknown[1], wind)
-        assert last is not None
-        last.fail(
-            codes.RANGE, f"{' and '.join(unknown)} are both to be largest", "give numbers for all but one"
-        )
     sample_time = _sample_time(field, entries, names)
     one_sample = _is(entries.get("delay"), ONE_SAMPLE)
     delay = (
@@ -137,38 +83,17 @@ def read_hardware(field: Field | None, disturbance: Field | None, names: Names) 
             f"hardware.delay is {number_text(delay)} s, longer than the sample time of {number_text(sample_time)} s",
             f"write a time in seconds, or `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep, too)",
         )
-    feedback = _positive(entries, "feedback_rate", names)
-    found = (
-        _noise(entries.get("noise"), names),
-        _size(entries, "noise_rate", names),
-        entries["feedforward"].word(("continuous", "held")) if "feedforward" in entries else "continuous",
-        entries["predict"].word(("true", "false")) if "predict" in entries else "false",
-        None if _is(entries.get("bandwidth"), "auto") else _positive(entries, "bandwidth", names),
-        entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT,
-        _geodesic(entries.get("geodesic"), names),
-    )
-    if len(field.reader.findings) > before or (sample_time is None and "sample_time" not in sought):
+    noise = _noise(entries.get("noise"), names)
+    noise_rate = _size(entries, "noise_rate", names)
+    arithmetic = entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT
+    if len(field.reader.findings) > before or sample_time is None or noise is None:
         return None
-    noise, noise_rate, feedforward, predict, bandwidth, arithmetic, geodesic = found
-    if geodesic is not None and arithmetic != EXACT:
-        entries["geodesic"].fail(
-            codes.RANGE,
-            "hardware.geodesic beside hardware.arithmetic: how geodesics are rounded is not covered",
-            "leave one of the two out",
-        )
     return Hardware(
         sample_time=sample_time,
         delay=delay,
-        one_sample=one_sample,
         noise=noise,
         noise_rate=noise_rate,
-        held=feedforward == "held",
-        feedback_time=None if feedback is None else 1 / feedback,
-        predict=predict == "true",
-        bandwidth=bandwidth,
         arithmetic=_ARITHMETICS.get(arithmetic or EXACT),
-        geodesic=geodesic,
-        largest=unknown[0] if unknown else None,
     )
 
 
@@ -182,7 +107,7 @@ def _is_of_samples(entries: Mapping[str, Field], names: Names) -> bool:
     field.fail(
         codes.RANGE,
         f"{field.path} is {field.node.text[:40]!r}, not a time in seconds",
-        f"write a number of seconds (half of the sample time at 500 Hz: 0.001), `{ONE_SAMPLE}`, or {LARGEST}",
+        f"write a number of seconds (half of the sample time at 500 Hz: 0.001), or `{ONE_SAMPLE}`",
     )
     return True
 
@@ -205,17 +130,10 @@ def _within(section: Field | None, name: str) -> Field | None:
 
 
 def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fraction | None:
-    """From the rate, or itself; None if it is the largest, or unsound."""
+    """From the rate, or itself; None if unsound."""
     if "rate" in entries and "sample_time" in entries:
         entries["sample_time"].fail(
             codes.RANGE, "hardware has a rate and a sample time", "give one of the two"
-        )
-        return None
-    if _is(entries.get("rate"), LARGEST):
-        entries["rate"].fail(
-            codes.RANGE,
-            "hardware.rate is searched for by its sample time",
-            f"write sample_time: {LARGEST}: it finds the slowest computer that serves",
         )
         return None
     if "rate" in entries:
@@ -227,10 +145,10 @@ def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fr
         field.fail(
             codes.MISSING_KEY,
             "hardware lacks the rate",
-            "write rate: 500 (in Hz), sample_time: 1/500, or sample_time: largest",
+            "write rate: 500 (in Hz), or sample_time: 1/500 (in s)",
         )
         return None
-    return None if _is(entries["sample_time"], LARGEST) else _positive(entries, "sample_time", names)
+    return _positive(entries, "sample_time", names)
 
 
 def _is_meant(field: Field) -> bool:
@@ -240,11 +158,9 @@ def _is_meant(field: Field) -> bool:
 
 
 def _noise(field: Field | None, names: Names) -> Fraction | Vector | None:
-    """|n|, or |n_i| by state, 0 for those that are not named; None if it is the largest, or unsound."""
+    """|n|, or |n_i| by state, 0 for those that are not named; None if unsound."""
     if field is None:
         return Fraction(0)
-    if _is(field, LARGEST):
-        return None
     if not isinstance(field.node, MappingNode):
         return field.number(names.values, least=0, side="above")
     entries = field.mapping(optional=names.states)
@@ -255,41 +171,11 @@ def _noise(field: Field | None, names: Names) -> Fraction | Vector | None:
     return found if len(found) == len(sizes) else None
 
 
-def _geodesic(field: Field | None, names: Names) -> Picard | None:
-    """Nodes and sweeps; None if geodesics are exact, or unsound."""
-    if field is None or _is(field, EXACT):
-        return None
-    entries = field.mapping(required=("nodes", "sweeps"))
-    if entries is None or len(entries) < len(Picard.__slots__):
-        return None
-    nodes, sweeps = (
-        _whole(entries[key], names, most) for key, most in (("nodes", MAX_NODES), ("sweeps", MAX_SWEEPS))
-    )
-    return None if nodes is None or sweeps is None else Picard(nodes=nodes, sweeps=sweeps)
-
-
-def _whole(field: Field, names: Names, most: int) -> int | None:
-    """A whole number from 1 to `most`."""
-    value = field.number(names.values, least=1)
-    if value is None:
-        return None
-    if value.denominator != 1 or value > most:
-        field.fail(
-            codes.RANGE,
-            f"{field.path} is {number_text(value)}, not a whole number from 1 to {most}",
-            "write geodesic: {nodes: 16, sweeps: 3}",
-        )
-        return None
-    return int(value)
-
-
 def _size(
     entries: Mapping[str, Field], key: str, names: Names, default: Fraction | None = None
 ) -> Fraction | None:
-    """A number that is not negative, rounded up; `default` if it is not there, None if it is the largest."""
-    if key not in entries:
-        return default
-    return None if _is(entries[key], LARGEST) else entries[key].number(names.values, least=0, side="above")
+    """A number that is not negative, rounded up; `default` if it is not there."""
+    return entries[key].number(names.values, least=0, side="above") if key in entries else default
 
 
 def _positive(entries: Mapping[str, Field], key: str, names: Names) -> Fraction | None:

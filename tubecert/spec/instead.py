@@ -73,6 +73,14 @@ _KEYS: Final[Mapping[str, str]] = {
         ("Gamma", "gamma", "omega", "bandwidth", "adaptation_rate", "gains"),
         "gains are found; certify --bandwidth W --adaptation-rate G proves some of your own",
     ),
+    **dict.fromkeys(
+        ("feedforward", "feedback_rate", "predict", "geodesic"),
+        "certificate H, which knew it, is gone; leave it out",
+    ),
+    "windows": "windows of time are gone: one tube holds for the whole plan; leave it out, or ask for half_widths",
+    "control_rate": "a controller that is held between samples is not simulated now; leave it out",
+    "kernel": "there is one kernel, the tight one, which is never worse; leave it out",
+    "Q": "Q follows from A_m: with P = I it is -(A_m + A_m'); leave it out",
     **dict.fromkeys(("circle", "sphere", "ball"), "a round obstacle is a disc: {center: [...], radius: ...}"),
     **dict.fromkeys(("d", "delta", "matched"), "the uncertainty is the key h, an expression per input"),
     "A": 'f is written out, an expression per state: f: [v, "-3*p - 0.5*v"]',
@@ -94,7 +102,7 @@ _PLACES: Final[Mapping[str, str]] = {
     "h": "uncertainty",
     "E": "disturbance",
     "horizon": "trajectory",
-    **dict.fromkeys(("gap", "windows"), "tube"),
+    "gap": "tube",
 }
 """Where keys belong that are often written elsewhere."""
 
@@ -131,9 +139,14 @@ OTHER_WORDS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("proven", "proved", "ok"), "certified"),
     **dict.fromkeys(("yes", "on", "1"), "true"),
     **dict.fromkeys(("no", "off", "0"), "false"),
-    **dict.fromkeys(("zoh", "zero_order_hold"), "held"),
 }
 """Words that other formats have for a choice."""
+
+GONE: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("C", "c", "H", "h"), "certificates C and H are gone: let B decide"),
+    **dict.fromkeys(("sampled", "hardware"), "sampled and delayed loops are not covered now: leave it out"),
+}
+"""Choices that there once were, and what to do instead."""
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "horizon": "5, in s",

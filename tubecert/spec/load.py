@@ -20,11 +20,9 @@ from tubecert.spec.override import Setting, put
 from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import (
-    check_predictor,
     read_adaptation,
     read_decides,
     read_expectation,
-    read_kernel,
     read_name,
     read_tube,
 )
@@ -32,7 +30,6 @@ from tubecert.spec.simulation import read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
 from tubecert.spec.system import (
     NO_SEARCH,
-    check_gains,
     check_moving,
     is_uncertain,
     known_of,
@@ -51,7 +48,6 @@ from tubecert.spec.types import (
     TermMatrix,
     Trajectory,
 )
-from tubecert.spec.windows import check_windows
 
 VERSION: Final = 1
 
@@ -228,31 +224,17 @@ def _read_named(
     metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)
     adaptation = read_adaptation(entries.get("adaptation"), names)
-    check_predictor(reader, tube, adaptation)
-    kernel, _ = read_kernel(entries.get("conditions"))
     expect = read_expectation(entries.get("expect"), names)
     obstacles = read_obstacles(entries.get("obstacles"), names)
     limits = read_limits(limits_of(entries.get("limits"), entries.get("hardware")), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
-    hardware = read_hardware(entries.get("hardware"), entries.get("disturbance"), names)
+    hardware = read_hardware(entries.get("hardware"), names)
     gained = dynamics is not None and is_uncertain(dynamics[1], names)
-    if gained and B is not None and plan is not None and trajectory is not None:
-        windows = tube is not None and tube.windows is not None
-        computed = hardware is not None and hardware.geodesic is not None
-        check_gains(
-            B,
-            plan,
-            has_hardware="hardware" in entries,
-            has_windows=windows,
-            has_geodesic=computed,
-        )
     disturbance = read_disturbance(entries.get("disturbance"), names)
     if f is not None and dynamics is not None and plan is not None:
         h = () if uncertainty is None or uncertainty.h is None else uncertainty.h
         waves = (*dynamics[0], *h)
         check_moving(f, dynamics[0], _beside_moving(plan, synthesis, waves))
-    if plan is not None and tube is not None and not reader.findings:
-        check_windows(entries.get("tube"), tube, plan, hardware, disturbance)
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
     if plan is None or x0 is None or tube is None or adaptation is None:
@@ -285,7 +267,6 @@ def _read_named(
         synthesis=synthesis,
         tube=tube,
         adaptation=adaptation,
-        kernel=kernel,
         decides=read_decides(entries.get("conditions")),
         expect=expect,
         obstacles=obstacles,

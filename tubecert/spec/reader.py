@@ -26,7 +26,7 @@ from tubecert.expression import (
 from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
-from tubecert.spec.instead import EXAMPLES, OTHER_WORDS, glued, of_key, of_value
+from tubecert.spec.instead import EXAMPLES, GONE, OTHER_WORDS, glued, of_key, of_value
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
@@ -177,7 +177,7 @@ class Field:
         else:
             other = OTHER_WORDS.get(word.lower())
             meant = f"here it is {other}; " if other in choices else ""
-            help = meant + suggestion(word, choices, what="choices")
+            help = GONE.get(word) or meant + suggestion(word, choices, what="choices")
             self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
         return None
 

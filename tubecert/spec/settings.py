@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from fractions import Fraction
-from typing import Final, Literal
+from typing import Final
 
 from tubecert.expression import number_text
 from tubecert.letters import ALL, name_of, words_of
 from tubecert.spec import codes
-from tubecert.spec.algebra import is_positive_definite
 from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
-from tubecert.spec.reader import Field, Reader
-from tubecert.spec.types import Adaptation, Expectation, Matrix, Tube
-from tubecert.spec.windows import KEYS, with_windows
+from tubecert.spec.reader import Field
+from tubecert.spec.types import Adaptation, Expectation, Tube
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
-RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
+RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
 
+_KEYS: Final = tuple(item.name for item in fields(Tube))  # of `tube`
 _SLUG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
@@ -38,7 +38,7 @@ def read_name(field: Field) -> str | None:
 
 def read_tube(field: Field | None, names: Names) -> Tube | None:
     """The two radii or the half-widths, as far as they are given, and the coordinates they are measured in."""
-    entries = field.mapping(optional=KEYS, reserved=("weights",)) if field else {}
+    entries = field.mapping(optional=_KEYS, reserved=("weights",)) if field else {}
     if entries is None:
         return None
     radii = {
@@ -66,14 +66,13 @@ def read_tube(field: Field | None, names: Names) -> Tube | None:
             codes.RANGE, "half_widths with coordinates: identity", "write coordinates: auto, or leave it out"
         )
         return None
-    found = Tube(
+    return Tube(
         epsilon=radii.get("epsilon"),
         rho_a=radii.get("rho_a"),
         coordinates="auto" if chosen == "auto" else "identity" if chosen == "identity" else None,
         half_widths=widths,
         gap=None if gap is None else "auto",
     )
-    return with_windows(found, entries, names)
 
 
 def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fraction], ...] | None:
@@ -96,80 +95,35 @@ def _read_half_widths(field: Field | None, names: Names) -> tuple[tuple[str, Fra
 
 
 def read_adaptation(field: Field | None, names: Names) -> Adaptation | None:
-    """The predictor matrix and the projection."""
-    entries = field.mapping(optional=("A_m", "Q", "projection")) if field else {}
+    """The gain of the predictor and the projection."""
+    entries = field.mapping(optional=("A_m", "projection")) if field else {}
     if entries is None:
         return None
-    A_m = _read_predictor(entries.get("A_m"), len(names.states), names)
-    sound = A_m is not None and _read_Q(entries.get("Q"), A_m, names)
+    gain, known = _read_predictor(entries.get("A_m"), names)
     smooth, readable = _read_projection(entries.get("projection"), names)
-    if A_m is None or not sound or not readable:
-        return None
-    return Adaptation(A_m=A_m, smooth=smooth)
+    return Adaptation(predictor_gain=gain, smooth=smooth) if known and readable else None
 
 
-def _read_predictor(field: Field | None, n: int, names: Names) -> Literal["auto"] | Matrix | None:
+def _read_predictor(field: Field | None, names: Names) -> tuple[Fraction | None, bool]:
+    """The g of A_m = -g I (None for auto), and whether what is written is sound."""
     if field is None or (isinstance(field.node, Scalar) and field.node.text == "auto"):
-        return "auto"
-    A_m = field.matrix(n, names.values)
-    if A_m is None:
-        return None
-    if is_positive_definite(dissipation(A_m)):
-        return A_m
-    trace = sum((A_m[i][i] for i in range(n)), start=Fraction(0))
-    unstable = (
-        "it is not Hurwitz (its trace is not negative)"
-        if trace >= 0
-        else "an eigenvalue of the sum is not negative"
-    )
-    field.fail(
-        codes.STABILITY,
-        f"A_m must satisfy A_m + A_m^T < 0, because P = I is used; {unstable}",
-        "write a negative number, e.g. -1 for minus the identity, or auto",
-    )
-    return None
-
-
-def check_predictor(reader: Reader, tube: Tube | None, adaptation: Adaptation | None) -> None:
-    """In coordinates that are chosen later, only a multiple of the identity is known to suit P = I."""
-    if tube is None or adaptation is None or not tube.auto or adaptation.A_m == "auto":
-        return
-    A_m = adaptation.A_m
-    if any(A_m[i][j] != (A_m[0][0] if i == j else 0) for i in range(len(A_m)) for j in range(len(A_m))):
-        reader.report(
-            codes.STABILITY,
-            reader.places["adaptation.A_m"],
-            "in coordinates of the tube, A_m must be a multiple of the identity",
-            "write auto, a negative number, or tube.coordinates: identity",
-        )
-
-
-def dissipation(A_m: Matrix) -> Matrix:
-    """Q = -(A_m + A_m^T), which solves the Lyapunov equation with P = I."""
-    n = range(len(A_m))
-    return tuple(tuple(-(A_m[i][j] + A_m[j][i]) for j in n) for i in n)
-
-
-def _read_Q(field: Field | None, A_m: Literal["auto"] | Matrix, names: Names) -> bool:
-    """Q may be repeated for the reader; it must be the one that follows from A_m."""
-    if field is None:
-        return True
-    if A_m == "auto":
-        field.fail(codes.STABILITY, "Q follows from A_m; with A_m: auto it cannot be given", "remove Q")
-        return False
-    Q = field.matrix(len(names.states), names.values)
-    if Q is None:
-        return False
-    wanted = dissipation(A_m)
-    if wanted != Q:
-        rows = ", ".join("[" + ", ".join(number_text(q) for q in row) + "]" for row in wanted)
+        return None, True
+    if not isinstance(field.node, Scalar):
         field.fail(
             codes.STABILITY,
-            "Q must equal -(A_m + A_m^T), because P = I is used",
-            f"remove Q, or write [{rows}]" if len(rows) < 200 else "remove Q",
+            f"{field.path} is a matrix; the predictor is a multiple of the identity",
+            "write auto, or a negative number: -10 stands for -10 I; no matrix serves better than auto",
         )
-        return False
-    return True
+        return None, False
+    value = field.number(names.values)
+    if value is not None and value >= 0:
+        field.fail(
+            codes.STABILITY,
+            f"{field.path} is {number_text(value)}, and a predictor that is stable needs a negative number",
+            "write auto, or -10, which stands for -10 I",
+        )
+        return None, False
+    return (None, False) if value is None else (-value, True)
 
 
 def _read_projection(field: Field | None, names: Names) -> tuple[Fraction | None, bool]:
@@ -200,26 +154,11 @@ def _read_gap(field: Field) -> str | None:
 
 def read_decides(field: Field | None) -> str | None:
     """The certificate that decides, by its letter, or all; None if it is not said."""
-    entries = field.mapping(optional=("kernel", "decides")) if field else None
+    entries = field.mapping(optional=("decides",)) if field else None
     if entries is None or "decides" not in entries:
         return None
     word = entries["decides"].word((*words_of(), ALL))
     return word if word is None or word == ALL else name_of(word).letter
-
-
-def read_kernel(field: Field | None) -> tuple[Literal["tight", "paper"] | None, bool]:
-    """The kernel of the conditions, and whether what is written is sound."""
-    entries = field.mapping(optional=("kernel", "decides")) if field else {}
-    if entries is None:
-        return None, False
-    if "kernel" not in entries:
-        return None, True
-    match entries["kernel"].word(("tight", "paper")):
-        case "tight":
-            return "tight", True
-        case "paper":
-            return "paper", True
-    return None, False
 
 
 def read_expectation(field: Field | None, names: Names) -> Expectation | None:

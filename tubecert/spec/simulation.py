@@ -12,8 +12,8 @@ from tubecert.spec.obstacles import read_plane
 from tubecert.spec.reader import Field
 from tubecert.spec.types import Simulation, Trajectory
 
-KEYS: Final = ("controllers", "gains", "duration", "runs", "seed", "control_rate", "plane", "h")
-CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1", "sampled", "hardware")
+KEYS: Final = ("controllers", "gains", "duration", "runs", "seed", "plane", "h")
+CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1")
 MAX_RUNS: Final = 1_000_000
 MAX_SEED: Final = 2**63 - 1
 
@@ -32,9 +32,6 @@ def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) 
         duration=_duration(entries.get("duration"), plan, names),
         runs=_whole(entries.get("runs"), names, least=1, most=MAX_RUNS),
         seed=_whole(entries.get("seed"), names, least=0, most=MAX_SEED),
-        control_rate=entries["control_rate"].number(names.values, above=0)
-        if "control_rate" in entries
-        else None,
         plane=read_plane(plane, field, names) if plane else None,
         h=h.terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input") if h else None,
     )

@@ -15,7 +15,7 @@ from tubecert.spec.document import MappingNode
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.synthesis import read_synthesis
-from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Trajectory, Uncertainty
+from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
 
 _SYMMETRY_BUDGET = 20_000
 _LONG: Final = 10**12  # s, or that many times pi
@@ -74,36 +74,6 @@ def returns(terms: Sequence[Term]) -> bool:
     owed = (duty.argument for term in terms for duty, _ in term.owed())
     found = frequencies([*(term.expression for term in terms), *owed], TIME)
     return found is not None and (found.period is None or found.period[0] < _LONG)
-
-
-def check_gains(
-    field: Field, plan: Trajectory, *, has_hardware: bool, has_windows: bool, has_geodesic: bool
-) -> None:
-    """What is covered where parameters known by ranges stand in B."""
-    if not has_hardware:
-        field.fail(
-            codes.RANGE,
-            "a parameter known by a range stands in B, and there is no section hardware",
-            "certificate H alone is stated for an uncertain gain: add hardware, or give the parameter one value",
-        )
-    elif has_windows:
-        field.fail(
-            codes.RANGE,
-            "a parameter known by a range stands in B, beside tube.windows",
-            "leave the windows out, or give the parameter one value",
-        )
-    elif has_geodesic:
-        field.fail(
-            codes.RANGE,
-            "a parameter known by a range stands in B, beside hardware.geodesic",
-            "leave hardware.geodesic out, or give the parameter one value",
-        )
-    elif not plan.written:
-        field.fail(
-            codes.RANGE,
-            f"a parameter known by a range stands in B, beside a trajectory of kind {plan.kind}",
-            "for an uncertain gain u* has to be written down: kind equilibrium or expressions",
-        )
 
 
 def _nominal(drift: tuple[Term, ...], names: Names) -> tuple[Term, ...]:

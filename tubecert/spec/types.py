@@ -193,16 +193,14 @@ class Synthesis:
 class Tube:
     """The tube's two radii, or half-widths (name, w) of states and outputs; the radii may come from the command line.
 
-    `coordinates` None: what was not said, `identity` unless there are half-widths. `windows`: how many of equal length
-    the plan is cut into, or the times between them in s; None for one. `gap`: how closely the constants over the tube
-    are enclosed; auto: each by its effect on the gains, None: as the command says.
+    `coordinates` None: what was not said, `identity` unless there are half-widths. `gap`: how closely the
+    constants over the tube are enclosed; auto: each by its effect on the gains, None: as the command says.
     """
 
     epsilon: Fraction | None = None
     rho_a: Fraction | None = None
     coordinates: Literal["identity", "auto"] | None = None
     half_widths: tuple[tuple[str, Fraction], ...] = ()
-    windows: int | tuple[Fraction, ...] | None = None
     gap: Literal["auto"] | None = None
 
     @property
@@ -213,9 +211,9 @@ class Tube:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adaptation:
-    """The predictor matrix (n, n), A_m + A_m^T < 0 as P = I; the smooth projection's layer, None if hard."""
+    """The g of the predictor A_m = -g I, None: chosen with the gains; the smooth projection's layer, None if hard."""
 
-    A_m: Literal["auto"] | Matrix = "auto"
+    predictor_gain: Fraction | None = None
     smooth: Fraction | None = None
 
 
@@ -246,7 +244,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulation:
-    """What `simulate` does by default: duration in s, control rate in Hz; no part of any claim.
+    """What `simulate` does by default: duration in s; no part of any claim.
 
     h (m) is the uncertainty that acts in place of `uncertainty.h`.
     """
@@ -256,63 +254,38 @@ class Simulation:
     duration: Fraction | None = None
     runs: int | None = None
     seed: int | None = None
-    control_rate: Fraction | None = None
     plane: tuple[str, str] | None = None
     h: tuple[Term, ...] | None = None
 
 
-Largest = Literal["sample_time", "delay", "noise", "wind"]
 Arithmetic = Literal["single", "double"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Picard:
-    """How a controller computes geodesics: second derivatives at so many `nodes`, improved in so many `sweeps`."""
-
-    nodes: int
-    sweeps: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Hardware:
-    """The computer, the sensors and their delay; times in s. What is None is searched for, or follows.
+    """The computer, the sensors and their delay; times in s.
 
-    `sample_time` of inputs and adaptation; `delay` from a sample to its input, None with `one_sample` (it is one
-    sample time); `noise`: |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|;
-    `held`: u* is played from sample to sample; `feedback_time`: the sample time of the feedback where it has one of its
-    own; `predict`: feedback from the predicted state; `bandwidth` of the filter in rad/s; `arithmetic`: what the
-    controller computes in, None where it computes exactly; `geodesic`: how, None where geodesics are exact. `largest`
-    is what is searched for, `wind` being the bound of the disturbance.
+    `sample_time` of the inputs; `delay` from a sample to its input, None: one sample time, whatever that is; `noise`:
+    |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|; `arithmetic`: what the
+    controller computes in, None where it computes exactly.
     """
 
-    sample_time: Fraction | None
+    sample_time: Fraction
     delay: Fraction | None = Fraction(0)
-    one_sample: bool = False
-    noise: Fraction | Vector | None = Fraction(0)
+    noise: Fraction | Vector = Fraction(0)
     noise_rate: Fraction | None = None
-    held: bool = False
-    feedback_time: Fraction | None = None
-    predict: bool = False
-    bandwidth: Fraction | None = None
     arithmetic: Arithmetic | None = None
-    geodesic: Picard | None = None
-    largest: Largest | None = None
-
-    def __post_init__(self) -> None:
-        assert (self.sample_time is None) == (self.largest == "sample_time")
-        assert (self.delay is None) == (self.one_sample or self.largest == "delay")
-        assert (self.noise is None) == (self.largest == "noise")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """What acts beside the inputs: E(x) w, E (n, k), |w| <= `bound` (None: the largest is searched for).
+    """What acts beside the inputs: E(x) w, E (n, k), |w| <= `bound`.
 
     `rate` in 1/s, if |w'| is at most that: what of it the inputs can reach is adapted to.
     """
 
     E: TermMatrix
-    bound: Fraction | None
+    bound: Fraction
     rate: Fraction | None = None
 
 
@@ -371,7 +344,6 @@ class Spec:
     synthesis: Synthesis | None = None  # only where there is no metric
     tube: Tube
     adaptation: Adaptation
-    kernel: Literal["tight", "paper"] | None
     decides: str | None
     expect: Expectation | None
     obstacles: tuple[Obstacle, ...] = ()

@@ -13,15 +13,12 @@ from typing import TypeVar
 from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
 from tubecert.bounds.compute import bound_constants
 from tubecert.bounds.constants import BoundConstants
-from tubecert.bounds.gains import gain_constants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.claims.advice import DeclareUncertaintyBound, RaiseBudget, ShrinkTube
 from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
-from tubecert.conditions.kernels import Kernel
-from tubecert.conditions.machine import Machine
-from tubecert.conditions.problem import Drift, Formulas, Part, TubeProblem, Wind
+from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.constant import Constant, printable_above
@@ -33,8 +30,6 @@ from tubecert.kinds.table import needed_by_all
 from tubecert.metric.geodesic import GeodesicTest, unique_geodesics
 from tubecert.model import TIME
 from tubecert.spec import Obstacle
-from tubecert.spec.types import Hardware
-from tubecert.stages.machine import machine_of
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.stages.tube import TubeFound
@@ -101,16 +96,13 @@ class Bounded:
 
     `half_widths`: |x_i - x_i*| is below, per state, and |c'(x - x*)|, per output. `geodesics`: whether minimising
     geodesics are proven unique.
-    `parts`: windows, where certificates B and C are asked for levels in each; those of H are the machine's.
     """
 
     enclosed: Enclosed
     half_widths: Mapping[str, float]
     geodesics: GeodesicTest
     clearances: tuple[Cleared, ...] = ()
-    machine: Machine | None = None
     inputs: tuple[LimitedInput, ...] = ()
-    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         if _endless(self.enclosed) is not None:
@@ -123,8 +115,8 @@ class Bounded:
 
     @property
     def problem(self) -> TubeProblem:
-        """What the theorems are asked about, with the machine if there is one."""
-        return replace(self.enclosed.problem, machine=self.machine, parts=self.parts)
+        """What the theorems are asked about."""
+        return self.enclosed.problem
 
 
 def enclose(tube: TubeFound, gaps: Mapping[str, Fraction] | None = None) -> Enclosed:
@@ -189,41 +181,13 @@ def unmet(enclosed: Enclosed) -> Stopped | None:
 
 
 def _bounded(enclosed: Enclosed) -> Bounded:
-    geodesics = _geodesics(enclosed)
     return Bounded(
         enclosed=enclosed,
         half_widths=half_widths(enclosed),
-        geodesics=geodesics,
-        machine=_machine(enclosed, geodesics),
+        geodesics=_geodesics(enclosed),
         clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
         inputs=tuple(_limited(enclosed, name, limits) for name, limits in enclosed.question.spec.limits),
     )
-
-
-def _machine(enclosed: Enclosed, geodesics: GeodesicTest) -> Machine | None:
-    """What theorem H knows of the machine; the suprema in it are those of any machine with such noise and inputs.
-
-    They are computed for a specification that has nothing else of it, so that they cannot rest on what is not said.
-    """
-    question = enclosed.question
-    spec, asked = question.spec, question.spec.hardware
-    if asked is None:
-        return None
-    noise = asked.noise if isinstance(asked.noise, tuple) else ()
-    machine = question.memory.recall(
-        "machine",
-        enclosed.tube.ground | enclosed.closely | {"noise": [*map(number_text, noise)], "held": asked.held},
-        lambda: machine_of(
-            replace(spec, hardware=any_such(asked)), enclosed.problem, enclosed.suprema, geodesics
-        ),
-    )
-    return None if machine is None else replace(machine, asked=asked)
-
-
-def any_such(asked: Hardware) -> Hardware:
-    """A machine of which no more is said than the suprema depend on."""
-    noise = asked.noise if isinstance(asked.noise, tuple) else Fraction(0)
-    return Hardware(sample_time=Fraction(1), noise=noise, held=asked.held)
 
 
 def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -> LimitedInput:
@@ -238,11 +202,6 @@ def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -
         greatest=greatest.printable(),
         any_plan=enclosed.tube.plan.allowance is not None,
     )
-
-
-def with_machine(enclosed: Enclosed) -> TubeProblem:
-    """What theorem H is asked about, where nothing else is told of the tube."""
-    return replace(enclosed.problem, machine=_machine(enclosed, _geodesics(enclosed)))
 
 
 def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:
@@ -272,26 +231,21 @@ def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> Tu
     question = tube.question
     spec, adaptation = question.spec, question.spec.adaptation
     epsilon, rho_a = tube.radii
-    formulas = Formulas(question.options.formulas)
-    blows = wind_constants(suprema, constants.metric_input_gain)
+    wind, blows = spec.disturbance, wind_constants(suprema, constants.metric_input_gain)
     return TubeProblem(
         constants=constants,
-        wind=None if blows is None else Wind(bound=question.model.wind_bound, constants=blows),
+        wind=None if wind is None or blows is None else Wind(bound=wind.bound, constants=blows),
         residual=residual_constants(suprema),
-        gain=gain_constants(suprema),
+        gained=bool(question.model.gained),
         rate=question.model.rate,
         epsilon=epsilon,
         rho_a=rho_a,
         rho_r=tube.rho - rho_a,
         rho=tube.rho,
-        initial_offset=question.start.offset(suprema),
         horizon=spec.trajectory.horizon,
         states=len(spec.states),
-        A_m=None if adaptation.A_m == "auto" else adaptation.A_m,
+        predictor_gain=adaptation.predictor_gain,
         smooth=adaptation.smooth,
-        formulas=formulas,
-        kernel=None if spec.kernel is None else Kernel(spec.kernel),
-        drift=Drift.SUM if formulas is Formulas.AS_PRINTED else Drift.PLAN,
     )
 
 

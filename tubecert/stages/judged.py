@@ -9,14 +9,13 @@ from typing import Any
 
 from tubecert.bounds.constants import DERIVED, Meaning
 from tubecert.conditions.inputs import JudgedInput, LimitedInput
-from tubecert.conditions.problem import Formulas
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import overall
 from tubecert.kinds import RATES
 from tubecert.kinds.kind import Section
-from tubecert.kinds.table import KINDS, kind_of, kinds_of
-from tubecert.letters import ALL, HARDWARE
+from tubecert.kinds.table import KINDS, kind_of
+from tubecert.letters import ALL
 from tubecert.stages.bounded import Bounded
 from tubecert.stages.question import Question
 from tubecert.verdict import Verdict
@@ -40,15 +39,8 @@ class Judged:
         return deciding(self.question)
 
     @property
-    def as_printed(self) -> bool:
-        """Whether the paper's own formulas are reproduced: they certify nothing."""
-        return self.bounded.problem.formulas is Formulas.AS_PRINTED
-
-    @property
     def verdict(self) -> Verdict:
         """The worst of those that decide."""
-        if self.as_printed:
-            return Verdict.UNDECIDED
         obstacles = [each.verdict for each in self.bounded.clearances if each.obstacle.decides]
         inputs = [each.verdict for each in self.inputs]
         return overall([*(self.sections[key].verdict for key in self.deciding), *obstacles, *inputs])
@@ -64,30 +56,22 @@ class Judged:
             input=own,
             bounds={key: bound for key, bound in found.items() if bound is not None},
             verdict=own.verdict([found[key] for key in self.deciding]),
-            windows={
-                key: own.along(ranges)
-                for key, section in self.sections.items()
-                if (ranges := section.input_along(own.name))
-            },
         )
 
     def derived(self) -> dict[str, tuple[Constant, Meaning]]:
         """Constants at the gains found, that the certificate lists beside those of the tube."""
         return {
             name: (value.printable(), DERIVED[name])
-            for kind in kinds_of(self.bounded.problem)
+            for kind in KINDS
             for name, value in kind.derived(self.sections[kind.key]).items()
         }
 
 
 def deciding(question: Question) -> tuple[str, ...]:
-    """The kinds that decide a question, by key; of an uncertain B nothing is known but by certificate H."""
+    """The kinds that decide a question, by key."""
     chosen = question.options.conditions or question.spec.decides or RATES.option
-    if question.spec.gained:
-        return (HARDWARE.key,)
     if chosen == ALL:
-        given = question.spec.hardware is not None
-        return tuple(kind.key for kind in KINDS if kind.name.adapts and (given or kind.name is not HARDWARE))
+        return tuple(kind.key for kind in KINDS if kind.name.adapts)
     return (kind_of(chosen).key,)
 
 
@@ -95,6 +79,6 @@ def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judg
     """The sections about what is proposed, by the recipe of each kind."""
     sections = {
         kind.key: kind.section(bounded.problem, proposals.get(kind.theorem.recipe, Proposal()))
-        for kind in kinds_of(bounded.problem)
+        for kind in KINDS
     }
     return Judged(bounded=bounded, sections=sections)

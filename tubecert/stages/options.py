@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 from tubecert.spec import Spec
-
-Formulas: TypeAlias = Literal["corrected", "as-printed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +20,6 @@ class Options:
     rho_a: Fraction | None = None
     epsilon: Fraction | None = None
     metric: Path | None = None
-    formulas: Formulas = "corrected"
     conditions: str | None = None
     bandwidth: Fraction | None = None
     adaptation_rate: Fraction | None = None

@@ -84,7 +84,7 @@ class Question:
             return self.options.by_effect
         spec = self.spec
         long = spec.trajectory.moves or len(spec.states) >= _MANY
-        return spec.tube.gap == "auto" or (bool(spec.tube.half_widths) and long and spec.hardware is None)
+        return spec.tube.gap == "auto" or (bool(spec.tube.half_widths) and long)
 
     @cached_property
     def model(self) -> ControlAffineModel:

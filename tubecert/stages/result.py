@@ -87,7 +87,6 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
     spec, options = question.spec, question.options
     return Result(
         verdict=verdict,
-        formulas=options.formulas,
         spec=_source(spec),
         claim=claim_data(spec, period_of(spec)),
         overrides=_overrides(spec, options),
@@ -220,11 +219,6 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
         return {}
     all_of_tube = [*enclosed.constants.items(), *enclosed.problem.beside()]
     own = {name: constant_data(value, meaning) for name, value, meaning in all_of_tube}
-    if reached.bounded is not None and reached.bounded.machine is not None:
-        machine = reached.bounded.machine
-        bent = [] if machine.covariant is None else machine.covariant.items()
-        of_machine = [*machine.constants.items(), *bent]
-        own |= {name: constant_data(value, meaning) for name, value, meaning in of_machine}
     derived = {} if judged is None else judged.derived()
     return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
 
@@ -259,7 +253,6 @@ def _input_data(found: JudgedInput) -> InputData:
             )
             for key, bound in found.bounds.items()
         },
-        windows=dict(found.windows),
     )
 
 

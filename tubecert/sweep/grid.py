@@ -20,9 +20,6 @@ from tubecert.findings import Finding, NamedPlace
 from tubecert.spec import Setting
 
 OPTION: Final = "--over"
-FORMULAS: Final = "formulas"  # no key of a specification: whose formulas, as certify --formulas says it
-PRINTED: Final = "as-printed"
-_WHOSE: Final = ("corrected", PRINTED)
 MOST: Final = 100_000  # points
 _SHORT: Final = 12  # digits of a value between the ends that is exact
 _DIGITS: Final = 6  # of one that is not
@@ -45,12 +42,7 @@ class Axis:
         setting = Setting.of(words, OPTION)
         parts = [part.strip() for part in setting.text.split(":")]
         if len(parts) == 1:
-            found = cls(path=setting.path, texts=_listed(setting))
-            if found.path == FORMULAS and not set(found.texts) <= set(_WHOSE):
-                _refuse(setting, "these are no formulas", f"write {FORMULAS}={','.join(_WHOSE)}")
-            return found
-        if setting.path == FORMULAS:
-            _refuse(setting, "these are no formulas", f"write {FORMULAS}={','.join(_WHOSE)}")
+            return cls(path=setting.path, texts=_listed(setting))
         count = _COUNT.fullmatch(parts[2]) if len(parts) == 3 else None
         if count is None:
             _refuse(setting, f"{setting.text[:60]!r} is no range", _FORM)
@@ -95,16 +87,6 @@ def points(axes: Sequence[Axis]) -> list[tuple[Setting, ...]]:
         message = f"the sweep has {count:,} points; it may have {MOST:,}"
         raise SpecError([Finding(code="TC102", message=message, help="take fewer values of some keys")])
     return list(itertools.product(*(axis.settings() for axis in axes)))
-
-
-def keys_of(settings: Sequence[Setting]) -> tuple[Setting, ...]:
-    """Those of the specification."""
-    return tuple(each for each in settings if each.path != FORMULAS)
-
-
-def printed_in(settings: Sequence[Setting]) -> bool:
-    """Whether a point has the formulas as they are printed."""
-    return any(each.path == FORMULAS and each.text == PRINTED for each in settings)
 
 
 def _listed(setting: Setting) -> tuple[str, ...]:

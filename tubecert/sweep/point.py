@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -21,7 +21,6 @@ from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
 from tubecert.spec.metric_file import with_metric
 from tubecert.spec.source import Source
-from tubecert.sweep.grid import PRINTED, keys_of, printed_in
 
 ERROR_FORMAT: Final = "tubecert-sweep-error/1"
 _KEPT: Final = 256  # proofs that a worker remembers
@@ -40,20 +39,16 @@ class Task:
 
     def load(self, settings: tuple[Setting, ...]) -> Spec:
         """The specification of a point; raises `TubecertError`."""
-        spec = load_source(Source.of(self.path, self.text), (*self.fixed, *keys_of(settings)))
+        spec = load_source(Source.of(self.path, self.text), (*self.fixed, *settings))
         return spec if self.options.metric is None else with_metric(spec, str(self.options.metric))
-
-    def options_of(self, settings: tuple[Setting, ...]) -> pipeline.Options:
-        """The options of a point."""
-        return replace(self.options, formulas=PRINTED) if printed_in(settings) else self.options
 
     def command(self, settings: tuple[Setting, ...]) -> str:
         """The command that makes the certificate of a point."""
-        own, default = self.options_of(settings), pipeline.Options()
+        own, default = self.options, pipeline.Options()
         words = ["tubecert", "certify", self.path]
-        for each in (*self.fixed, *keys_of(settings)):
+        for each in (*self.fixed, *settings):
             words += ["--set", str(each)]
-        for name in ("metric", "conditions", "formulas", "gap", "budget"):
+        for name in ("metric", "conditions", "gap", "budget"):
             if getattr(own, name) != getattr(default, name):
                 words += [f"--{name}", str(getattr(own, name))]
         return visible(shlex.join(words))
@@ -102,8 +97,7 @@ def memory_of(task: Task) -> pipeline.Memory:
 def certify_point(task: Task, point: Point) -> None:
     """Certify a point and keep what comes out. Raises `TargetError` if it cannot be written."""
     try:
-        options = task.options_of(point.settings)
-        result = pipeline.certify(task.load(point.settings), options, memory=memory_of(task))
+        result = pipeline.certify(task.load(point.settings), task.options, memory=memory_of(task))
     except TubecertError as error:
         _keep_failed(
             task,
@@ -135,7 +129,7 @@ def error_file(folder: Path, point: Point) -> Path:
 
 def outcome(task: Task, point: Point) -> Certificate | Failed | None:
     """What is kept of a point, None if there is nothing (or something that tubecert did not write for this point)."""
-    wanted = {each.path: each.text for each in (*task.fixed, *keys_of(point.settings))}
+    wanted = {each.path: each.text for each in (*task.fixed, *point.settings)}
     found: Certificate | Failed
     try:
         if error_file(task.folder, point).exists():
@@ -145,14 +139,13 @@ def outcome(task: Task, point: Point) -> Certificate | Failed | None:
         found = Certificate.from_json(certificate.load(str(certificate_file(task.folder, point))))
     except (TargetError, FormError, ValueError):
         return None
-    own = found.result.overrides.settings, found.result.formulas
-    return found if own == (wanted, task.options_of(point.settings).formulas) else None
+    return found if found.result.overrides.settings == wanted else None
 
 
 def _keep_failed(task: Task, point: Point, code: ExitCode, problems: list[Problem]) -> None:
     failed = Failed(
         format=ERROR_FORMAT,
-        settings={each.path: each.text for each in (*task.fixed, *keys_of(point.settings))},
+        settings={each.path: each.text for each in (*task.fixed, *point.settings)},
         exit_code=int(code),
         problems=tuple(problems),
     )

@@ -17,20 +17,15 @@ from tubecert.claims.advice import (
     CorrectPlan,
     DeclareMetricBound,
     DeclareUncertaintyBound,
-    EaseHardware,
     EnlargeSafeSet,
     GiveInput,
     HalveConstant,
-    HalveHardware,
     HigherDegree,
-    Knob,
     LeavePlanRoom,
-    LessenCause,
     LowerDegree,
     LowerRate,
     MendPlan,
     MoreKnots,
-    NoKnobAlone,
     OtherInterpolation,
     OtherMetric,
     OtherVariables,
@@ -41,12 +36,9 @@ from tubecert.claims.advice import (
     ReduceRadii,
     ShrinkSafeSet,
     ShrinkTube,
-    TakeWindows,
-    TurnKnob,
 )
 from tubecert.claims.family import Relax
 from tubecert.digits import down, near, up
-from tubecert.words.machine import CAUSES, PARTS
 
 
 def advice(items: Sequence[Relax], h: Sequence[str] = ()) -> str:
@@ -55,16 +47,11 @@ def advice(items: Sequence[Relax], h: Sequence[str] = ()) -> str:
         (item for item in items if isinstance(item, HalveConstant) and item.constant in _OF_H), None
     )
     halvings = ", ".join(
-        _halving(item, h if item is about_h else ()) if isinstance(item, HalveConstant) else _better(item)
-        for item in items
-        if isinstance(item, (HalveConstant, HalveHardware))
+        _halving(item, h if item is about_h else ()) for item in items if isinstance(item, HalveConstant)
     )
-    turns = _turns([item for item in items if isinstance(item, TurnKnob)])
     plans = [_plan(item) for item in items if isinstance(item, MendPlan)]
-    causes = _filled([item for item in items if isinstance(item, LessenCause)])
     others = [item for item in items if not isinstance(item, _SAID_APART)]
-    windows = [_windows(item) for item in items if isinstance(item, TakeWindows)]
-    return "; ".join(filter(None, (halvings, turns, _alternatives(others), *windows, causes, *plans)))
+    return "; ".join(filter(None, (halvings, _alternatives(others), *plans)))
 
 
 def _alternatives(items: Sequence[Relax]) -> str:
@@ -75,7 +62,7 @@ def _alternatives(items: Sequence[Relax]) -> str:
     return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
-_SAID_APART = (HalveConstant, HalveHardware, LessenCause, TurnKnob, MendPlan, TakeWindows)
+_SAID_APART = (HalveConstant, MendPlan)
 _TRIED = (HigherDegree, AskForRateUpTo, ShrinkSafeSet)
 
 
@@ -94,80 +81,6 @@ def _halving(item: HalveConstant, h: Sequence[str]) -> str:
     shown = whole if len(whole) <= _LONGEST else f"{whole[:_LONGEST]} ..."
     words = f"{meaning.words}, h = {shown}" if h else meaning.words
     return f"halving {meaning.symbol} ({words}) would lower the least Gamma by {share:.0f} %"
-
-
-def _better(item: HalveHardware) -> str:
-    return f"half of {PARTS[item.part]} would make the tube {100 * (1 - item.factor):.0f} % narrower"
-
-
-def _easier(item: EaseHardware) -> str:
-    unit = " s" if item.part in ("sample_time", "delay") else ""
-    rate = f" ({near(1 / item.value, 4)} Hz)" if item.part == "sample_time" else ""
-    return f"bring {PARTS[item.part]} down to {near(item.value, 4)}{unit}{rate}, which is proven to serve"
-
-
-def _windows(item: TakeWindows) -> str:
-    return (
-        f"tube.windows: {item.windows} may do without a better machine (not tried): "
-        "in each part of the plan constants are smaller"
-    )
-
-
-def _filled(items: Sequence[LessenCause]) -> str:
-    """What takes too much, together with its sum; the start's distance is no cause of these."""
-    if not items:
-        return ""
-    shares = ", ".join(f"{CAUSES[item.cause]} {100 * item.share:.0f} %" for item in items)
-    whole = 100 * sum(item.share for item in items)
-    return f"what fills the level of the loop that comes nearest, to {whole:.0f} % (not proven): {shares}"
-
-
-def _turns(items: Sequence[TurnKnob]) -> str:
-    """What certifies, one thing at a time."""
-    if not items:
-        return ""
-    lead = "each of these alone is proven to serve: " if len(items) > 1 else "this is proven to serve: "
-    return lead + "; or ".join(map(_turn, items))
-
-
-def _turn(item: TurnKnob) -> str:
-    share = f"{near(100 * item.value, 3)} %"
-    match item.knob:
-        case "start":
-            whole = "start where the plan starts"
-            return f"start at {share} of the distance from the plan" if item.value else whole
-        case "half_widths":
-            return f"all half-widths at {share}"
-        case "uncertainty" if item.term is not None:
-            return f"{item.term} in the h of {item.input} at {share} of its size"
-        case "uncertainty":
-            return f"all of h at {share} of its size"
-    return f"{_KNOBS[item.knob]} {near(item.value, 4)} in place of {near(item.now, 4)}"
-
-
-_KNOBS: Mapping[Knob, str] = {
-    "epsilon": "epsilon",
-    "rho_a": "rho_a",
-    "half_widths": "the half-widths",
-    "rate": "metric.rate",
-    "start": "the start",
-    "uncertainty": "h",
-    "wind": "disturbance.bound",
-    "knots": "trajectory.knots",
-    "defect": "trajectory.defect",
-    "gap": "--gap",
-}
-
-
-def _none_alone(item: NoKnobAlone) -> str:
-    """That nothing serves by itself, and what does together."""
-    tried = f"nothing that was tried serves alone ({', '.join(_KNOBS[knob] for knob in item.tried)})"
-    if item.uncertainty is None:
-        return tried
-    tube = [] if item.epsilon is None else [f"epsilon {near(item.epsilon, 4)}"]
-    tube += [] if item.half_widths is None else [f"all half-widths at {near(100 * item.half_widths, 3)} %"]
-    share = f"all of h at {near(100 * item.uncertainty, 3)} % of its size"
-    return f"{tried}; together these are proven to serve: {' and '.join([*tube, share])}"
 
 
 def _plan(item: MendPlan) -> str:
@@ -217,8 +130,6 @@ def _smaller_set(item: ShrinkSafeSet) -> str:
 
 _ACTIONS: Mapping[type[Relax], Callable[[Any], str]] = {
     RaiseBudget: lambda item: "raise --budget" + (": a proof ran out of boxes" if item.proof else ""),
-    EaseHardware: _easier,
-    NoKnobAlone: _none_alone,
     ShrinkTube: lambda item: "shrink the tube",
     ReduceRadii: lambda item: "reduce epsilon, rho_a or the initial error",
     LeavePlanRoom: lambda item: "plan with more room to the limits",

@@ -7,8 +7,8 @@ from tubecert.claims.assumptions import (
     FirstOrderFilter,
     ForAllTime,
     HardProjection,
+    HardwareLeftOut,
     LeastFeedback,
-    MachineAsGiven,
     ParametersWithin,
     PerfectState,
     SmoothProjection,
@@ -24,13 +24,14 @@ from tubecert.digits import down, near, up
 
 _FIXED: dict[type[Assumption], str] = {
     LeastFeedback: "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, "
-    "section 0); the controller acts in continuous time and exactly (certificate C: with sampled adaptation), "
+    "section 0); the controller acts in continuous time and exactly, "
     "evaluates f(x*) + B(x*) u* itself and never the derivative of a stored plan",
     StraightGeodesics: "minimising geodesics are straight lines, which the constant metric makes unique",
     StartAtRest: "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's "
     "ball",
     HardProjection: "the projection is hard",
     PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
+    HardwareLeftOut: "sampling, delay and noise of the section hardware are no part of what is proven",
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
     ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "
@@ -50,8 +51,6 @@ def assumed(item: Assumption) -> str:
             return f"the claim is for 0 <= t <= {near(item.horizon)} s"
         case WindWithin():
             return _wind(item)
-        case MachineAsGiven():
-            return _machine(item)
         case UncertaintyAsGiven():
             others = ", or any other within the bounds h, h_x, h_t of this certificate"
             return "the uncertainty is the expression of the specification" + (
@@ -61,27 +60,9 @@ def assumed(item: Assumption) -> str:
             return _FIXED[type(item)]
 
 
-def _machine(item: MachineAsGiven) -> str:
-    computes = "it computes exactly"
-    if item.arithmetic is not None:
-        computes = (
-            f"it computes in {item.arithmetic} precision, losing no more than `rounding` of the proof says (which "
-            "tubecert export proves of the code that it writes)"
-        )
-    if item.nodes is not None:
-        computes += f", geodesics at {item.nodes} nodes in {item.sweeps} sweeps (docs/theory, section 8.12)"
-    return (
-        "certificate H is about the machine of the section hardware: it samples on time, its inputs act after exactly "
-        f"that delay and are held, its measurements are as good as stated, and {computes}, the estimate with B^+ (in "
-        "coordinates S of the tube: (S B)^+ S); what is said here of continuous time, of exact measurements and of the "
-        "predictor is for 0, A, B and C"
-    )
-
-
 def _wind(item: WindWithin) -> str:
-    size = "bounded" if item.bound is None else f"|w| <= {near(item.bound)}"
     rate = "" if item.rate is None else f", |dw/dt| <= {near(item.rate)} 1/s"
-    return f"a wind acts as E(x) w beside the inputs, {size}{rate}, and is otherwise arbitrary"
+    return f"a wind acts as E(x) w beside the inputs, |w| <= {near(item.bound)}{rate}, and is otherwise arbitrary"
 
 
 def _geodesics(item: ExactGeodesics) -> str:

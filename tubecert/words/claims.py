@@ -38,14 +38,10 @@ from tubecert.spec.codes import CODES
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import SAYS, SECTIONS, condition_name, equation
 
-_OF_PREDICTOR = ("26c", "distance", "sampled")  # conditions that another predictor may satisfy
+_OF_PREDICTOR = ("26c", "distance")  # conditions that another predictor may satisfy
 _WITHOUT_MARGIN = (
-    "wind_bound",
     "wind_not_covered",
     "gain_not_covered",
-    "gain_unmatched",
-    "gain_range",
-    "corrected_formulas",
     "proven_gains",
     "any_gains",
 )
@@ -230,8 +226,6 @@ def _suffice(claim: GainsSuffice, reason: Reason) -> str:
     )
     binds = "" if claim.binds is None else f"{equation(claim.binds)} sets the bandwidth; "
     said = f"{binds}proven margins: {margins}"
-    if claim.below_twice_rate:
-        said += "; the bandwidth lies below twice the rate"
     if claim.binds == "26b":
         said += "; where (26b) binds the rate grows without bound, so 1 % of it is left"
     return said

@@ -20,7 +20,6 @@ COUNTED: Final = {
     Phase.SWEEP: "points",
     Phase.COMPILATION: "functions",
     Phase.SIMULATION: "runs",
-    Phase.DRIVE: "samples",
 }
 _AT: Final = {
     Phase.CERTIFICATION: "proving",
@@ -34,7 +33,6 @@ _AT: Final = {
     Phase.SWEEP: "certifying points",
     Phase.COMPILATION: "compiling the loops, once per installation",
     Phase.SIMULATION: "simulating",
-    Phase.DRIVE: "driving the compiled controller",
     Phase.FIGURES: "figures and data",
     Phase.RECHECK: "examining",
 }

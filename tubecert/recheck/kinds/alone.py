@@ -41,9 +41,8 @@ class Alone(Kind[AloneSection, NoGains]):
     conditions: ClassVar = ("no_adaptation",)
     adapts: ClassVar = False
 
-    def read(self, node: Node, n: int) -> AloneSection:
+    def read(self, node: Node) -> AloneSection:
         """The section `no_adaptation`."""
-        del n
         own = node.closed(
             "verdict", "margin", "distance", "uncertainty_limit", "ultimate_radius", "shortfalls"
         )

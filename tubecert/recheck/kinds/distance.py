@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
@@ -19,7 +19,6 @@ from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
     all_of,
     at_least,
-    at_most,
     margin_at_least,
     not_shown_to_hold,
     told,
@@ -27,13 +26,9 @@ from tubecert.recheck.kinds.bounds import (
     words,
 )
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
-from tubecert.recheck.kinds.parts import Level, Parts, ranges, read_levels
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
-from tubecert.recheck.kinds.window_section import WindowSection, read_windows
-from tubecert.recheck.legs import of_distance
-from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.metric import stated
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.specified.numbers import Range
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +42,12 @@ class DistancePair:
 
 @dataclass(frozen=True, slots=True)
 class DistanceRecipe:
-    """Y, e and S of theorem B at its gains; with `windows`, which wait for `settling`, the largest of them."""
+    """Y, e and S of theorem B at its gains."""
 
     gains: Gains
     speed: Fraction
     prediction_error: Fraction
     uncertainty: Fraction
-    settling: Fraction | None = None
-    windows: tuple[Level, ...] = ()
 
     @property
     def proof(self) -> DistanceProof:
@@ -76,7 +69,6 @@ class DistanceSection(Section):
     ultimate_radius: Fraction | None
     curve: tuple[Point, ...]
     around: Around | None
-    windows: tuple[WindowSection, ...] = ()
 
     @property
     def pairs(self) -> dict[str, DistancePair]:
@@ -92,24 +84,17 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
     conditions: ClassVar = ("distance",)
     elastic: ClassVar = True
 
-    def read(self, node: Node, n: int) -> DistanceSection:
+    def read(self, node: Node) -> DistanceSection:
         """The section `distance`."""
-        del n
         return _section(node)
 
     def read_recipe(self, node: Node) -> DistanceRecipe:
         """Gains, Y, e and S."""
-        own = node.closed(
-            *GAINS, "speed", "prediction_error", "uncertainty", optional=("settling", "windows")
-        )
+        own = node.closed(*GAINS, "speed", "prediction_error", "uncertainty")
         speed, error, uncertainty = (
             own[key].decimal() for key in ("speed", "prediction_error", "uncertainty")
         )
-        windows = own.get("windows", read_levels) or ()
-        settling = own.get("settling", Node.decimal)
-        if bool(windows) != (settling is not None):
-            raise node.refused("has windows or settling, and not the other")
-        return DistanceRecipe(read_gains(own), speed, error, uncertainty, settling, windows)
+        return DistanceRecipe(read_gains(own), speed, error, uncertainty)
 
     def projection_radii(self, section: DistanceSection) -> Iterator[Fraction]:
         """Those of its pairs."""
@@ -134,27 +119,18 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
 
     def shares(self, section: DistanceSection, recipe: DistanceRecipe, ground: Ground) -> Shares | None:
         """The feedback acts within sup D of theorem B."""
-        if section.windows:
-            most = _parts(section, recipe, ground).feedback()
-            return None if most is None else Shares(most, recipe.gains.projection_radius)
+        del section
         bound = distance_bound(ground.setting, recipe.gains, recipe.proof)
         if bound is None:
             return None
         feedback = ground.setting.n.feedback_gain * bound.supremum()
         return Shares(feedback, recipe.gains.projection_radius)
 
-    def ranges(self, section: DistanceSection) -> Mapping[str, Range] | None:
-        """Those of the windows, if there are any."""
-        return ranges(section.windows)
-
     def claims(
         self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground
     ) -> Iterator[Claim]:
-        """Every pair with its margin and radius, the curve; or the windows."""
+        """Every pair with its margin and radius, the curve."""
         certified = section.verdict == "certified"
-        if section.windows or (recipe is not None and recipe.windows):
-            yield from _in_windows(section, recipe, ground)
-            return
         for k, (name, pair) in enumerate(section.pairs.items()):
             decides = k == 0
             if name == "asked" and not certified:
@@ -191,7 +167,7 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
 
 def _section(node: Node) -> DistanceSection:
     keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "curve", "shortfalls")
-    own = node.closed(*keys, optional=("margins_around", "windows"))
+    own = node.closed(*keys, optional=("margins_around",))
     found = DistanceSection(
         verdict=own["verdict"].word(*VERDICTS),
         split=own.known("split", _pair),
@@ -201,10 +177,7 @@ def _section(node: Node) -> DistanceSection:
         curve=printed.read_curve(own["curve"]),
         around=own.get("margins_around", lambda item: printed.read_around(item, ("margin",))),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
-        windows=own.get("windows", read_windows) or (),
     )
-    if found.windows and (found.curve or found.around or found.split or found.ultimate_radius is not None):
-        raise node.refused("has a curve, other gains or a radius in the long run beside windows")
     if not found.pairs and (found.verdict == "certified" or found.curve or found.around):
         raise node.refused("has no pair of gains")
     return found
@@ -217,52 +190,6 @@ def _pair(node: Node) -> DistancePair:
 
 
 # -- claims
-
-
-def _parts(section: DistanceSection, recipe: DistanceRecipe, ground: Ground) -> Parts:
-    settling = recipe.settling or Fraction(0)
-    return Parts(
-        windows=section.windows,
-        ground=ground,
-        letter="B",
-        levels=recipe.windows,
-        speed=recipe.speed,
-        radius=recipe.gains.projection_radius,
-        theorem=lambda stays: of_distance(stays, recipe.gains, settling),
-    )
-
-
-def _in_windows(section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground) -> Iterator[Claim]:
-    """Theorem BW in place of theorem B."""
-    pair = next(iter(section.pairs.values()), None)
-    if section.verdict != "certified":
-        yield ground.claim("B: what is told of it", (section,), lambda: _says_nothing(section, pair))
-        return
-    if recipe is None or pair is None or recipe.gains != pair.gains or not section.windows:
-        told_wrongly = stated(False, "its windows have no recipe, or one for other gains")
-        yield ground.claim("B: it has a recipe", (section, recipe), lambda: told_wrongly)
-        return
-    parts = _parts(section, recipe, ground)
-    yield ground.claim("B: S, e and the radius", (section, recipe), lambda: _sizes_hold(parts, recipe, pair))
-    yield from parts.claims(pair.margin, (recipe, pair))
-
-
-def _sizes_hold(parts: Parts, recipe: DistanceRecipe, pair: DistancePair) -> Outcome:
-    """S and e of the recipe are at least those of every window; no radius is stated for ever."""
-    found = parts.reached()
-    if found is None:
-        return stated(False, "a condition of the theorem does not hold at the numbers of the recipe")
-    outcomes = [stated(pair.ultimate_radius is None, "windows have an end")]
-    for own in found:
-        outcomes.append(at_most(own.S, recipe.uncertainty, "S in a window"))
-        outcomes.append(at_most(own.e, recipe.prediction_error, "e in a window"))
-    return all_of(outcomes)
-
-
-def _says_nothing(section: DistanceSection, pair: DistancePair | None) -> Outcome:
-    if any(window.proves for window in section.windows):
-        return stated(False, "windows tell of what is not certified")
-    return CONFIRMED if pair is None else not_shown_to_hold([pair.margin])
 
 
 def _pair_claim(

@@ -20,7 +20,7 @@ class Point:
 
     bandwidth: Fraction
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
 
     def at(self, R_H: Fraction) -> Gains:
         """Its gains, with the radius of the projection that the pair has."""
@@ -38,7 +38,7 @@ class Around:
 
     bandwidths: Numbers
     adaptation_rate: Fraction
-    predictor_gain: Fraction | None
+    predictor_gain: Fraction
     margins: dict[str, tuple[Fraction | None, ...]]
 
     def at(self, k: int, R_H: Fraction) -> Gains:
@@ -51,7 +51,7 @@ def read_gains(own: Members) -> Gains:
     return Gains(
         bandwidth=own["bandwidth"].decimal(),
         adaptation_rate=own["adaptation_rate"].decimal(),
-        predictor_gain=own.known("predictor_gain", Node.decimal),
+        predictor_gain=own["predictor_gain"].decimal(),
         projection_radius=own["projection_radius"].decimal(),
     )
 
@@ -64,7 +64,7 @@ def read_curve(node: Node) -> tuple[Point, ...]:
 def _point(node: Node) -> Point:
     own = node.closed("bandwidth", "adaptation_rate", "predictor_gain")
     gains = own["bandwidth"].decimal(), own["adaptation_rate"].decimal()
-    return Point(*gains, own.known("predictor_gain", Node.decimal))
+    return Point(*gains, own["predictor_gain"].decimal())
 
 
 def read_around(node: Node, claims: tuple[str, ...]) -> Around:
@@ -77,7 +77,7 @@ def read_around(node: Node, claims: tuple[str, ...]) -> Around:
         )
         for claim in claims
     }
-    gain = own.known("predictor_gain", Node.decimal)
+    gain = own["predictor_gain"].decimal()
     return Around(bandwidths, own["adaptation_rate"].decimal(), gain, margins)
 
 

@@ -27,8 +27,6 @@ from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, 
 from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.predictor import Gains
-from tubecert.recheck.specified.numbers import Rows
-from tubecert.recheck.system import System
 
 CONDITIONS = ("26a", "26b", "26c")
 DERIVED = (
@@ -56,27 +54,16 @@ class RatePair:
     margins: Margins
 
 
-@dataclass(frozen=True, slots=True)
-class Predictor:
-    """A_m, P and Q as printed."""
-
-    A_m: Rows
-    P: Rows
-    Q: Rows
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateSection(Section):
     """The pair that the verdict is about, that of least rate, the curve."""
 
     pair: RatePair | None
-    predictor: Predictor | None
     ultimate_radius: Fraction | None
     least_adaptation: RatePair | None
     curve: tuple[Point, ...]
     around: Around | None
     binds: str | None
-    below_twice_rate: bool
 
 
 class Rates(Kind[RateSection, Gains]):
@@ -87,9 +74,9 @@ class Rates(Kind[RateSection, Gains]):
     unread: ClassVar = ("bandwidth_infimum", "binds")
     elastic: ClassVar = True
 
-    def read(self, node: Node, n: int) -> RateSection:
+    def read(self, node: Node) -> RateSection:
         """The section `conditions_26`."""
-        return _section(node, n)
+        return _section(node)
 
     def read_recipe(self, node: Node) -> Gains:
         """The gains: nothing else is needed."""
@@ -117,11 +104,11 @@ class Rates(Kind[RateSection, Gains]):
             yield same, f"overrides.{name} is not what {self.key} judges"
 
     def said(self, section: RateSection) -> dict[str, object]:
-        """Margins, whether omega lies below twice the rate, which condition binds."""
+        """Margins, and which condition binds."""
         if section.pair is None:
             return {}
         below = {claim: margin.below for claim, margin in section.pair.margins.items()}
-        own: dict[str, object] = {"margins": below, "below_twice_rate": section.below_twice_rate}
+        own: dict[str, object] = {"margins": below}
         return own if section.binds is None else {**own, "binds": section.binds}
 
     def shares(self, section: RateSection, recipe: Gains, ground: Ground) -> Shares:
@@ -131,7 +118,7 @@ class Rates(Kind[RateSection, Gains]):
         return Shares(setting.n.feedback_gain * setting.reach, recipe.projection_radius)
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
-        """Predictor, constants, margins, radius, curve."""
+        """Constants, margins, radius, curve."""
         if section.pair is not None:
             yield from _of_pair(section, section.pair, recipe, ground)
         setting, R_H, least = ground.setting, ground.projection_radius, section.least_adaptation
@@ -151,65 +138,34 @@ class Rates(Kind[RateSection, Gains]):
 # -- reading
 
 
-def _section(node: Node, n: int) -> RateSection:
-    gains = ("bandwidth", "adaptation_rate", "projection_radius", "margins")
+def _section(node: Node) -> RateSection:
+    gains = (*GAINS, "margins")
     own = node.closed(
         "verdict",
         *gains,
-        "A_m",
-        "P",
-        "Q",
         "ultimate_radius",
         "least_adaptation",
         "curve",
         "bandwidth_infimum",
         "binds",
-        "below_twice_rate",
         "shortfalls",
         optional=("margins_around",),
     )
     own.known("bandwidth_infimum", Node.number)
     verdict = own["verdict"].word(*VERDICTS)
-    matrices = [own.known(key, lambda item: _matrix(item, n)) for key in ("A_m", "P", "Q")]
-    A_m, P, Q = matrices
-    predictor = None if A_m is None or P is None or Q is None else Predictor(A_m, P, Q)
     present = [own[key].value is not None for key in gains]
-    if any(present) != all(present) or (verdict == "certified" and not (all(present) and predictor)):
+    if any(present) != all(present) or (verdict == "certified" and not all(present)):
         raise node.refused("has a part of its gains only")
-    pair = None
-    if all(present):
-        pair = RatePair(
-            Gains(
-                bandwidth=own["bandwidth"].decimal(),
-                adaptation_rate=own["adaptation_rate"].decimal(),
-                predictor_gain=None if predictor is None else _scalar(predictor.A_m),
-                projection_radius=own["projection_radius"].decimal(),
-            ),
-            _margins(own["margins"]),
-        )
     return RateSection(
         verdict=verdict,
-        pair=pair,
-        predictor=predictor,
+        pair=RatePair(read_gains(own), _margins(own["margins"])) if all(present) else None,
         ultimate_radius=own.known("ultimate_radius", Node.number),
         least_adaptation=own.known("least_adaptation", _pair),
         curve=printed.read_curve(own["curve"]),
         around=own.get("margins_around", lambda item: printed.read_around(item, CONDITIONS)),
         binds=own.known("binds", Node.text),
-        below_twice_rate=own["below_twice_rate"].flag(),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
     )
-
-
-def _matrix(node: Node, n: int) -> Rows:
-    return tuple(tuple(e.decimal() for e in row) for row in node.rows(n, n))
-
-
-def _scalar(A: Rows) -> Fraction | None:
-    """The g > 0 of A = -g I."""
-    g = -A[0][0]
-    same = all(e == (-g if i == j else 0) for i, row in enumerate(A) for j, e in enumerate(row))
-    return g if same and g > 0 else None
 
 
 def _pair(node: Node) -> RatePair:
@@ -228,9 +184,7 @@ def _margins(node: Node) -> Margins:
 def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
     """What is claimed of the gains that the verdict is about."""
     setting, at = ground.setting, pair.gains
-    predictor, radius = section.predictor, section.ultimate_radius
-    if predictor is not None:
-        yield ground.claim("A: the predictor", (predictor,), lambda: _loop_holds(predictor, setting.system))
+    radius = section.ultimate_radius
     shown = {name: ground.constants[name] for name in DERIVED}
     yield ground.claim("A: derived constants", (at, shown), lambda: _derived_hold(shown, setting, at))
     if section.verdict == "certified":
@@ -252,29 +206,6 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
                 radius, setting, at, own_distance_proof(setting, at)
             ),  # theorem B at the same gains
         )
-    below = at.bandwidth < 2 * setting.system.rate or not section.below_twice_rate
-    yield ground.claim(
-        "A: below twice the rate",
-        (at, section.below_twice_rate),
-        lambda: stated(below, "below_twice_rate is not what the bandwidth says"),
-    )
-
-
-def _loop_holds(shown: Predictor, s: System) -> Outcome:
-    """The predictor that the section prints: A_m as specified, P = I, Q = -(A_m + A_m')."""
-    A, P, Q = shown.A_m, shown.P, shown.Q
-    n = len(s.states)
-    if s.A_m is not None and s.A_m != A:
-        return stated(False, "A_m is not that of the specification")
-    if s.A_m is None and (
-        A[0][0] >= 0 or any(A[i][j] != (A[0][0] if i == j else 0) for i in range(n) for j in range(n))
-    ):
-        return stated(False, "A_m is not -g I with g > 0")
-    if any(P[i][j] != (i == j) for i in range(n) for j in range(n)):
-        return stated(False, "P is not the identity")
-    return stated(
-        all(Q[i][j] == -(A[i][j] + A[j][i]) for i in range(n) for j in range(n)), "Q is not -(A_m + A_m')"
-    )
 
 
 def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:

@@ -8,7 +8,7 @@ from tubecert.recheck.specified.numbers import several
 from tubecert.recheck.specified.plant import Plant
 
 IDLE = ("name", "expect", "simulation", "obstacles", "limits")
-_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "sample_time", "largest_rate")
+_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
 
 
 def read_idle(own: Members, plant: Plant) -> None:
@@ -19,7 +19,7 @@ def read_idle(own: Members, plant: Plant) -> None:
         for key in _LOCKED:
             locked.get(key, lambda item: several(item, 2))
     if "simulation" in own:
-        numbers, texts = ("runs", "seed", "duration", "control_rate"), ("controllers", "plane", "h")
+        numbers, texts = ("runs", "seed", "duration"), ("controllers", "plane", "h")
         simulation = own["simulation"].closed(optional=("gains", *numbers, *texts))
         simulation.get("gains", Node.text)
         simulation.get(
