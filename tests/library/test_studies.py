@@ -1,4 +1,4 @@
-"""`tc.sweep`, `tc.compare` and `tc.design`: values that say what the files say."""
+"""`tc.sweep` and `tc.compare`: values that say what the files say."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import systems
-from tubecert.library.designing import _merged
 
 import tubecert as tc
-from tubecert.pipeline import design as attempts
-from tubecert.spec import Setting
-from tubecert.spec.load import load_source
-from tubecert.spec.source import Source
 
 
 @pytest.fixture(scope="module")
@@ -66,51 +61,6 @@ def test_a_comparison_is_what_its_certificates_say(swept, tmp_path):
         tc.compare(points[0].file, points[1].file, names=["one"])
 
 
-@pytest.mark.usefixtures("barely")
-@pytest.mark.slow
-def test_a_design_gives_the_certificate_of_its_best_tube(monkeypatch):
-    monkeypatch.setattr(attempts, "_FARTHEST", 1)
-    monkeypatch.setattr(attempts, "_NARROWINGS", 0)
-    steps = []
-    found = tc.design(tc.specification(systems.SCALAR), gap=0.1, progress=steps.append)
-    assert [each.scale for each in found.attempts] == [1, Fraction(1, 2), 2]
-    sizes = [each.size for each in found.attempts if each.size is not None]
-    assert found.best.size == min(sizes)
-    best = found.best.certification
-    assert best.certified
-    assert str(found) == str(best)
-    assert best.result.tube.epsilon == found.best.scale / 2
-    assert steps
-    assert "times as wide" in found._repr_html_()
-
-
-def test_what_a_design_lacks_is_told():
-    for wrong, message in (({"minimise": ["z"]}, "minimise: z is no state"), ({"gap": 2}, "gap")):
-        with pytest.raises(tc.SpecError, match=message):
-            tc.design(tc.specification(systems.SCALAR), **wrong)
-    with pytest.raises(tc.SpecError, match="is no pair of quantities"):
-        tc.trade_off(tc.specification(systems.SCALAR), "hardware.colour")
-    with pytest.raises(tc.SpecError, match="corridor: the specification has no hardware"):
-        tc.machines(tc.specification(systems.SMALL), {"x": 0.1})
+def test_a_range_of_one_value_is_refused():
     with pytest.raises(tc.SpecError, match="no range"):
         tc.sweep(systems.SMALL, {"tube.epsilon": "1:2"}, folder="x")
-
-
-@pytest.mark.parametrize(
-    ("whole", "own", "widths"),
-    [
-        (
-            "tube={epsilon: 0.3, rho_a: 0.2}",
-            ("tube.epsilon=0.6", "tube.rho_a=0.4"),
-            (Fraction("0.6"), Fraction("0.4")),
-        ),
-        ("tube={half_widths: {x: 0.3}}", ("tube.half_widths.x=1/7",), (Fraction(1, 7),)),
-    ],
-)
-def test_a_tube_that_was_set_as_a_whole_is_scaled_inside(whole, own, widths):
-    fixed = [Setting.of(whole), Setting.of("hardware.rate=100")]
-    merged = _merged(fixed, [Setting.of(each) for each in own])
-    spec = load_source(Source.of("scalar.yaml", systems.SCALAR), merged)
-    assert len(merged) == 2
-    tube = spec.tube
-    assert (tuple(w for _, w in tube.half_widths) or (tube.epsilon, tube.rho_a)) == widths

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from fractions import Fraction
 
@@ -22,7 +21,6 @@ from tubecert.library.certification import read as read_file
 from tubecert.model import build
 from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted, certified_plan, require_tube
-from tubecert.simulate.grid import computer
 from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
 from tubecert.simulate.setting import setting_of
 from tubecert.simulate.tuning import CHOSEN, Choice, loop_of
@@ -154,15 +152,9 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     assert "B distance" in loop.origin
     paper = loop_of(where, "l1", Choice(source="26"))
     assert paper.problem.gains.adaptation_rate == result.to_json()["conditions_26"]["adaptation_rate"]
-    for chosen in (
-        loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000))),
-        loop_of(where, "sampled", Choice(sample_time=Fraction(1, 10))),
-    ):
-        assert chosen.promise is None
-        assert chosen.origin == CHOSEN
-    held = loop_of(where, "l1", Choice(), Fraction(1000))
-    assert held.promise is None
-    assert "not for a controller that is held" in held.origin
+    chosen = loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000)))
+    assert chosen.promise is None
+    assert chosen.origin == CHOSEN
     assert loop_of(where, "ccm", Choice()).promise is None
 
 
@@ -200,50 +192,6 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
     assert found.h != setting("three_state").h
 
 
-# the sample time of C on the ticks of a computer (S7)
-
-
-def test_a_certified_sample_time_is_cut_to_whole_control_periods():
-    """`--controllers ccm,l1,sampled --control-rate 500`, the example of its own help, ended in a ValueError."""
-    where = setting("flat")
-    Ts = certified("flat")[1].to_json()["sampled"]["sample_time"]
-    for rate in (Fraction(500), Fraction(70), 1 / Fraction(repr(Ts))):
-        loop = loop_of(where, "sampled", Choice(), rate)
-        cut = loop.problem.gains.sample_time
-        periods = Fraction(repr(Ts)) * rate
-        assert cut == float(int(periods) / rate)
-        assert Ts - float(1 / rate) < cut <= Ts
-        assert computer(loop.problem).every == int(periods)
-        assert ("cut to" in loop.origin) == (cut != Ts)
-        assert loop.promise is None
-    untouched = loop_of(where, "l1", Choice(), Fraction(500))
-    assert "cut to" not in untouched.origin
-
-
-@pytest.mark.parametrize("rate", ["500", "1/10"])
-def test_a_chosen_sample_time_must_fit_the_control_rate(rate):
-    where, rate = setting("flat"), Fraction(rate)
-    fitting = loop_of(where, "sampled", Choice(sample_time=3 / rate), rate)
-    assert computer(fitting.problem).every == 3
-    error, finding = refused(loop_of, where, "sampled", Choice(sample_time=Fraction(7, 2) / rate), rate)
-    assert error.exit_code is ExitCode.INVALID
-    assert "is no multiple of the control period" in finding.message
-    assert f"--sample-time {3 / rate} or {4 / rate}" in finding.help
-
-
-def test_a_control_period_longer_than_the_sample_time_is_located():
-    slow = load_text(FLAT + "simulation: {control_rate: 2}\n")
-    where = replace(setting("flat"), spec=slow)
-    error, finding = refused(loop_of, where, "sampled", Choice(), Fraction(2))
-    assert error.exit_code is ExitCode.INVALID
-    assert "is longer than the sample time" in finding.message
-    least = int(re.search(r"(\d+) Hz", finding.help).group(1))
-    assert finding.location.line == FLAT.count("\n") + 1
-    assert loop_of(where, "sampled", Choice(), Fraction(least)).problem.gains.sample_time
-    _, finding = refused(loop_of, where, "sampled", Choice(), Fraction(21, 10))
-    assert finding.location is None
-
-
 # kinds of certificates
 
 
@@ -254,7 +202,7 @@ def test_kinds_are_named_alike_everywhere():
     assert all(kind.name.option == key for key, kind in KINDS.items())
     _, result = certified("two_state", "0.4")
     adapting = {kind.name.key for kind in KINDS.values() if kind.name.adapts}
-    assert adapting - {"hardware"} == set(result.proof.of)
+    assert adapting == set(result.proof.of)
 
 
 @pytest.mark.slow
@@ -263,11 +211,8 @@ def test_kinds_are_named_alike_everywhere():
     [
         ("l1", "26", "26"),
         ("l1", "distance", "distance"),
-        ("l1", "sampled", "distance"),
-        ("sampled", "26", "sampled"),
-        ("sampled", "sampled", "sampled"),
+        ("l1", "none", "distance"),
         ("reference", "26", "26"),
-        ("reference", "sampled", "sampled"),
     ],
 )
 def test_a_loop_takes_the_gains_of_a_kind_that_is_about_it(controller, wanted, taken):

@@ -128,7 +128,7 @@ def feedback(case, x, x_star, u_star):
 
 
 class Reference:
-    """z = (x, xtilde, sigma_hat, u_a, s_hat), integrated from one jump, sample or switch to the next."""
+    """z = (x, xtilde, sigma_hat, u_a), integrated from one jump or switch to the next."""
 
     def __init__(self, case, controller, gains, knots):
         self.case, self.controller, self.gains = case, controller, gains
@@ -138,32 +138,28 @@ class Reference:
 
     def split(self, z):
         n, m = self.n, self.m
-        return np.split(z, [n, 2 * n, 2 * n + m, 2 * n + 2 * m])
+        return np.split(z, [n, 2 * n, 2 * n + m])
 
     def push(self, z):
-        _, xt, _, _, _ = self.split(z)
+        _, xt, _, _ = self.split(z)
         return -self.case.B.T @ xt
 
     def derivative(self, k):
         case, gains = self.case, self.gains
 
         def rate(t, z):
-            x, xt, s, u, held = self.split(z)
+            x, xt, s, u = self.split(z)
             h = case.h(t, x)
             u_star = self.knots[2][k]
             applied = u_star + feedback(case, x, self.curve(k, t), u_star) + u + h
             out = np.zeros_like(z)
-            dx, dxt, ds, du, _ = self.split(out)
+            dx, dxt, ds, du = self.split(out)
             dx[:] = case.f(x) + case.B @ applied
             if self.controller == "ccm":
                 return out
-            dxt[:] = gains.A_m(self.n) @ xt - case.B @ h
+            dxt[:] = -gains.predictor_gain * xt + case.B @ (s - h)
             du[:] = -gains.bandwidth * (u + s)
-            if self.controller == "sampled":
-                dxt += held
-            else:
-                dxt += case.B @ s
-                ds[:] = gains.adaptation_rate * self.projected(s, self.push(z))
+            ds[:] = gains.adaptation_rate * self.projected(s, self.push(z))
             return out
 
         return rate
@@ -175,27 +171,14 @@ class Reference:
             return y - F * s * (s @ y) / (s @ s) if F > 0 and y @ s > 0 else y
         return y - s * (s @ y) / (s @ s) if self.sliding else y
 
-    def sample(self, z):
-        """The adaptation of certificate C."""
-        _, xt, s, _, held = self.split(z)
-        g, Ts = self.gains.predictor_gain, self.gains.sample_time
-        held[:] = -g / np.expm1(g * Ts) * xt
-        s[:] = np.exp(g * Ts) * np.linalg.pinv(self.case.B) @ held
-        s *= min(1.0, self.gains.projection_radius / max(np.linalg.norm(s), 1e-300))
-
     def run(self, start, times):
         """z at the times (K, .)."""
         horizon, knots = times[-1], self.knots[0]
-        samples = np.zeros(0)
-        if self.controller == "sampled":
-            samples = np.arange(int(horizon / self.gains.sample_time) + 1) * self.gains.sample_time
-        marks = np.unique(np.round([*times, *knots[knots < horizon], *samples], 12))
-        z = np.zeros(3 * self.n + 2 * self.m)
+        marks = np.unique(np.round([*times, *knots[knots < horizon]], 12))
+        z = np.zeros(2 * self.n + 2 * self.m)
         z[: self.n] = start
         rows = {}
         for a, b in pairwise([*marks, horizon + 1]):
-            if len(samples) and np.abs(samples - a).min() < 1e-9:
-                self.sample(z)
             rows[a] = z.copy()
             if b > horizon:
                 break
@@ -262,7 +245,7 @@ def compared(case, loop, inputs, *, span, K, tolerance=1e-7):
 def agree(found, expected, fast=1e-4):
     """x and xtilde to 1e-6; sigma_hat to Gamma times less."""
     n, m = found.x.shape[2], found.u_a.shape[2]
-    x, xt, s, u, _ = np.split(expected, [n, 2 * n, 2 * n + m, 2 * n + 2 * m], axis=1)
+    x, xt, s, u = np.split(expected, [n, 2 * n, 2 * n + m], axis=1)
     assert np.abs(found.x[0] - x).max() < 1e-6
     assert np.abs(found.xtilde[0] - xt).max() < 1e-6
     assert np.abs(found.u_a[0] - u).max() < 1e-5
@@ -271,15 +254,12 @@ def agree(found, expected, fast=1e-4):
 
 JUMPS = [np.array([u]) for u in (1.0, -0.5, 2.0, 0.0, -1.5, 0.7)]
 L1 = LoopGains(bandwidth=20.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=2e4)
-C = LoopGains(bandwidth=20.0, projection_radius=50.0, predictor_gain=3.0, sample_time=0.037)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("controller", "gains"), [("ccm", None), ("l1", L1), ("sampled", C)], ids=["ccm", "l1", "sampled"]
-)
+@pytest.mark.parametrize(("controller", "gains"), [("ccm", None), ("l1", L1)], ids=["ccm", "l1"])
 def test_inputs_that_jump_at_knots(controller, gains):
-    """Knots, samples and output times are incommensurable here."""
+    """Knots and output times are incommensurable here."""
     found, expected = compared(ONE_INPUT, (controller, gains), JUMPS, span=0.13, K=8)
     assert np.ptp(found.u_plan[:, 0]) > 2
     agree(found, expected)
@@ -302,16 +282,6 @@ def test_two_inputs_whose_estimate_slides_along_the_ball(smooth):
     assert 5 < at_rim.sum() < len(size)
     angle = np.unwrap(np.arctan2(*found.sigma_hat[0][at_rim].T))
     assert np.ptp(angle) > 0.5  # along the rim, not only at one place
-
-
-@pytest.mark.slow
-def test_two_sampled_inputs_are_clipped_to_the_ball():
-    gains = LoopGains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=3.0, sample_time=0.04)
-    found, expected = compared(TWO_INPUTS, ("sampled", gains), PAIRS, span=0.3, K=12)
-    agree(found, expected)
-    size = np.linalg.norm(found.sigma_hat[0], axis=1)
-    assert (size > RADIUS * (1 - 1e-12)).sum() > 3
-    assert size.max() <= RADIUS * (1 + 1e-12)
 
 
 @pytest.mark.slow

@@ -8,9 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from simulated import Failure, certified, runs, setting
-from tubecert.conditions.hardware import HardwareRecipe
 
-from tubecert.simulate.certified import Own, Section, Values, read_numbers
+from tubecert.simulate.certified import Section, Values, read_numbers
 from tubecert.simulate.compare import compare
 from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.promise import KINDS, promise
@@ -36,7 +35,7 @@ def numbers():
     return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants, sections=sections)
 
 
-@pytest.mark.parametrize("key", [key for key in KINDS if key != "hardware"])
+@pytest.mark.parametrize("key", list(KINDS))
 def test_bounds_are_those_of_the_theory(numbers, key):
     c, recipe = numbers.constants, numbers.sections[KINDS[key].name.key].recipe
     kmax = c["feedback_gain"] * 0.4
@@ -59,61 +58,11 @@ def test_bounds_are_those_of_the_theory(numbers, key):
     assert promise(numbers, KINDS[key]).bounds == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("prediction", [None, "0.2"])
-def test_bounds_of_a_machine(numbers, prediction):
-    """Theorem H: kb, X, Y and what is left of h at the samples; its tube and its ranges of inputs are its own."""
-    c, recipe = (
-        numbers.constants,
-        {"sample_time": "0.01", "delay": "0.005", "feedback_time": "0.02", "noise": "0.3"},
-    )
-    recipe |= {"clip_radius": "0.7", "level": "0.35", "floor": "0.1", "speed": "0.9", "bias": "0.11"}
-    recipe |= {"ripple": "0.07", "prediction": prediction, "bandwidth": None, "wind": "0"}
-    c |= {"noise_metric": 0.5, "input_rate": 0.6}
-    own = Own(
-        recipe=HardwareRecipe(**{k: None if q is None else Fraction(q) for k, q in recipe.items()}),
-        radius=0.55,
-        half_widths=(0.2, 0.3),
-        clip=None,
-    )
-    section = Section(certified=True, recipe=Values(), ultimate=0.4, own=own)
-    found = promise(replace(numbers, sections={"hardware": section}), KINDS["hardware"])
-    n_M = 0.3 * 0.5 if prediction is None else 1.9**0.5 * 0.2
-    s1, H0 = c["h_t"] + c["h_x"] * 0.9, c["h_initial"]
-    expected = {
-        "distance": 0.35,
-        "deviation": 0.55,
-        "k": c["feedback_gain"] * (0.35 + n_M) + min(0.6 * 0.025, 2 * c["u_star"]),
-        "sigma_error": min(
-            c["h"] + 0.7, max(min(c["h"], H0 + s1 * 0.015), max(0.11, H0) + 0.07 + s1 * 0.015)
-        ),
-        "estimate": max(0.11, H0) + 0.07,
-        "speed": 0.9,
-    }
-    assert found.bounds == pytest.approx(expected, rel=1e-12)
-    assert found.half_widths == own.half_widths
-
-
 def test_the_decay_without_adaptation(numbers):
     c, t = numbers.constants, np.linspace(0, 5, 50)
     pushed = (c["metric_input_gain"] * c["h"] + c["plan_defect_metric"]) / numbers.rate
     expected = pushed + (c["initial_distance"] - pushed) * np.exp(-numbers.rate * t)
     assert promise(numbers, KINDS["none"]).decay(t) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("h_initial", [0.1, 5.0])
-def test_the_decay_of_the_sampled_kind(numbers, h_initial):
-    """(4.6) and (4.8); H1 is the smaller of Dh and H0 + s1 Ts."""
-    numbers.constants["h_initial"] = h_initial
-    c, recipe = numbers.constants, numbers.sections[KINDS["sampled"].name.key].recipe
-    Ts, g, omega, Y = (recipe[name] for name in ("sample_time", "predictor_gain", "bandwidth", "speed"))
-    s1 = c["h_t"] + c["h_x"] * Y
-    b = min(c["B_pinv"] * c["B_x"], c["B_pinv_x"] * c["B"]) * c["h"]
-    m = 1 / g - Ts / (np.exp(g * Ts) - 1)
-    decay = promise(numbers, KINDS["sampled"]).decay
-    assert decay.rest == pytest.approx(s1 * Ts / (1 - np.exp(-omega * Ts)) + m * (s1 + b * Y), rel=1e-9)
-    assert decay.first == pytest.approx(min(c["h"], h_initial + s1 * Ts), rel=1e-12)
-    assert (decay.start, decay.beta) == (c["initial_distance"], c["metric_input_gain"])
-    assert (decay.defect, decay.delay) == (c["plan_defect_metric"], Ts)
 
 
 def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
