@@ -37,7 +37,6 @@ _CONSTANTS = {
 
 _RESULT = {
     "verdict": "certified",
-    "formulas": "corrected",
     "spec": {"effective": _EFFECTIVE, "effective_hash": "sha256:00", "file_hash": "sha256:01"},
     "claim": {
         "id": "tube",
@@ -88,18 +87,15 @@ _RESULT = {
         "verdict": "certified",
         "bandwidth": 41.82,
         "adaptation_rate": 13940000.0,
-        "A_m": [[-10.0, 0.0], [0.0, -10.0]],
-        "P": [[1.0, 0.0], [0.0, 1.0]],
-        "Q": [[20.0, 0.0], [0.0, 20.0]],
+        "predictor_gain": 10.0,
         "projection_radius": 0.1,
         "ultimate_radius": None,
         "bandwidth_infimum": 41.8,
-        "below_twice_rate": False,
         "margins": {"26a": [0.000123, 0.02], "26b": [0.63, 0.64], "26c": [4.1e-5, 0.03]},
         "least_adaptation": {
             "bandwidth": 48.0,
             "adaptation_rate": 12340000.0,
-            "predictor_gain": None,
+            "predictor_gain": 12.0,
             "projection_radius": 0.1,
             "margins": {"26a": [0.05, 0.06], "26b": [0.7, 0.8], "26c": [2e-5, 0.03]},
         },
@@ -130,22 +126,10 @@ _RESULT = {
         "curve": [],
         "shortfalls": [],
     },
-    "sampled": {
-        "verdict": "certified",
-        "sample_time": 0.0906,
-        "bandwidth": 11.04,
-        "predictor_gain": 11.04,
-        "projection_radius": 0.1,
-        "ultimate_radius": 0.0125,
-        "margin": [1e-4, 0.01],
-        "sample_time_limit": 0.12589,
-        "curve": [],
-        "shortfalls": [],
-    },
     "proof": {},
 }
 
-_TUBE_KEYS = ("tube", "constants", "conditions_26", "distance", "sampled", "decided_by")
+_TUBE_KEYS = ("tube", "constants", "conditions_26", "distance", "decided_by")
 
 
 def certified(**changes):

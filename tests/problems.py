@@ -6,8 +6,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from tubecert.conditions.sampled import SampledRecipe, margin_sampled_along
-from tubecert.kinds.sampled import SampledSection
 
 from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions import rates
@@ -37,7 +35,7 @@ X0 = np.array([0.01, -0.01, 0.01])
 
 def constants(**values: float | tuple[float, float]) -> BoundConstants:
     """Constants by name; a pair is an enclosure, what is not named is 0 (1 where 0 makes no sense)."""
-    default = dict.fromkeys(TABLE, 0.0) | {"lower": 1.0, "upper": 1.0, "input_gain_least": 1.0}
+    default = dict.fromkeys(TABLE, 0.0) | {"lower": 1.0, "upper": 1.0}
     if "h_initial" not in values:
         values = values | {"h_initial": values.get("h", 0.0)}
     pairs = {
@@ -45,11 +43,6 @@ def constants(**values: float | tuple[float, float]) -> BoundConstants:
         for name, value in (default | values).items()
     }
     return BoundConstants(**{name: Constant(below=lo, above=hi) for name, (lo, hi) in pairs.items()})
-
-
-def scalar_predictor(g: str, n: int) -> tuple[tuple[Fraction, ...], ...]:
-    """A_m = -g I."""
-    return tuple(tuple(-Fraction(g) if i == j else Fraction(0) for j in range(n)) for i in range(n))
 
 
 def two_state(**options: Any) -> TubeProblem:
@@ -125,8 +118,6 @@ def three_state(**options: Any) -> TubeProblem:
         "metric_input_gain": float(np.sqrt(_metric(np.zeros(3))[2, 2])),
         "drift_on_plan": float(np.linalg.norm(_f(x), axis=1).max()),
         "initial_distance": _segment_length(X0),
-        "input_gain_least": 2.0,
-        "contraction_excess": 2.0,
     } | options.pop("values", {})
     defaults = {
         "rate": Fraction("0.9999"),
@@ -134,7 +125,6 @@ def three_state(**options: Any) -> TubeProblem:
         "rho_a": Fraction("0.01"),
         "rho_r": Fraction(rho_r),
         "rho": Fraction(rho * (1 + 1e-12)),
-        "initial_offset": Fraction(offset),
         "states": 3,
     }
     return TubeProblem(constants=constants(**values), **(defaults | options))
@@ -163,8 +153,6 @@ ALIVE = {
     "initial_distance": 0.45,  # large enough for sup D to be an interior maximum
     "plan_defect": 0.02,
     "plan_defect_metric": 0.02,
-    "input_gain_least": 0.8,
-    "contraction_excess": 1.9,
 }
 
 
@@ -177,8 +165,7 @@ def alive(**options) -> TubeProblem:
         "rho_a": Fraction("0.2"),
         "rho_r": Fraction("0.7"),
         "rho": Fraction("0.9"),
-        "initial_offset": Fraction(0.15),
-        "A_m": scalar_predictor("3.5", 2),
+        "predictor_gain": Fraction("3.5"),
         "states": 2,
     }
     return TubeProblem(constants=constants(**values), **(defaults | options))
@@ -201,11 +188,6 @@ def judged_distance(problem: TubeProblem, **asked: Any) -> DistanceSection:
     return _judged("B", problem, asked)
 
 
-def judged_sampled(problem: TubeProblem, **asked: Any) -> SampledSection:
-    """What is proposed and decided for certificate C."""
-    return _judged("C", problem, asked)
-
-
 def verdict_at(problem: TubeProblem, recipe: RateRecipe) -> Verdict:
     """What the kernel decides about one recipe."""
     return judge(problem, rates.THEOREM, Proposal(decisive=recipe)).verdict
@@ -219,11 +201,6 @@ def margins_26(problem: TubeProblem, recipe: RateRecipe) -> dict[str, Interval]:
 def margin_distance(problem: TubeProblem, recipe: DistanceRecipe) -> Interval:
     """The margin of one recipe."""
     return margin_distance_along(problem, [recipe])[0]
-
-
-def margin_sampled(problem: TubeProblem, recipe: SampledRecipe) -> Interval:
-    """The margin of one recipe."""
-    return margin_sampled_along(problem, [recipe])[0]
 
 
 def problem_of(spec: Spec, options: Options) -> TubeProblem:

@@ -138,31 +138,27 @@ tube: {epsilon: 0.2, rho_a: 0.1}
 adaptation: {A_m: -10}
 """
 
-# the same on a plan that comes to rest, with windows and a machine of which every term is alive
-IN_WINDOWS = (
+DISTURBED = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
+
+# the same in a wind, of which more than h knows is left
+BLOWN = SMALL + DISTURBED
+
+# on a plan that comes to rest, with an output, in a wind, with limits, for certificate B
+COMING_TO_REST = (
     SMALL.replace(
         "{kind: equilibrium, at: [0, 0], input: [0]}",
         '{kind: expressions, horizon: 2, x: ["0.3*exp(-2*t)", "-0.3*exp(-2*t)"],'
         ' u: ["0.3*exp(-2*t) - 0.3*sin(0.3*exp(-2*t))"]}',
     )
-    .replace("at: [0.05, 0]", "at: [0.35, -0.3]")
+    .replace("at: [0.05, 0]", "at: [0.31, -0.3]")
     .replace("  B: ", "  outputs: {s: x - 0.5*y}\n  B: ")
-    .replace("rho_a: 0.1}", "rho_a: 0.1, windows: [0.3, 0.9]}")
-    + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0002, y: 0.0005}}\n"
-    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
-)
-
-# without a machine: windows of certificates B and C, in a wind, with limits
-GAINS_IN_WINDOWS = (
-    IN_WINDOWS.split("hardware:", maxsplit=1)[0]
-    .replace("at: [0.35, -0.3]", "at: [0.31, -0.3]")
     .replace("0.1*sin(t) + 0.05*x", "0.6*sin(3*t) + 0.3*x*(1 + y)")
     .replace("adaptation: {A_m: -10}\n", "")
-    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\nlimits: {u: [-3, 3]}\n'
-    + "conditions: {decides: B}\n"
+    + DISTURBED
+    + "limits: {u: [-3, 3]}\nconditions: {decides: B}\n"
 )
 
-# the smallest machine: a line that is known well, at 200 Hz
+# the smallest: a line that is known well
 SCALAR = """
 tubecert: 1
 name: scalar
@@ -172,16 +168,7 @@ uncertainty: {h: ["0.2*sin(t)"]}
 trajectory: {kind: equilibrium, at: [0]}
 metric: {rate: 0.5, dual_metric: [[1]]}
 tube: {epsilon: 0.5, rho_a: 0.5}
-hardware: {rate: 200, noise: 0.001}
-conditions: {decides: H}
 """
-
-# a machine with noise of each state, in a wind
-BLOWN = (
-    SMALL
-    + "hardware: {rate: 500, delay: 0.0005, noise: {x: 0.0005, y: 0.001}}\n"
-    + 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
-)
 
 # any plan of the two-state system in a box
 FAMILY_TWO = """

@@ -40,7 +40,7 @@ def main() -> int:
         document = read(path.read_text(encoding="utf-8"), str(path))
         case = Case(read_certificate(document).result, given.boxes)
         for name in OVER_TUBE:
-            rising = name in ("lower", "input_gain_least")
+            rising = name == "lower"
             value = getattr(case.constants[name], "above" if rising else "below")
             if value is None or value <= 0:
                 continue
