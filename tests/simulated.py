@@ -65,7 +65,7 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         return Peak(value=values[lanes, at], time=t[at])
 
     none = np.zeros((N, K))
-    peaks = {name: peak(none) for name in ("u", "k", "xtilde", "sigma_error", "h", "estimate", "speed")}
+    peaks = {name: peak(none) for name in ("u", "k", "xtilde", "sigma_error", "h", "speed")}
     worst = Worst(
         **(peaks | {"distance": peak(distance), "deviation": peak(deviation)} | changes.pop("peaks", {}))
     )

@@ -97,13 +97,13 @@ def test_overrides_of_the_certificate_are_adopted_and_other_radii_refused():
 
 
 def test_simulate_and_recheck_have_one_judge():
-    """Other units were refused here and accepted there, another kernel the other way round."""
+    """Other units were refused here and accepted there, another adaptation the other way round."""
     _, result = certified("flat")
     measured = FLAT.replace("system: {", "system: {units: {p: m}, ")
     assert compared(load_text(measured), result).idle == ("system.units",)
     assert adopted(load_text(measured), result).units != load_text(FLAT).units
-    another = load_text(FLAT + "conditions: {kernel: paper}\n")
-    assert compared(another, result).serious == ("conditions",)
+    another = load_text(FLAT + "adaptation: {projection: {smooth: 0.1}}\n")
+    assert compared(another, result).serious == ("adaptation",)
     error, finding = refused(adopted, another, result)
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC604")
 
@@ -274,3 +274,14 @@ def test_half_widths_keep_their_states_through_a_file(tmp_path):
         widths = setting_of(spec, found).certified.half_widths
         assert widths == tuple(result.tube.half_widths[name] for name in ("v", "p"))
         assert widths[0] > 1.02 * widths[1]
+
+
+def test_an_uncertain_input_gain_is_refused_by_every_loop():
+    text = FLAT.replace("system: {", "system: {parameters: {g: [0.96, 1.04]}, ").replace("[1]]", '["g"]]', 1)
+    spec = load_text(text)
+    where = replace(setting("flat"), spec=spec, model=build(spec))
+    for controller in ("ccm", "l1", "reference"):
+        error, finding = refused(loop_of, where, controller, Choice())
+        assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC705")
+        assert "parameters known by ranges stand in B" in finding.message
+        assert finding.location is not None

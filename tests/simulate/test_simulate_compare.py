@@ -62,27 +62,25 @@ def test_the_error_of_the_estimate_counts_from_the_start():
     np.testing.assert_allclose(promise(own, KINDS["distance"]).decay(t), solved, rtol=1e-7)
 
 
-def test_decay_with_delay_waits_without_adaptation():
-    decay = Decay(rate=1.3, bandwidth=1.3, start=0.2, beta=0.8, defect=0.0, first=1.5, rest=0.4, delay=0.5)
+def test_decay_where_the_bandwidth_is_the_rate():
+    decay = Decay(rate=1.3, bandwidth=1.3, start=0.2, beta=0.8, defect=0.0, first=1.5, rest=0.4)
     t = np.linspace(0, 3, 301)
 
     def right(s, D):
-        e = np.exp(-1.3 * (s - 0.5))
-        return -1.3 * D + 0.8 * (1.5 if s < 0.5 else e * 1.5 + (1 - e) * 0.4)
+        e = np.exp(-1.3 * s)
+        return -1.3 * D + 0.8 * (e * 1.5 + (1 - e) * 0.4)
 
     solved = solve_ivp(right, (0, 3), [0.2], t_eval=t, rtol=1e-9, atol=1e-12, max_step=0.01).y[0]
     np.testing.assert_allclose(decay(t), solved, atol=1e-4)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("which", ["distance", "sampled"])
-def test_the_largest_promised_distance_is_the_margin_of_the_certificate(which):
+def test_the_largest_promised_distance_is_the_margin_of_the_certificate():
     _, result = certified("two_state", "0.4")
-    found = promise(read_numbers(result), KINDS[which])
+    found = promise(read_numbers(result), KINDS["distance"])
     assert found is not None
     assert found.decay is not None
-    section = result.to_json()[which]
-    margin = (section["least_adaptation"] if which == "distance" else section)["margin"]
+    margin = result.to_json()["distance"]["least_adaptation"]["margin"]
     left = 1 - found.decay(np.linspace(0, 5, 5001)).max() / found.reach
     assert margin[0] - 1e-6 <= left <= margin[1] + 1e-6
 
@@ -92,7 +90,6 @@ def test_only_certified_sections_promise():
     assert promise(read_numbers(result), KINDS["distance"]) is not None
     refuted = {"distance": replace(result.sections["distance"], verdict=Verdict.REFUTED)}
     changes = (
-        {"formulas": "as-printed"},
         {"sections": {}, "decided_by": ()},
         {"proof": Recipes()},
         {"sections": result.sections | refuted},

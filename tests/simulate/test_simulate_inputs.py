@@ -22,7 +22,7 @@ from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
 LIMITED = FLAT + "limits: {u: [-3, 4]}\n"
-CONTROLLERS = {"A": "l1", "B": "l1", "C": "sampled"}
+CONTROLLERS = {"A": "l1", "B": "l1"}
 
 
 def made(text, kinds="all"):

@@ -74,7 +74,7 @@ def test_blocks_cover_y_once_and_in_order(n, m):
 
 @entry
 def rate(fast, y, h, B, dy):
-    _rate(fast, y, h, B, dy)
+    _rate(fast, False, y, h, B, dy)
 
 
 @pytest.mark.slow
