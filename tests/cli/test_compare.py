@@ -33,10 +33,11 @@ def changed(change):
 
 
 def other(result):
-    """Half the rate, another horizon, and no certificate C."""
+    """Half the rate, another horizon, and no certificate A."""
     result["spec"]["effective"]["trajectory"] |= {"at": ["0", "1"], "horizon": "10"}
     result["distance"]["least_adaptation"]["adaptation_rate"] *= 0.5
-    del result["sampled"]
+    del result["conditions_26"]
+    result["decided_by"] = ["distance"]
 
 
 @pytest.fixture
@@ -61,7 +62,7 @@ def test_a_table_names_gains_changes_what_is_missing_and_what_differs(files):
     assert lines[0] == "pendulum: 2 certificates, 2 keys of their specifications differ"
     rate = certificates.certified()["distance"]["least_adaptation"]["adaptation_rate"]
     assert any(line.startswith("least Gamma, Γ ") and line.endswith("-50 %") for line in lines), rate
-    assert "verdict certified not there" in lines  # of C
+    assert "verdict certified not there" in lines  # of A
     assert "trajectory.at[1] 0 1" in lines
     assert "trajectory.horizon not there 10" in lines
     same = run("compare", files[0], files[0])
@@ -92,7 +93,11 @@ def test_formats_have_every_number_as_the_certificate_states_it(files):
             ),
         ):
             assert float(rows[key][name]) == data["quantities"][key][index] == number
-    assert rows["sampled.verdict"] == {"quantity": "sampled.verdict", "before": "certified", "after": ""}
+    assert rows["conditions_26.verdict"] == {
+        "quantity": "conditions_26.verdict",
+        "before": "certified",
+        "after": "",
+    }
     assert rows["specification.trajectory.horizon"]["after"] == "10"
     assert data["differences"]["trajectory.horizon"] == [None, "10"]
 

@@ -106,7 +106,7 @@ def test_two_words_about_one_key_are_refused():
     assert (done.exit_code, "--set goes without it" in " ".join(done.output.split())) == (2, True)
 
 
-@pytest.mark.parametrize("command", ["certify", "synth", "simulate", "check", "design"])
+@pytest.mark.parametrize("command", ["certify", "synth", "simulate", "check"])
 def test_every_command_names_the_option_as_the_place(command):
     done = run(command, SPEC, "--set", "tube.epsilom=1", "--set", "foo")
     assert done.exit_code == 2

@@ -56,7 +56,6 @@ def test_a_command_line_that_means_something_else(
         ),
         (("verify", "plant.yaml"), "a metric file after the specification (tubecert synth finds one)"),
         (("report", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
-        (("export", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
         (("recheck", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
         (("recheck", "other.json"), "give a file that tubecert certify wrote"),
     ],

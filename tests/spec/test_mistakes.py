@@ -28,7 +28,9 @@ def found(text: str) -> list[Finding]:
 
 
 def test_without_a_mistake_nothing_is_said() -> None:
-    assert found(GOOD) == []
+    assert [item.code for item in found(GOOD)] == [
+        "TC416"
+    ]  # the machine is read, and not part of what is proven
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1].strip()[:40] or "left out")
@@ -52,7 +54,7 @@ def test_there_are_many_of_them() -> None:
 
 def test_a_delay_may_use_a_parameter_whose_name_is_about_samples() -> None:
     text = SCALAR.replace("system: {", "system: {parameters: {sample_time: 0.001}, ")
-    spec = load_text(text.replace("rate: 200", "rate: 200, delay: sample_time/2"))
+    spec = load_text(text + "hardware: {rate: 200, delay: sample_time/2}\n")
     assert spec.hardware is not None
     assert spec.hardware.delay == Fraction(1, 2000)
 

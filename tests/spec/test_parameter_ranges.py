@@ -8,7 +8,6 @@ from fractions import Fraction
 import pytest
 from systems import SMALL
 
-from tubecert import pipeline
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
 from tubecert.model import build
@@ -108,10 +107,3 @@ def test_a_gain_is_known_at_the_middle():
 
 def test_a_range_that_is_in_f_alone_leaves_B():
     assert load_text(with_mass() + MACHINE, "s.yaml").gained == ()
-
-
-def test_another_kind_may_not_decide_of_a_gain():
-    spec = load_text(with_gain(), "s.yaml")
-    with pytest.raises(SpecError, match="stated for a known B") as found:
-        pipeline.question_of(spec, pipeline.Options(conditions="distance"))
-    assert found.value.findings[0].location == spec.location("system.B")

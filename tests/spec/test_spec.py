@@ -119,7 +119,7 @@ def test_three_state() -> None:
     assert spec.metric.rate == Fraction(9999, 10000)
     assert spec.metric.lower is None
     assert spec.tube.epsilon == spec.tube.rho_a == Fraction(1, 100)
-    assert spec.adaptation.A_m == ((-1, 0, 0), (0, -1, 0), (0, 0, -1))
+    assert spec.adaptation.predictor_gain == 1
     assert spec.trajectory.kind == "equilibrium"
     assert spec.trajectory.horizon is None
     assert spec.uncertainty.h is not None
@@ -129,9 +129,9 @@ def test_three_state() -> None:
 
 def test_defaults() -> None:
     spec = load_text(MINIMAL)
-    assert (spec.metric, spec.kernel, spec.expect) == (None, None, None)
+    assert (spec.metric, spec.expect) == (None, None)
     assert (spec.tube.epsilon, spec.tube.rho_a) == (None, None)
-    assert (spec.adaptation.A_m, spec.adaptation.smooth) == ("auto", None)
+    assert (spec.adaptation.predictor_gain, spec.adaptation.smooth) == (None, None)
     assert spec.x0 == (0,)
     assert [term.expression.fraction for term in spec.trajectory.u] == [0]
 
@@ -166,7 +166,6 @@ def test_expectations_are_kept() -> None:
     assert spec.expect is not None
     assert spec.expect.verdict == "certified"
     assert dict(spec.expect.ranges) == {"rho": (Fraction(1, 10), Fraction(1, 5)), "bandwidth": (1, 1000)}
-    assert spec.kernel == "tight"
 
 
 def test_obligations_know_their_places() -> None:

@@ -145,8 +145,9 @@ OTHER_WORDS: Final[Mapping[str, str]] = {
 GONE: Final[Mapping[str, str]] = {
     **dict.fromkeys(("C", "c", "H", "h"), "certificates C and H are gone: let B decide"),
     **dict.fromkeys(("sampled", "hardware"), "sampled and delayed loops are not covered now: leave it out"),
+    "largest": "no machine and no disturbance is searched for now: write a number",
 }
-"""Choices that there once were, and what to do instead."""
+"""Words that there once were, and what to do instead."""
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "horizon": "5, in s",

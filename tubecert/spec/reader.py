@@ -197,6 +197,7 @@ class Field:
         try:
             value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
+            error.help = GONE.get(self.node.text, error.help)
             self._expression_error(error, codes.NUMBER)
             return None
         if extreme := out_of_range(value):
