@@ -32,7 +32,6 @@ def tube_of(name: str, kind: str, **options):
     ("name", "kind"),
     [
         ("three_state", "A"),
-        ("two_state", "C"),
         ("state_dependent_input", "B"),
     ],
 )
@@ -80,9 +79,9 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
         ("tubecert/templates/car.yaml", False, {}),
         ("tubecert/templates/crane.yaml", True, {}),
         ("configs/quadrotor3d.yaml", False, {}),
-        ("configs/hardware_pvtol.yaml", False, {}),
+        ("configs/hardware_pvtol.yaml", True, {}),
         ("configs/two_state_orbit.yaml", False, {}),
-        ("configs/hardware_pvtol_moving.yaml", False, {}),
+        ("configs/hardware_pvtol_moving.yaml", True, {}),
     ],
 )
 def test_half_widths_along_a_plan_that_moves_or_of_many_states_ask_for_it_by_themselves(

@@ -11,9 +11,8 @@ from proven import barely as in_brief
 from rechecked import certified, examine, failing, respecified, sealed
 
 from tubecert.errors import ExitCode, TubecertError
-from tubecert.library import designing
 from tubecert.pipeline import Options, certify
-from tubecert.pipeline.width import measure_in, measure_of
+from tubecert.pipeline.width import measure_in
 from tubecert.simulate.certified import read_numbers
 from tubecert.spec import canonical, load_text
 
@@ -130,13 +129,9 @@ def test_more_than_was_asked_for_is_noticed():
     assert failing(examine(respecified(made(), other)))
 
 
-def test_designs_and_metrics_may_be_compared_by_outputs():
+def test_metrics_may_be_compared_by_outputs():
     spec = load_text(TEXT)
-    assert measure_of(spec).units == {"y": 0.5, "tip": 0.3}
     assert measure_in(spec, ["tip", "m"]).units == {"tip": 0.3, "m": 1.0}
-    assert designing._minimised(spec, ["tip"], str).of({"tip": 0.15}, None) == 0.5
-    with pytest.raises(TubecertError, match="tipp is no state or output"):
-        designing._minimised(spec, ["tipp"], str)
     wanted = TEXT.replace("metric: {rate: 0.8", "metric: {synthesise: {outputs: [tip, x]}} #")
     assert load_text(wanted).synthesis.outputs == ("tip", "x")
 

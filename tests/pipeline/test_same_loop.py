@@ -1,7 +1,7 @@
 """The same loop written otherwise: units of states and inputs, the order of states, the unit of time.
 
-Theorems 0, A, B and C are about the loop, not about how it is written: omega is 1/s and a sample time s; sigma' = Gamma
-B'P xt makes Gamma u^2 (the s of B is that of sigma'); distances have no unit, half-widths those of their states.
+Theorems 0, A and B are about the loop, not about how it is written: omega is 1/s; sigma' = Gamma B'P xt makes Gamma
+u^2 (the s of B is that of sigma'); distances have no unit, half-widths those of their states.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from proven import proven
 from tubecert.kinds import ALONE
 
 NAMES = ("p", "v")
-TAKEN = ("bandwidth", "adaptation_rate", "sample_time")
+TAKEN = ("bandwidth", "adaptation_rate")
 
 
 def loop(*, s: int = 1, u: int = 1, clock: int = 1, order: tuple[int, int] = (0, 1)) -> str:
@@ -47,7 +47,7 @@ def found(**options):
     result = proven(loop(**options), bare=True, conditions="all")["result"]
     gains = {
         (kind, name): result["proof"][kind][name]
-        for kind, name in product(("conditions_26", "distance", "sampled"), TAKEN)
+        for kind, name in product(("conditions_26", "distance"), TAKEN)
         if name in result["proof"].get(kind, {})
     }
     return gains, result[ALONE.key], result["tube"]["half_widths"]
@@ -63,8 +63,8 @@ def test_the_same_loop_has_the_same_gains_in_its_units(options):
     gains, alone, widths = found()
     others, alone_there, widths_there = found(**options)
     u, clock = options.get("u", 1), options.get("clock", 1)
-    powers = {"bandwidth": 1 / clock, "adaptation_rate": 1 / u**2, "sample_time": clock}
-    assert len(gains) == 6
+    powers = {"bandwidth": 1 / clock, "adaptation_rate": 1 / u**2}
+    assert len(gains) == 4
     assert others == pytest.approx({key: powers[key[1]] * value for key, value in gains.items()}, rel=1e-2)
     assert alone_there["verdict"] == alone["verdict"]
     assert alone_there["distance"] == pytest.approx(alone["distance"], rel=1e-6)

@@ -95,31 +95,25 @@ def numbers(stage):
 
 OVER_THE_TUBE = ("radius", "constants", "geodesics")
 MACHINE = ("hardware.rate=400", "hardware.noise=0.0001")
-NOISY = ("hardware.rate=400", "hardware.noise={x: 0.0001}")
 
 
 @pytest.mark.parametrize(
-    ("fixed", "one", "other", "machines"),
+    ("fixed", "one", "other"),
     [
-        ((), "adaptation.A_m=-1", "adaptation.A_m=-2", 0),
-        ((), "conditions.decides=A", "conditions.decides=B", 0),
-        ((), "limits.u=[-1, 1]", "limits.u=[-2, 1]", 0),
-        (MACHINE[1:], "hardware.rate=400", "hardware.rate=800", 1),
-        (MACHINE, "hardware.delay=0", "hardware.delay=0.001", 1),
-        (MACHINE[:1], "hardware.noise=0.0001", "hardware.noise=0.0002", 1),
-        (MACHINE[:1], NOISY[1], "hardware.noise={x: 0.0002}", 2),
-        (MACHINE, "hardware.feedforward=held", "hardware.feedforward=continuous", 2),
+        ((), "adaptation.A_m=-1", "adaptation.A_m=-2"),
+        ((), "conditions.decides=A", "conditions.decides=B"),
+        ((), "limits.u=[-1, 1]", "limits.u=[-2, 1]"),
+        (MACHINE[1:], "hardware.rate=400", "hardware.rate=800"),
     ],
 )
 @pytest.mark.slow
-def test_what_the_constants_do_not_rest_on_computes_none_again(fixed, one, other, machines):
+def test_what_the_constants_do_not_rest_on_computes_none_again(fixed, one, other):
     memory = Memory()
     for words in (one, other):
         spec = set_in(ONE, *fixed, words)
         found = bounded(spec, memory)
     assert numbers(found) == numbers(bounded(spec))
     assert [memory.computed[name] for name in OVER_THE_TUBE] == [1, 1, 1]
-    assert memory.computed.get("machine", 0) == machines
 
 
 @pytest.mark.slow
