@@ -56,7 +56,7 @@ def test_what_is_used_is_told_of_the_middle_of_the_limits():
     """[0.1, 0.3] in [0, 0.8]: 0.3 from the middle, which is 0.4 from the limits."""
     result = certificate_of(ONE + "limits: {u: [0, 0.8]}\n").result
     assert result.inputs[0].use(["distance"]) == pytest.approx(0.75, abs=1e-3)
-    assert result.inputs[0].use(["sampled", "distance"]) >= result.inputs[0].use(["distance"])
+    assert result.inputs[0].use(["conditions_26", "distance"]) >= result.inputs[0].use(["distance"])
     assert result.inputs[0].use([]) is None
 
 
@@ -81,7 +81,7 @@ def test_the_page_has_a_row_for_every_loop():
     section = next(section for section in page.sections if section.key == "inputs")
     table, figures = section.blocks
     assert [figure.key for figure in figures.figures] == ["input-0"]
-    assert [row[4].text for row in table.rows] == ["0 no adaptation", "A (26)", "B distance", "C sampled"]
+    assert [row[4].text for row in table.rows] == ["0 no adaptation", "A (26)", "B distance"]
     assert table.rows[0][6].text == "20.1 %"
     text = render_page(page)
     assert "The input u stays within its limits, on the plan and in the loop." in text

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from tubecert import pipeline
 from tubecert.certificate.searched import MetricRow, SynthesisData
-from tubecert.claims.advice import ConstantInputs, LessenCause
+from tubecert.claims.advice import ConstantInputs
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
 from tubecert.cli.app import app
@@ -417,59 +417,3 @@ def test_advice_costs_no_more_than_the_search():
 
 
 # -- for a machine
-
-
-CART = """
-tubecert: 1
-name: cart
-system: {states: [z, v], inputs: [F], f: [v, "-0.5*v"], B: [[0], [1]]}
-safe_set: {z: [-1, 1], v: [-2, 2]}
-uncertainty: {h: ["0.02*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
-tube: {half_widths: {z: 0.3}}
-hardware: {rate: 200}
-disturbance: {E: [[0], [1]], bound: 0.02}
-conditions: {decides: H}
-"""
-
-
-@pytest.mark.slow
-def test_for_a_machine_metrics_are_ranked_by_the_tube_that_is_proven_with_them():
-    """At a rate of samples that is given every metric used to be worth the same."""
-    found = pipeline.synthesise(
-        load_text(CART), Synthesis(rate=Fraction(2), objective="adaptation"), Options()
-    )
-    best = min(found.rows, key=lambda row: row.score("adaptation"))
-    width = pipeline.certify(found.spec, Options()).sections["hardware"].half_widths["z"] / 0.3
-    assert best.verdict is Verdict.CERTIFIED
-    assert width <= best.demand < 1.1 * width  # the search knew constants to 5 %
-    failed = [row for row in found.rows if row.verdict is not Verdict.CERTIFIED]
-    assert all(row.demand > 1 for row in failed)
-
-
-@pytest.mark.slow
-def test_where_no_metric_serves_a_machine_what_fills_the_loop_that_comes_nearest_is_said(monkeypatch):
-    """Only margins were told: of -1e-6, where the loop needed ten times its room."""
-    monkeypatch.setattr("tubecert.pipeline.climb.FLOORS", ("identity",))  # that of least input gain serves B
-    told = []
-    spec = load_text(CART.replace("rate: 200", "rate: 2").replace("z: 0.3", "z: 0.01"))
-    found = pipeline.synthesise(
-        spec, Synthesis(rate=Fraction(2), objective="adaptation"), Options(), told=told.append
-    )
-    assert [each.reason.relax for each in told] == [()], "the verdict first"
-    assert found.reason.claim.failure.slow.condition == "hardware"
-    shares = [each.share for each in found.reason.relax if isinstance(each, LessenCause)]
-    least = min(row.demand for row in found.rows)
-    assert sum(shares) > 1
-    assert sum(shares) == pytest.approx(least, rel=0.1), "of the best of them"
-
-
-def test_a_narrow_tube_counts_even_where_the_filter_is_slow():
-    row = Row(
-        rate=Fraction(2), floor="identity", degree=0, condition_number=9.0, metric=None, by_machine=True
-    )
-    slow = replace(row, verdict=Verdict.CERTIFIED, bandwidth=1.0, demand=0.1)
-    fast = replace(row, verdict=Verdict.CERTIFIED, bandwidth=9.0, demand=0.2, condition_number=1.0)
-    fails = replace(row, verdict=Verdict.UNDECIDED, served=True, demand=1.01)
-    for objective in ("adaptation", "tube"):
-        assert sorted([fails, fast, slow], key=lambda each: each.score(objective)) == [slow, fast, fails]
