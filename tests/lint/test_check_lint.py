@@ -43,6 +43,8 @@ MOVING = '{kind: expressions, x: ["0.5*sin(t)", "0.5*cos(t)"], u: ["%s"], horizo
 ALONG = "initial_state: {at: [0, 0.5]}"
 START = "initial_state: {at: [0, 0]}"
 TUBE = "rho_a: 0.1}"
+OF_TUBE = BASE[BASE.index("tube:") :]
+LOOP = BASE[BASE.index("uncertainty") : BASE.index("metric")]
 CSV = "t,p,v,u\n0,0,0,0\n1,%s,0,0\n"
 
 CASES = {
@@ -57,6 +59,7 @@ CASES = {
     "units": ("TC132", "4:10", [("  states: [p, v]", "  units: {p: m}\n  states: [p, v]")]),
     "idle": ("TC133", "7:7", [("f: [v, ", "f: [0, ")]),
     "expect nothing": ("TC134", "9:9", [("safe_set", "expect: {}\nsafe_set")]),
+    "a metric alone": ("TC136", "11:3", [(LOOP, ""), (OF_TUBE, "")]),
     "no uncertainty": ("TC205", "11:6", [('"0.1*sin(2*t)"', "0")]),
     "bounded by zero": ("TC205", "11:15", [('h: ["0.1*sin(2*t)"]', "bounds: {h: 0, h_x: 0, h_t: 0}")]),
     "unknown constant": ("TC205", "11:11", [('h: ["0.1*sin(2*t)"]', "bounds: {h: 1, h_x: 0, h_t: 0}")]),
@@ -90,7 +93,7 @@ CASES = {
 
 
 def found(text: str) -> list[Finding]:
-    return pipeline.inspect(load_text(text, "base.yaml"))
+    return pipeline.inspect(load_text(text, "base.yaml", "question"))
 
 
 def changed(*changes: tuple[str, str]) -> str:

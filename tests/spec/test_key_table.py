@@ -89,7 +89,7 @@ def effective(data: Any, path: str) -> Any:
 def read(text: str, path: str) -> Any:
     """The same of a text: most files do not have the key in question, and are read once."""
     try:
-        return canonical(load_text(text, path))
+        return canonical(load_text(text, path, "question"))
     except SpecError:
         return None
 

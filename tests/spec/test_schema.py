@@ -25,7 +25,7 @@ from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
 from tubecert.records import to_json
-from tubecert.spec.load import load, load_system, load_text
+from tubecert.spec.load import load, load_question, load_system, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.spec.reader import Field
 
@@ -96,7 +96,7 @@ def test_good_files_fit(path):
 
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
 def test_the_effective_specification_fits(path):
-    assert not errors("spec", spec.canonical(load(str(path))))
+    assert not errors("spec", spec.canonical(load_question(str(path))))
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
@@ -222,7 +222,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
         schema = subschema(path, kind)
         named = path == "uncertainty.bounds"  # beside its own keys, those of the inputs
         assert set(schema["properties"]) == (known & {"h", "h_x", "h_t"} if named else known), (path, kind)
-        depends = "anyOf" in schema or path == "uncertainty.bounds"  # on other keys
+        depends = "anyOf" in schema or "if" in schema or path == "uncertainty.bounds"  # on other keys
         if not depends:
             assert set(schema.get("required", ())) == asked.required[(path, kind)], (path, kind)
         assert schema["additionalProperties"] is False or path == "uncertainty.bounds"
@@ -231,14 +231,15 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
 def test_the_choices_are_those_of_the_readers():
     from tubecert.letters import ADAPTIVE, ALL, NAMES, words_of
     from tubecert.spec.plan import KINDS
-    from tubecert.spec.settings import RANGES, VERDICTS
+    from tubecert.spec.settings import METRICS, RANGES, VERDICTS
     from tubecert.spec.simulation import CONTROLLERS
     from tubecert.spec.synthesis import OBJECTIVES, ROUTES, SOLVERS
 
     properties = SCHEMAS["spec"]["properties"]
     assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
     assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
-    assert set(properties["expect"]["properties"]) == {"verdict", *RANGES}
+    assert properties["expect"]["properties"]["metric"]["enum"] == list(METRICS)
+    assert set(properties["expect"]["properties"]) == {"verdict", "metric", *RANGES}
     decides = properties["conditions"]["properties"]["decides"]["enum"]
     assert set(map(str, decides)) == {*words_of(), ALL}
     result = SCHEMAS["certificate"]["properties"]["result"]["properties"]

@@ -22,7 +22,7 @@ from tubecert.findings import Finding
 from tubecert.recheck.document import Node
 from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import system_of
-from tubecert.spec import CODES, Spec, canonical, load, load_text
+from tubecert.spec import CODES, Spec, canonical, load, load_question, load_text
 
 ROOT = Path(__file__).parents[2]
 OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
@@ -53,17 +53,17 @@ def minimal(old: str, new: str) -> str:
 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_good_files_load(path: Path) -> None:
-    spec = load(str(path))
+    spec = load_question(str(path))
     assert spec.path == str(path)
     assert all(location.file == str(path) for location in spec.locations.values())
 
 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_the_canonical_form_is_a_specification_of_the_same_system(path: Path) -> None:
-    data = canonical(load(str(path)))
-    again = load_text(json.dumps(data), "canonical.json")
+    data = canonical(load_question(str(path)))
+    again = load_text(json.dumps(data), "canonical.json", "question")
     assert canonical(again) == data
-    assert canonical(load_text(yaml.safe_dump(data), "canonical.yaml")) == data
+    assert canonical(load_text(yaml.safe_dump(data), "canonical.yaml", "question")) == data
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
@@ -609,7 +609,7 @@ def test_numbers_are_bounded_before_anything_is_computed(key: str, number: str) 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_a_specification_travels(path: Path) -> None:
     """Pickled or copied it is equal, with the very same expressions, and knows where its keys stand."""
-    spec = load(str(path))
+    spec = load_question(str(path))
     for other in (pickle.loads(pickle.dumps(spec)), copy.deepcopy(spec), copy.copy(spec)):
         assert other == spec
         assert other.locations == spec.locations

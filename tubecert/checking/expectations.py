@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
@@ -15,7 +15,7 @@ from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
 from tubecert.pipeline.verification import Verified
-from tubecert.spec import Expectation, Spec
+from tubecert.spec import Spec
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import input_title, message, title
@@ -25,6 +25,8 @@ VERDICT_MISMATCH = "TC502"
 RANGE_MISMATCH = "TC503"
 REFUTED = "TC504"
 UNDECIDED = "TC505"
+
+_LARGEST_RATE = "largest_rate"
 
 CODES: Mapping[str, str] = {
     VERDICT_MISMATCH: "the verdict is not the expected one",
@@ -46,9 +48,10 @@ class Claim:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """A certification in short: the verdict, the numbers that can be expected, and every claim."""
+    """A certification in short: verdict, that on the metric if it was reached, numbers that can be expected, claims."""
 
     verdict: Verdict
+    metric: Verdict | None
     numbers: tuple[tuple[str, float], ...]
     claims: tuple[Claim, ...]
 
@@ -59,7 +62,12 @@ class Outcome:
 
 def outcome(result: Result) -> Outcome:
     """What a `result` comes down to."""
-    return Outcome(verdict=result.verdict, numbers=tuple(_numbers(result)), claims=tuple(_claims(result)))
+    return Outcome(
+        verdict=result.verdict,
+        metric=None if result.metric is None else result.metric.verdict,
+        numbers=tuple(_numbers(result)),
+        claims=tuple(_claims(result)),
+    )
 
 
 def _numbers(result: Result) -> Iterator[tuple[str, float]]:
@@ -84,14 +92,14 @@ def _numbers(result: Result) -> Iterator[tuple[str, float]]:
 def _largest_rate(enclosed: Constant) -> Iterator[tuple[str, float]]:
     """What is proven that the metric supports, if there is a bound."""
     if isfinite(enclosed.below):
-        yield "largest_rate", enclosed.below
+        yield _LARGEST_RATE, enclosed.below
 
 
 def outcome_of_metric(found: Verified) -> Outcome:
     """What the verification of a metric comes down to."""
     numbers = () if found.largest_rate is None else tuple(_largest_rate(found.largest_rate))
-    claims = [] if found.reason is None else [_claim(found.reason)]
-    return Outcome(verdict=found.verdict, numbers=numbers, claims=tuple(claims))
+    claim = Claim(name="metric", verdict=found.verdict) if found.reason is None else _claim(found.reason)
+    return Outcome(verdict=found.verdict, metric=found.verdict, numbers=numbers, claims=(claim,))
 
 
 def _claim(reason: Reason, h: Sequence[str] = ()) -> Claim:
@@ -124,23 +132,40 @@ def _claims(result: Result) -> Iterator[Claim]:
 
 def compared(spec: Spec, found: Outcome) -> list[Finding]:
     """What is not as expected; without an expectation, a verdict that is not `certified`."""
+    if spec.lacks:
+        return metric_compared(spec, found)
     expect = spec.expect
-    if expect is None or expect.verdict is None:
-        findings = list(_not_certified(spec, found))
-    elif expect.verdict == found.verdict:
-        findings = []
-    else:
-        findings = [
-            Finding(
-                code=VERDICT_MISMATCH,
-                message=f"the verdict is {found.verdict}, expected: {expect.verdict}",
-                location=spec.location("expect.verdict"),
-                help="; ".join(claim.message for claim in found.claims if claim.verdict == found.verdict)[
-                    :400
-                ],
-            )
-        ]
-    return findings if expect is None else [*findings, *_ranges(spec, expect, found)]
+    if expect is None:
+        return list(_not_certified(spec, found))
+    told = [] if expect.metric is None else list(_metric(spec, expect.metric, found))
+    if expect.verdict is None:
+        told += _not_certified(spec, found)
+    elif expect.verdict != found.verdict:
+        message = f"the verdict is {found.verdict}, expected: {expect.verdict}"
+        told.append(_mismatch(spec, "expect.verdict", message, found))
+    return [*told, *_ranges(spec, expect.ranges, found)]
+
+
+def metric_compared(spec: Spec, found: Outcome) -> list[Finding]:
+    """The same of a metric alone: what a file expects beside it is not looked at."""
+    expect = spec.expect
+    locked = None if expect is None else expect.metric
+    told = _not_certified(spec, found) if locked is None else _metric(spec, locked, found)
+    ranges = () if expect is None else [each for each in expect.ranges if each[0] == _LARGEST_RATE]
+    return [*told, *_ranges(spec, ranges, found)]
+
+
+def _metric(spec: Spec, expected: str, found: Outcome) -> Iterator[Finding]:
+    known = found.metric
+    told = "not decided" if known is None else "holds" if known is Verdict.CERTIFIED else str(known)
+    if told != expected:
+        message = f"metric: {told}, expected: {expected}"
+        yield _mismatch(spec, "expect.metric", message, found)
+
+
+def _mismatch(spec: Spec, where: str, message: str, found: Outcome) -> Finding:
+    why = "; ".join(claim.message for claim in found.claims if claim.verdict == found.verdict)
+    return Finding(code=VERDICT_MISMATCH, message=message, location=spec.location(where), help=why[:400])
 
 
 def _not_certified(spec: Spec, found: Outcome) -> Iterator[Finding]:
@@ -157,9 +182,11 @@ def _not_certified(spec: Spec, found: Outcome) -> Iterator[Finding]:
             )
 
 
-def _ranges(spec: Spec, expect: Expectation, found: Outcome) -> Iterator[Finding]:
+def _ranges(
+    spec: Spec, ranges: Iterable[tuple[str, tuple[Fraction, Fraction]]], found: Outcome
+) -> Iterator[Finding]:
     numbers = dict(found.numbers)
-    for name, (least, most) in expect.ranges:
+    for name, (least, most) in ranges:
         value = numbers.get(name)
         if value is not None and least <= Fraction(str(value)) <= most:
             continue

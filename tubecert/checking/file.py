@@ -9,14 +9,16 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.checking import cache
-from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, outcome
+from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, outcome, outcome_of_metric
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding, Severity
 from tubecert.kept import nothing_kept
-from tubecert.spec import Setting, Spec, load
+from tubecert.spec import Setting, Spec, load_question
 
 if TYPE_CHECKING:
     from tubecert.progress import Progress
+
+_GAP_OF_RATES = Fraction(1, 1000)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +57,10 @@ def _checked(path: str, options: CheckOptions, progress: Progress | None) -> Che
     started = time.perf_counter()
     claims: tuple[Claim, ...] = ()
     try:
-        spec = load(path, options.settings)
+        spec = load_question(path, options.settings)
         findings = _remembered("lint", spec, lambda: _inspected(spec))
         if options.certify and not _errors(findings):
-            found = _certified(spec, options, progress)
+            found = _outcome(spec, options, progress)
             findings = [*findings, *compared(spec, found)]
             claims = found.claims
     except TubecertError as error:
@@ -110,14 +112,27 @@ def _remembered(what: str, spec: Spec, work: Callable[[], list[Finding]]) -> lis
     return kept
 
 
-def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
-    """The outcome of a system that has not changed, or of a new certification; raises `TubecertError`."""
+def _outcome(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
+    """The outcome of a system that has not changed, or a new one; raises `TubecertError`."""
     name = cache.key_of_system(spec, options.gap, options.budget)
     kept = cache.read_outcome(name)
     if kept is None:
-        from tubecert import pipeline
-
-        effort = pipeline.Options(gap=options.gap, budget=options.budget)
-        kept = outcome(pipeline.certify(spec, effort, progress))
+        kept = (_verified if spec.lacks else _certified)(spec, options, progress)
         cache.write_outcome(name, kept)
     return kept
+
+
+def _certified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
+    from tubecert import pipeline
+
+    effort = pipeline.Options(gap=options.gap, budget=options.budget)
+    return outcome(pipeline.certify(spec, effort, progress))
+
+
+def _verified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:
+    """The same of a metric alone, at least as closely as `verify` encloses its largest rate."""
+    from tubecert.enclosure.branch_and_bound import Effort
+    from tubecert.pipeline.verification import verify
+
+    effort = Effort(gap=float(min(options.gap, _GAP_OF_RATES)), budget=options.budget)
+    return outcome_of_metric(verify(spec, effort, progress))

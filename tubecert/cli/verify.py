@@ -91,13 +91,13 @@ def run(given: Given, output: Output) -> ExitCode:
 
 def _as_locked(specs: Sequence[Spec], found: Sequence[Verified], terminal: Terminal) -> ExitCode:
     """Certified if every metric is what the section `expect` of its specification says."""
-    from tubecert.checking.expectations import compared, outcome_of_metric
+    from tubecert.checking.expectations import metric_compared, outcome_of_metric
     from tubecert.report.findings import render
 
     wrong = [
         each
         for spec, verified in zip(specs, found, strict=True)
-        for each in compared(spec, outcome_of_metric(verified))
+        for each in metric_compared(spec, outcome_of_metric(verified))
     ]
     if wrong:
         terminal.show(render(wrong))

@@ -211,7 +211,7 @@ def verify(
 
     numbers = verification_numbers(number_texts(rate=rate, gap=gap, budget=budget), str)
     wanted, effort = numbers.rate, Effort(gap=float(numbers.gap), budget=numbers.budget)
-    whole, name = spec_of(spec, alone=True), ""
+    whole, name = spec_of(spec, reads="system"), ""
     if metric is not None:
         whole, name = with_metric(whole, metric, wanted)
     return VerifiedMetric(

@@ -16,7 +16,7 @@ from tubecert.certificate.file import digest
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
 from tubecert.spec import Setting, Spec, canonical
-from tubecert.spec.load import VERSION, again, load_source
+from tubecert.spec.load import VERSION, Reads, again, load_source, whole
 from tubecert.spec.source import Source, read_source
 
 File: TypeAlias = str | os.PathLike[str]
@@ -25,7 +25,7 @@ NAME: Final = "<specification>"  # what findings call a specification that is no
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Specification:
-    """A system with its safe set, uncertainty, plan and options; `spec` has all of it, exact.
+    """A system with its safe set, uncertainty, plan and options, or with a metric alone; `spec` has all of it, exact.
 
     Two specifications are equal if they are the same but for spelling.
     """
@@ -76,7 +76,8 @@ class Specification:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.specification(Effective.of(self.data))
+        unseen = {"trajectory": {"kind": "equilibrium"}} if self.spec.lacks else {}  # a card shows no plan
+        return notebook.specification(Effective.of(self.data | unseen))
 
 
 Specifiable: TypeAlias = Specification | File | Data
@@ -88,7 +89,7 @@ def load(source: Specifiable, *, settings: Data | None = None) -> Specification:
     `settings` are keys that are set in place of its own, by their paths: `{"tube.rho_a": 0.05}`, as `--set` does.
     Raises `TargetError` if the file cannot be read, and `SpecError` with every problem of it.
     """
-    return Specification(spec=spec_of(source, settings_of(settings or {})))
+    return Specification(spec=spec_of(source, settings_of(settings or {}), "question"))
 
 
 def specification(data: Data | str) -> Specification:
@@ -97,17 +98,17 @@ def specification(data: Data | str) -> Specification:
     Values may be texts, numbers (a float stands for its shortest decimal), lists, arrays, and expressions and matrices
     of sympy; `tubecert: 1` may be left out. Raises `SpecError` with every problem.
     """
-    return Specification(spec=load_source(_source(data)))
+    return Specification(spec=load_source(_source(data), reads="question"))
 
 
-def spec_of(source: Specifiable, settings: Sequence[Setting] = (), *, alone: bool = False) -> Spec:
-    """What `load` reads; `alone`: what is no part of a system with its metric may be missing, and is not read."""
+def spec_of(source: Specifiable, settings: Sequence[Setting] = (), reads: Reads = "whole") -> Spec:
+    """The specification in a source, as far as it `reads` (`spec.load`); raises `SpecError`."""
     if isinstance(source, Specification):
         kept = [Setting(path=path, text=text) for path, text in source.spec.settings]
-        return again(source.spec, [*kept, *settings]) if settings else source.spec
-    if isinstance(source, Mapping):
-        return load_source(_source(source), settings, alone=alone)
-    return load_source(read_source(os.fspath(source)), settings, alone=alone)
+        spec = again(source.spec, [*kept, *settings]) if settings else source.spec
+        return whole(spec) if reads == "whole" else spec
+    text = _source(source) if isinstance(source, Mapping) else read_source(os.fspath(source))
+    return load_source(text, settings, reads)
 
 
 def settings_of(given: Data) -> list[Setting]:

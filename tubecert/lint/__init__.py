@@ -34,16 +34,12 @@ __all__ = ["CODES", "lint", "name_findings"]
 
 
 def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
-    """Every finding; what a file is known to be refuted for (`expect: {verdict: refuted}`) is only a note."""
+    """Every finding; what a file is known to be refuted for (`expect`) is only a note."""
     with np.errstate(all="ignore"):  # what overflows is not finite, and nothing is said about it
-        findings = [
-            *name_findings(spec),
-            *plan_findings(spec),
-            *uncertainty_findings(spec, time, effort),
-            *metric_findings(spec),
-            *_left_out(spec),
-        ]
-    if spec.expect is not None and spec.expect.verdict == "refuted":
+        findings = [*name_findings(spec), *metric_findings(spec), *_left_out(spec)]
+        if not spec.lacks:  # else it asks about a metric alone
+            findings += [*plan_findings(spec), *uncertainty_findings(spec, time, effort)]
+    if spec.expect is not None and "refuted" in (spec.expect.verdict, spec.expect.metric):
         return [replace(item, severity=Severity.NOTE) for item in findings]
     return findings
 

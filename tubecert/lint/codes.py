@@ -11,6 +11,7 @@ UNITS: Final = "TC132"
 IDLE_STATE: Final = "TC133"
 EMPTY_EXPECTATION: Final = "TC134"
 NOT_POSITIVE: Final = "TC135"
+METRIC_ALONE: Final = "TC136"
 NO_UNCERTAINTY: Final = "TC205"
 LOOSE_BOUND: Final = "TC206"
 BROKEN_BOUND: Final = "TC207"
@@ -41,6 +42,7 @@ CODES: Final[Mapping[str, str]] = {
     IDLE_STATE: "a state cannot change",
     EMPTY_EXPECTATION: "an expectation that expects nothing",
     NOT_POSITIVE: "a mass, an inertia or a length is not positive",
+    METRIC_ALONE: "the question is about a metric alone",
     NO_UNCERTAINTY: "there is no uncertainty: h is zero",
     LOOSE_BOUND: "a declared bound of h is larger than its expression needs",
     BROKEN_BOUND: "the expression of h breaks a declared bound",

@@ -164,7 +164,7 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
 def _modes(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
     """Eigenvalues of d(f + B u*)/dx at an equilibrium that B does not reach (Hautus): no rate lies beyond them."""
     plan = spec.trajectory
-    if plan.kind != "equilibrium":
+    if plan.kind != "equilibrium" or spec.lacks:
         return
     x, u = ([nearest(term.expression.fraction) for term in terms] for terms in (plan.x, plan.u))
     at = np.array([x])

@@ -131,11 +131,20 @@ def _idle(spec: Spec) -> Iterator[Finding]:
 
 
 def _expectation(spec: Spec) -> Iterator[Finding]:
-    if spec.expect is not None and spec.expect.verdict is None and not spec.expect.ranges:
+    expect = spec.expect
+    if expect is None and spec.lacks:
+        yield Finding(
+            code=codes.METRIC_ALONE,
+            severity=Severity.NOTE,
+            message="this asks about a metric alone: there is neither uncertainty nor trajectory",
+            location=spec.location("metric"),
+            help="write expect: {metric: holds}, or add the sections that are missing",
+        )
+    if expect is not None and not (expect.verdict or expect.metric or expect.ranges):
         yield Finding(
             code=codes.EMPTY_EXPECTATION,
             severity=Severity.WARNING,
             message="expect names nothing that is expected",
             location=spec.location("expect"),
-            help="write expect: {verdict: certified}, or remove it",
+            help=f"write expect: {{{'metric: holds' if spec.lacks else 'verdict: certified'}}}, or remove it",
         )

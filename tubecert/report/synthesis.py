@@ -69,6 +69,8 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
     if file is None:
         return [*parts, *_failure(data, system.states)]
     certify = f"certify with it: tubecert certify {visible(system.path)} --metric {target}"
+    if system.lacks:
+        certify = f"to certify with it, add {' and '.join(system.lacks)} to {visible(system.path)}"
     return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
 
 

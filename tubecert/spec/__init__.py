@@ -18,7 +18,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 
 from tubecert.spec.canonical import canonical
 from tubecert.spec.codes import CODES
-from tubecert.spec.load import load, load_text
+from tubecert.spec.load import load, load_question, load_text
 from tubecert.spec.override import Setting
 from tubecert.spec.types import (
     Adaptation,
@@ -72,5 +72,6 @@ __all__ = [
     "Vector",
     "canonical",
     "load",
+    "load_question",
     "load_text",
 ]

@@ -37,16 +37,9 @@ def canonical(spec: Spec) -> dict[str, Any]:
         "name": spec.name,
         "system": _system(spec),
         "safe_set": {name: _numbers(side) for name, side in zip(spec.states, spec.safe_set, strict=True)},
-        "uncertainty": _uncertainty(spec),
-        "trajectory": _trajectory(spec),
-        "initial_state": _initial_state(spec),
-        "tube": _tube(spec.tube),
-        "adaptation": {
-            "A_m": "auto" if (g := spec.adaptation.predictor_gain) is None else number_text(-g),
-            "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
-        },
-        "conditions": {} if spec.decides is None else {"decides": spec.decides},
     }
+    if not spec.lacks:  # else it is about a metric alone
+        data |= _loop(spec)
     if spec.metric is not None:
         data["metric"] = _metric(spec)
     elif spec.synthesis is not None:
@@ -55,6 +48,8 @@ def canonical(spec: Spec) -> dict[str, Any]:
         data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
         if spec.expect.verdict is not None:
             data["expect"]["verdict"] = spec.expect.verdict
+        if spec.expect.metric is not None:
+            data["expect"]["metric"] = spec.expect.metric
     if spec.obstacles:
         data["obstacles"] = [_obstacle(obstacle) for obstacle in spec.obstacles]
     if spec.limits:
@@ -69,6 +64,21 @@ def canonical(spec: Spec) -> dict[str, Any]:
             **_given(bound=wind.bound, rate=wind.rate),
         }
     return data
+
+
+def _loop(spec: Spec) -> dict[str, Any]:
+    """What every certificate is about, beside a system and its metric."""
+    return {
+        "uncertainty": _uncertainty(spec),
+        "trajectory": _trajectory(spec),
+        "initial_state": _initial_state(spec),
+        "tube": _tube(spec.tube),
+        "adaptation": {
+            "A_m": "auto" if (g := spec.adaptation.predictor_gain) is None else number_text(-g),
+            "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
+        },
+        "conditions": {} if spec.decides is None else {"decides": spec.decides},
+    }
 
 
 def _system(spec: Spec) -> dict[str, Any]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
 from tubecert.errors import SpecError
-from tubecert.findings import Finding, capped
+from tubecert.findings import Finding, Location, capped
 from tubecert.spec import codes
 from tubecert.spec.boxes import read_box, read_units
 from tubecert.spec.document import MappingNode, Scalar, compose
@@ -52,7 +52,7 @@ from tubecert.spec.types import (
 VERSION: Final = 1
 
 _SYSTEM = ("tubecert", "name", "system", "safe_set")
-_REQUIRED = (*_SYSTEM, "uncertainty", "trajectory")
+_LOOP = ("uncertainty", "trajectory")
 _FORMATS = (
     (
         "tubecert-certificate/",
@@ -65,13 +65,12 @@ _FORMATS = (
         "give it beside a specification: tubecert certify SPEC --metric FILE",
     ),
 )
+_METRIC = ("metric", "expect")  # all that a question about a metric alone has beside its system
 _OPTIONAL = (
     "initial_state",
-    "metric",
     "tube",
     "adaptation",
     "conditions",
-    "expect",
     "obstacles",
     "limits",
     "simulation",
@@ -79,14 +78,21 @@ _OPTIONAL = (
     "disturbance",
 )
 
+Reads: TypeAlias = Literal["whole", "question", "plant", "system"]
+
 
 def load(path: str, settings: Sequence[Setting] = ()) -> Spec:
     """The specification in a file, with the keys that are set in place of its own.
 
     Raises `TargetError` if the file cannot be read and `SpecError` with every problem, in the order of the
-    file.
+    file; that it asks about a metric alone is one.
     """
     return load_source(read_source(path), settings)
+
+
+def load_question(path: str, settings: Sequence[Setting] = ()) -> Spec:
+    """The same, also of a file that asks about a metric alone: `Spec.lacks` says so. Raises as `load` does."""
+    return load_source(read_source(path), settings, "question")
 
 
 def load_system(path: str, settings: Sequence[Setting] = ()) -> Spec:
@@ -94,7 +100,7 @@ def load_system(path: str, settings: Sequence[Setting] = ()) -> Spec:
 
     The specification is that of rest in the middle of the safe set without uncertainty. Raises as `load` does.
     """
-    return load_source(read_source(path), settings, alone=True)
+    return load_source(read_source(path), settings, "system")
 
 
 def load_plant(path: str, settings: Sequence[Setting] = ()) -> Spec:
@@ -103,23 +109,28 @@ def load_plant(path: str, settings: Sequence[Setting] = ()) -> Spec:
     Of one that lacks either, `Spec.lacks` says what, and system, safe set, metric and tube are read; the rest is as
     `load_system` leaves it. Raises as `load` does.
     """
-    return load_source(read_source(path), settings, partial=True)
+    return load_source(read_source(path), settings, "plant")
 
 
-def load_text(text: str, file: str = "<text>") -> Spec:
+def load_text(text: str, file: str = "<text>", reads: Reads = "whole") -> Spec:
     """The specification in a text; `file` is what findings call it."""
-    return load_source(Source.of(file, text))
+    return load_source(Source.of(file, text), reads=reads)
 
 
 def again(spec: Spec, settings: Sequence[Setting]) -> Spec:
     """The specification in the same text, with these keys set in place of those it was read with."""
-    return load_source(Source.of(spec.path, spec.source), settings) if settings else spec
+    return load_source(Source.of(spec.path, spec.source), settings, "question") if settings else spec
 
 
-def load_source(
-    source: Source, settings: Sequence[Setting] = (), *, alone: bool = False, partial: bool = False
-) -> Spec:
-    """The specification in a source; see `load_system` for a system `alone`, `load_plant` for one in part."""
+def whole(spec: Spec) -> Spec:
+    """The same specification; raises `SpecError` if it asks about a metric alone."""
+    if spec.lacks:
+        raise SpecError([_of_metric_alone(spec.path, spec.location("metric"))])
+    return spec
+
+
+def load_source(source: Source, settings: Sequence[Setting] = (), reads: Reads = "whole") -> Spec:
+    """The specification in a source; see `load`, `load_question`, `load_plant` and `load_system`."""
     check_limits(source)
     node, findings = compose(source)
     node, misplaced = put(node, settings)
@@ -128,7 +139,7 @@ def load_source(
     reader.findings.extend(findings)
     spec = None
     if not any(finding.code in (codes.YAML_SYNTAX, codes.LIMIT) for finding in findings):
-        spec = _read(root_field(reader, node), settings, alone=alone, partial=partial)
+        spec = _read(root_field(reader, node), settings, reads)
     if reader.findings or spec is None:
         raise SpecError(_ordered(reader.findings))
     return spec
@@ -141,22 +152,24 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
     return capped(sorted(findings, key=position), codes.LIMIT)
 
 
-def _read(root: Field, settings: Sequence[Setting], *, alone: bool, partial: bool) -> Spec | None:
+def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
     if _is_another_file(root):
         return None
-    entries = (
-        root.mapping(required=_SYSTEM, optional=(*_REQUIRED, *_OPTIONAL))
-        if alone or partial
-        else root.mapping(required=_REQUIRED, optional=_OPTIONAL)
+    alone = _asks_about_metric(root)
+    in_part = alone or reads in ("plant", "system")
+    entries = root.mapping(
+        required=_SYSTEM if in_part else (*_SYSTEM, *_LOOP), optional=(*_LOOP, *_METRIC, *_OPTIONAL)
     )
     if entries is None:
         return None
-    lacks = tuple(key for key in _REQUIRED if key not in entries) if partial else ()
-    if alone or lacks:
-        beside = ("metric", "expect") if alone else ("metric", "tube")
+    if alone and reads == "whole":
+        root.reader.findings.append(_of_metric_alone(root.reader.source.file, entries["metric"].location))
+    lacks = tuple(key for key in _LOOP if key not in entries) if in_part and reads != "system" else ()
+    if lacks or reads == "system":
+        beside = ("metric", "tube") if reads == "plant" else _METRIC
         entries = {key: entries[key] for key in (*_SYSTEM, *beside) if key in entries}
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
@@ -172,11 +185,30 @@ def _read(root: Field, settings: Sequence[Setting], *, alone: bool, partial: boo
     if system is None or names is None:
         return None  # without names nothing else can be read
     names = with_outputs(names, system.get("outputs"))
-    spec = _read_named(root.reader, entries, system, name, names)
+    spec = _read_named(root.reader, entries, system, name, names, alone=alone)
     return (
         None
         if spec is None
         else replace(spec, settings=tuple((each.path, each.text) for each in settings), lacks=lacks)
+    )
+
+
+def _asks_about_metric(root: Field) -> bool:
+    """Whether there is a metric, given and not asked for, and nothing of a plan, a loop or a tube."""
+    found = {key.text: node for key, node in root.node.pairs} if isinstance(root.node, MappingNode) else {}
+    own = found.get("metric")
+    wanted = isinstance(own, MappingNode) and any(key.text == "synthesise" for key, _ in own.pairs)
+    return own is not None and not wanted and not found.keys() & {*_LOOP, *_OPTIONAL}
+
+
+def _of_metric_alone(file: str, place: Location | None) -> Finding:
+    """That there is nothing to certify in a question about a metric alone."""
+    return Finding(
+        code=codes.MISSING_KEY,
+        message="this specification asks about a metric alone: it has neither uncertainty nor trajectory",
+        location=place,
+        help=f"`tubecert verify {file}` decides it; for a tube around a plan, add the sections uncertainty, "
+        "trajectory and tube",
     )
 
 
@@ -205,7 +237,13 @@ def _in_the_middle(
 
 
 def _read_named(
-    reader: Reader, entries: dict[str, Field], system: dict[str, Field], name: str | None, names: Names
+    reader: Reader,
+    entries: dict[str, Field],
+    system: dict[str, Field],
+    name: str | None,
+    names: Names,
+    *,
+    alone: bool,
 ) -> Spec | None:
     f, B = system.get("f"), system.get("B")
     dynamics = read_dynamics(f, B, names)
@@ -217,14 +255,14 @@ def _read_named(
     plan = read_trajectory(trajectory, names) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     x0 = start.x0
-    if box is not None and not entries.keys() & {"uncertainty", "trajectory"}:  # as `load_system` leaves it
+    if box is not None and not entries.keys() & {*_LOOP}:  # as `load_system` leaves it
         plan, uncertainty = at_rest(entries["safe_set"], box, len(names.inputs))
         x0 = tuple((low + high) / 2 for low, high in box)
     plan = completed(plan, x0) if plan else None
     metric, synthesis = _metric(entries.get("metric"), names)
     tube = read_tube(entries.get("tube"), names)
     adaptation = read_adaptation(entries.get("adaptation"), names)
-    expect = read_expectation(entries.get("expect"), names)
+    expect = read_expectation(entries.get("expect"), names, alone=alone)
     obstacles = read_obstacles(entries.get("obstacles"), names)
     limits = read_limits(limits_of(entries.get("limits"), entries.get("hardware")), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)

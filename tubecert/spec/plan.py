@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, get_args
 
-from tubecert.expression import ZERO, constant, substitute, to_text
+from tubecert.expression import ZERO, ExpressionError, constant, parse_number, substitute, to_text
 from tubecert.spec import codes
 from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
 from tubecert.spec.document import MappingNode, Scalar
@@ -280,10 +280,10 @@ def read_initial_state(
         return InitialState(x0=planned(), within=radius)
     (given,) = entries.values()
     if isinstance(given.node, MappingNode):
-        ends = _named_ends(given, planned, names)
+        ends = _named_ends(given, planned, names, point="at" in entries)
     else:
         items = given.items(len(names.states), "numbers") or []
-        ends = [_ends(item, names) for item in items]
+        ends = [_ends(item, names, point="at" in entries) for item in items]
     box = tuple(end for end in ends if end is not None)
     if len(box) < len(names.states):
         return InitialState(x0=None)
@@ -297,7 +297,7 @@ def read_initial_state(
 
 
 def _named_ends(
-    field: Field, planned: Callable[[], Vector | None], names: Names
+    field: Field, planned: Callable[[], Vector | None], names: Names, *, point: bool
 ) -> list[tuple[Fraction, Fraction] | None]:
     """Values or ranges by state; a state that is not named starts on the plan."""
     entries = field.mapping(optional=names.states)
@@ -307,16 +307,19 @@ def _named_ends(
     found: list[tuple[Fraction, Fraction] | None] = []
     for i, name in enumerate(names.states):
         if name in entries:
-            found.append(_ends(entries[name], names))
+            found.append(_ends(entries[name], names, point=point))
         else:
             found.append(None if start is None else (start[i], start[i]))
     return found
 
 
-def _ends(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
-    """A range, or a number, which is one without width; with pi in it, the least one that contains it."""
-    single = isinstance(field.node, Scalar)
-    fields = [field, field] if single else field.items(2, "numbers, or one number") or []
+def _ends(field: Field, names: Names, *, point: bool = False) -> tuple[Fraction, Fraction] | None:
+    """A range, of a `point` also a number, one without width; with pi in it, the least one that contains it."""
+    if point and isinstance(field.node, Scalar):
+        fields = [field, field]
+    else:
+        what = "numbers, or one number" if point else "numbers"
+        fields = field.items(2, what, _of_one_number(field, names)) or []
     if not fields:
         return None
     low, high = fields[0].number(names.values, side="below"), None
@@ -330,6 +333,22 @@ def _ends(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
         )
         return None
     return low, high
+
+
+def _of_one_number(field: Field, names: Names) -> str:
+    """The two ways to write a number that stands where a range belongs; empty for anything else."""
+    text = field.node.text.strip() if isinstance(field.node, Scalar) else ""
+    try:
+        value = parse_number(text, names.values)
+    except ExpressionError:
+        return ""
+    name = "" if field.key is None else f"{field.key.text}: "
+    point = f"{name}[{text}, {text}]"
+    if value == 0:
+        return f"write {point}"
+    size = text.removeprefix("-")
+    minus = f"-({size})" if set(size) & {"+", "-"} else f"-{size}"
+    return f"write {name}[{minus}, {size}] for the interval, {point} for the point"
 
 
 def _has(field: Field, key: str) -> bool:

@@ -16,6 +16,7 @@ from tubecert.spec.reader import Field
 from tubecert.spec.types import Adaptation, Expectation, Tube
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
+METRICS: Final = ("holds", "refuted", "undecided")  # what may be known of one
 RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
 
 _KEYS: Final = tuple(item.name for item in fields(Tube))  # of `tube`
@@ -161,12 +162,19 @@ def read_decides(field: Field | None) -> str | None:
     return word if word is None or word == ALL else name_of(word).letter
 
 
-def read_expectation(field: Field | None, names: Names) -> Expectation | None:
-    """Locked results: a verdict, and [least, most] of numbers of the certificate."""
-    entries = field.mapping(optional=("verdict", *RANGES)) if field else None
+def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expectation | None:
+    """Locked results: verdicts, and [least, most] of numbers of the certificate; `alone`: of a metric alone."""
+    entries = field.mapping(optional=("verdict", "metric", *RANGES)) if field else None
     if entries is None:
         return None
+    for key in entries.keys() - {"metric", "largest_rate"} if alone else ():
+        entries[key].fail(
+            codes.RANGE,
+            f"{entries[key].path} in a question about a metric alone",
+            f"write metric: {', '.join(METRICS)}; the number that can be expected is largest_rate",
+        )
     verdict = entries["verdict"].word(VERDICTS) if "verdict" in entries else None
+    metric = entries["metric"].word(METRICS) if "metric" in entries else None
     ranges = []
     for key in RANGES:
         limits = entries[key].numbers(2, names.values) if key in entries else None
@@ -174,4 +182,4 @@ def read_expectation(field: Field | None, names: Names) -> Expectation | None:
             entries[key].fail(codes.RANGE, f"{entries[key].path}: the range is empty", "write [least, most]")
         elif limits:
             ranges.append((key, (limits[0], limits[1])))
-    return Expectation(verdict=verdict, ranges=tuple(ranges))
+    return Expectation(verdict=verdict, metric=metric, ranges=tuple(ranges))

@@ -219,9 +219,10 @@ class Adaptation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expectation:
-    """A locked result: a verdict and ranges in the certificate's own words."""
+    """A locked result: a verdict, what is known of the metric, and ranges in the certificate's own words."""
 
     verdict: str | None
+    metric: str | None
     ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...]
 
 
@@ -352,9 +353,7 @@ class Spec:
     hardware: Hardware | None = None
     disturbance: Disturbance | None = None
     settings: tuple[tuple[str, str], ...] = ()  # keys set by the command line, with their texts
-    lacks: tuple[
-        str, ...
-    ] = ()  # sections that a file may lack of which a metric alone is asked (`load_plant`)
+    lacks: tuple[str, ...] = ()  # sections that a file need not have that asks about a metric alone
     locations: Places = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:

@@ -14,8 +14,9 @@ _LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "larges
 def read_idle(own: Members, plant: Plant) -> None:
     """Known keys all the same."""
     if "expect" in own:
-        locked = own["expect"].closed(optional=("verdict", *_LOCKED))
-        locked.get("verdict", Node.text)
+        locked = own["expect"].closed(optional=("verdict", "metric", *_LOCKED))
+        for key in ("verdict", "metric"):
+            locked.get(key, Node.text)
         for key in _LOCKED:
             locked.get(key, lambda item: several(item, 2))
     if "simulation" in own:
