@@ -80,7 +80,7 @@ def test_the_verdict_comes_first_with_its_numbers():
 
 def test_a_certificate_is_put_in_one_sentence():
     text = " ".join(shown(certified()).split())
-    assert "the state stays within 0.04124 of the plan for all t >= 0, under the assumptions below" in text
+    assert "the state stays within 0.04124 of the plan for all t >= 0 if it starts at 0, under the" in text
     finite = certified()
     finite["spec"]["effective"]["trajectory"]["horizon"] = "2.5"
     assert "for 0 <= t <= 2.5 s" in " ".join(shown(finite).split())

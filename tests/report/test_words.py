@@ -67,12 +67,12 @@ NAMED = ("for", "t", "x", "y", "z", "v", "it")
 PLAIN = frozenset(
     re.findall(
         r"\w+",
-        """a add adds after all alone an and another are around as at be behind below beside between bounded by
-    can check claim command computes control danger delayed do does each every exactly fails false
+        """a add adds after all alone an and another anywhere are around as at be behind below beside between bounded by
+    can check claim command computes control danger delayed do does each else every exactly fails false
     follow from full gain give gives good half has holding however in is its lag large later left
     lengths lies long make marked measurements most ms must narrower nearest needs neither next no
     nor not nothing of on one or over own pushes relied rest rests row run safe same say says set
-    sets shows sign so specified stated stays supports rates take takes that the their them these
+    sets shows sign so specified starts stated stays supports rates take takes that the their them these
     this time to twice under unknown up versions was what where widest with within without would""",
     )
 )

@@ -1,4 +1,4 @@
-"""What a result claims, in words: its time, its plans, its radius, points."""
+"""What a result claims, in words: its time, its start, its plans, its radius, points."""
 
 from __future__ import annotations
 
@@ -6,19 +6,38 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from tubecert.certificate.result import Plans, Result
-from tubecert.digits import short
+from tubecert.digits import end, short
 from tubecert.enclosure.constant import Witness
 
 
 def span(result: Result) -> str:
     """The time that is claimed."""
-    end = horizon(result)
-    return "for all t >= 0" if end is None else f"for 0 <= t <= {short(end, 12)} s"
+    last = horizon(result)
+    return "for all t >= 0" if last is None else f"for 0 <= t <= {short(last, 12)} s"
 
 
 def plan_words(result: Result) -> str:
     """What the state stays close to."""
     return "the plan" if result.claim.plans is None else "every plan of the family"
+
+
+def start_words(result: Result) -> str:
+    """Where the state starts: `at q = 0.1, all else 0`, `anywhere with q in [-0.1, 0.1]`, `within 0.1 of ...`."""
+    start = result.claim.start
+    if start.within is not None:
+        whose = "the plan" if result.claim.plans is None else "its plan"
+        return f"within {end(Fraction(start.within))} of the start of {whose}"
+    states = result.spec.effective.system.states
+    sides = start.box or {name: (at, at) for name, at in zip(states, start.at or (), strict=False)}
+    told = [_side(name, *map(Fraction, ends)) for name, ends in sides.items() if set(ends) != {"0"}]
+    if len(told) < len(sides):
+        told.append("all else 0" if told else "0")
+    return f"{'anywhere with' if any(' in [' in each for each in told) else 'at'} {', '.join(told)}"
+
+
+def _side(name: str, low: Fraction, high: Fraction) -> str:
+    """What a state may be; one that is given with pi in it lies between two numbers of 30 digits."""
+    return f"{name} = {end(low)}" if end(low) == end(high) else f"{name} in [{end(low)}, {end(high)}]"
 
 
 def family_words(plans: Plans) -> str:

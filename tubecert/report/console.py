@@ -96,7 +96,8 @@ def _promise(result: Result) -> Text:
     loops = "; or ".join(gains.words() for gains in chosen)
     return Text(
         f"With this metric, {loops}, the state stays within {reach.extent(result)} of "
-        f"{claimed.plan_words(result)} {claimed.span(result)}, under the assumptions below.{_by_state(result)}"
+        f"{claimed.plan_words(result)} {claimed.span(result)} if it starts {claimed.start_words(result)}, under the "
+        f"assumptions below.{_by_state(result)}"
     )
 
 

@@ -255,6 +255,7 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
     for line in reach.clearances(result):
         yield "obstacles", Cell(text=line)
     yield "claimed", Cell(text=claimed.span(result))
+    yield "starts", Cell(text=claimed.start_words(result))
     for words, rest in reach.long_run(result):
         yield f"in the long run, {words}", Cell(text=rest)
 

@@ -11,7 +11,7 @@ from rich.text import Text
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
-from tubecert.report.claimed import family_words, horizon, radius
+from tubecert.report.claimed import family_words, horizon, radius, start_words
 from tubecert.report.gains import NAMES
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
@@ -32,6 +32,8 @@ def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
         lines[0] += " (Euclidean norm over all states)"
     if result.claim.plans is not None:
         lines.append(f"around every plan with {family_words(result.claim.plans)}")
+    if result.verdict is not Verdict.CERTIFIED:  # else it stands in the sentence above
+        lines.append(f"for a state that starts {start_words(result)}")
     if tube.half_widths:
         lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
         lines += asked_for(result, tube.half_widths)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.expression import free_symbols, parse, symbol
 from tubecert.printable import visible
 from tubecert.report.claimed import place
 from tubecert.report.cut import cut_short
@@ -92,13 +93,21 @@ def _proven(file: MetricFile) -> list[Text]:
         f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in file.verified_on.items()
     )
     solver = file.solver
-    depends = ", ".join(solver.variables) if solver.degree else ""
-    kind = f"of degree {solver.degree} in {depends}" if depends else "constant"
     found = f"{solver.digits} digits ({solver.route})"
     return [
         Text(f"proven on {sides}: C1 and C2 by branch and bound, C3 exactly"),
-        Text(f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I; W is {kind}, {found}"),
+        Text(
+            f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I; W {_kind(file)}, {found}"
+        ),
     ]
+
+
+def _kind(file: MetricFile) -> str:
+    """What W depends on, read from its expressions: what was asked for may be another thing."""
+    states = {name: symbol(name) for name in file.verified_on}
+    entries = [parse(text, symbols=states).expression for row in file.dual_metric for text in row]
+    moving = [name for name in states if name in free_symbols(entries)]
+    return f"depends on {', '.join(moving)}" if moving else "is constant"
 
 
 def _limits(limits: RateLimits) -> list[Text]:
