@@ -69,7 +69,7 @@ PLAIN = frozenset(
         r"\w+",
         """a add adds after all alone an and another anywhere are around as at be behind below beside between bounded by
     can check claim command computes control danger delayed do does each else every exactly fails false
-    follow from full gain give gives good half has holding however in is its lag large later left
+    follow from full gain give gives good half has holding however if in is its lag large later left
     lengths lies long make marked measurements most ms must narrower nearest needs neither next no
     nor not nothing of on one or over own pushes relied rest rests row run safe same say says set
     sets shows sign so specified starts stated stays supports rates take takes that the their them these
