@@ -238,7 +238,7 @@ def test_the_choices_are_those_of_the_readers():
     properties = SCHEMAS["spec"]["properties"]
     assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
     assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
-    assert properties["expect"]["properties"]["metric"]["enum"] == list(METRICS)
+    assert properties["expect"]["properties"]["metric"]["enum"] == list(METRICS.values())
     assert set(properties["expect"]["properties"]) == {"verdict", "metric", *RANGES}
     decides = properties["conditions"]["properties"]["decides"]["enum"]
     assert set(map(str, decides)) == {*words_of(), ALL}

@@ -16,6 +16,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
 from tubecert.pipeline.verification import Verified
 from tubecert.spec import Spec
+from tubecert.spec.settings import METRICS
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import input_title, message, title
@@ -156,8 +157,7 @@ def metric_compared(spec: Spec, found: Outcome) -> list[Finding]:
 
 
 def _metric(spec: Spec, expected: str, found: Outcome) -> Iterator[Finding]:
-    known = found.metric
-    told = "not decided" if known is None else "holds" if known is Verdict.CERTIFIED else str(known)
+    told = "not decided" if found.metric is None else METRICS[found.metric]
     if told != expected:
         message = f"metric: {told}, expected: {expected}"
         yield _mismatch(spec, "expect.metric", message, found)

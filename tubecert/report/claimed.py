@@ -29,15 +29,14 @@ def start_words(result: Result) -> str:
         return f"within {end(Fraction(start.within))} of the start of {whose}"
     states = result.spec.effective.system.states
     sides = start.box or {name: (at, at) for name, at in zip(states, start.at or (), strict=False)}
-    told = [_side(name, *map(Fraction, ends)) for name, ends in sides.items() if set(ends) != {"0"}]
+    shown = {
+        name: [end(Fraction(text)) for text in ends] for name, ends in sides.items() if set(ends) != {"0"}
+    }
+    # with pi in it, a number is a range as wide as its 30th digit
+    told = [f"{name} = {a}" if a == b else f"{name} in [{a}, {b}]" for name, (a, b) in shown.items()]
     if len(told) < len(sides):
         told.append("all else 0" if told else "0")
-    return f"{'anywhere with' if any(' in [' in each for each in told) else 'at'} {', '.join(told)}"
-
-
-def _side(name: str, low: Fraction, high: Fraction) -> str:
-    """What a state may be; one that is given with pi in it lies between two numbers of 30 digits."""
-    return f"{name} = {end(low)}" if end(low) == end(high) else f"{name} in [{end(low)}, {end(high)}]"
+    return f"{'anywhere with' if any(a != b for a, b in shown.values()) else 'at'} {', '.join(told)}"
 
 
 def family_words(plans: Plans) -> str:

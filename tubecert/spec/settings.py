@@ -14,9 +14,10 @@ from tubecert.spec.document import Scalar
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.types import Adaptation, Expectation, Tube
+from tubecert.verdict import Verdict
 
 VERDICTS: Final = ("certified", "refuted", "undecided")
-METRICS: Final = ("holds", "refuted", "undecided")  # what may be known of one
+METRICS: Final = {Verdict.CERTIFIED: "holds", Verdict.REFUTED: "refuted", Verdict.UNDECIDED: "undecided"}
 RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
 
 _KEYS: Final = tuple(item.name for item in fields(Tube))  # of `tube`
@@ -171,10 +172,10 @@ def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expec
         entries[key].fail(
             codes.RANGE,
             f"{entries[key].path} in a question about a metric alone",
-            f"write metric: {', '.join(METRICS)}; the number that can be expected is largest_rate",
+            f"write metric: {', '.join(METRICS.values())}; the number that can be expected is largest_rate",
         )
     verdict = entries["verdict"].word(VERDICTS) if "verdict" in entries else None
-    metric = entries["metric"].word(METRICS) if "metric" in entries else None
+    metric = entries["metric"].word(tuple(METRICS.values())) if "metric" in entries else None
     ranges = []
     for key in RANGES:
         limits = entries[key].numbers(2, names.values) if key in entries else None
