@@ -27,16 +27,20 @@ def start_words(result: Result) -> str:
     if start.within is not None:
         whose = "the plan" if result.claim.plans is None else "its plan"
         return f"within {end(Fraction(start.within))} of the start of {whose}"
-    states = result.spec.effective.system.states
-    sides = start.box or {name: (at, at) for name, at in zip(states, start.at or (), strict=False)}
-    shown = {
-        name: [end(Fraction(text)) for text in ends] for name, ends in sides.items() if set(ends) != {"0"}
-    }
-    # with pi in it, a number is a range as wide as its 30th digit
-    told = [f"{name} = {a}" if a == b else f"{name} in [{a}, {b}]" for name, (a, b) in shown.items()]
+    system = result.spec.effective.system
+    sides = start.box or {name: (at, at) for name, at in zip(system.states, start.at or (), strict=False)}
+    places = {name: _place(*ends) for name, ends in sides.items() if set(ends) != {"0"}}
+    told = [f"{name} {where} {system.units.get(name, '')}".rstrip() for name, where in places.items()]
     if len(told) < len(sides):
         told.append("all else 0" if told else "0")
-    return f"{'anywhere with' if any(a != b for a, b in shown.values()) else 'at'} {', '.join(told)}"
+    wide = any(where.startswith("in") for where in places.values())
+    return f"{'anywhere with' if wide else 'at'} {', '.join(told)}"
+
+
+def _place(low: str, high: str) -> str:
+    """`= 0.1`, or `in [0, 0.1]`; with pi in it, a number is a range as wide as its 30th digit."""
+    a, b = end(Fraction(low)), end(Fraction(high))
+    return f"= {a}" if a == b else f"in [{a}, {b}]"
 
 
 def family_words(plans: Plans) -> str:
