@@ -308,7 +308,7 @@ def test_the_radius_is_rounded_up(rho):
 def test_what_is_not_certified_has_no_gains_to_use():
     result = tc.certify(DATA, bandwidth=1, adaptation_rate=10)
     assert not result.certified
-    assert (result.omega, result.Gamma, result.sample_time) == (None, None, None)
+    assert (result.omega, result.Gamma) == (None, None)
     assert result.reasons[0].message
     assert not [gains for gains in result.gains if gains.decides and gains.certified]
     assert "not certified" in result._repr_html_()

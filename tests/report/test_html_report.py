@@ -336,7 +336,7 @@ def test_which_figures_there_are(orbit, regulated, outside):
             for f in block.figures
         }
 
-    gains = {"trade-off", "sample-time"}
+    gains = {"trade-off"}
     assert keys(orbit) == gains | {"tube-0-1", "suprema-0-1", "state-0", "state-1", "input-0"}
     over_time = {"state-0", "state-1", "state-2", "input-0"}
     planes = {f"{w}-{p}" for w in ("tube", "suprema") for p in ("0-1", "0-2", "1-2")}

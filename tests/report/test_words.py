@@ -69,11 +69,11 @@ PLAIN = frozenset(
         r"\w+",
         """a add adds after all alone an and another anywhere are around as at be behind below beside between bounded by
     can check claim command computes control danger delayed do does each else every exactly fails false
-    follow from full gain give gives good half has holding however if in is its lag large later left
+    follow from full gain give gives good half has holding however if in is its known lag large largest later left
     lengths lies long make marked measurements most ms must narrower nearest needs neither next no
-    nor not nothing of on one or over own pushes relied rest rests row run safe same say says set
+    nor not nothing of on one or over own part pushes ranges relied rest rests row run safe same say says section set
     sets shows sign so specified starts stated stays supports rates take takes that the their them these
-    this time to twice under unknown up versions was what where widest with within without would""",
+    this time to twice under unknown up value versions was what where widest with within without would""",
     )
 )
 
@@ -135,16 +135,7 @@ def test_every_word_of_a_comparison_of_metrics_has_a_page():
 @pytest.mark.slow
 def test_every_label_of_the_first_screen_has_a_page(screen):
     found = labels(screen)
-    assert {
-        "Gains",
-        "margin left",
-        "omega",
-        "Ts",
-        "Machine",
-        "what fills the tube",
-        "proven tube",
-        "filter",
-    } <= set(found)
+    assert {"Gains", "margin left", "omega", "Gamma"} <= set(found)
     assert [word for word in found if pages.find(word) is None] == []
     assert unexplained(screen) == []
 
@@ -153,18 +144,15 @@ def test_every_label_of_the_first_screen_has_a_page(screen):
 @pytest.mark.parametrize("kind", SCREENS)
 def test_every_label_of_every_first_screen_has_a_page(kind):
     text, conditions = SCREENS[kind]
-    roughly = {"gap": Fraction(1, 10)} if text == BLOWN else {}  # as other tests make it
-    shown = first_screen(text, conditions=conditions, bare=text == IN_WINDOWS, **roughly)  # so is this
+    shown = first_screen(text, conditions=conditions)
     assert len(labels(shown)) >= 5
     assert [word for word in labels(shown) if pages.find(word) is None] == []
     assert [word for word in WORDS if word in shown and pages.find(word) is None] == []
     assert unexplained(shown) == []
 
 
-def test_what_fills_a_tube_and_every_condition_has_a_page():
-    assert [
-        word for word in [*CAUSES.values(), "26a", "26b", "26c", "C1", "C2", "C3"] if not pages.find(word)
-    ] == []
+def test_every_condition_has_a_page():
+    assert [word for word in ("26a", "26b", "26c", "C1", "C2", "C3") if not pages.find(word)] == []
 
 
 def test_words_of_the_theory_have_a_page():
@@ -198,10 +186,8 @@ def test_numbers_say_their_unit():
         "rho_a",
         "epsilon",
         "half-width",
-        "level",
         "omega",
         "Gamma",
-        "Ts",
         "rate",
         "h",
         "noise",
@@ -217,7 +203,7 @@ def test_numbers_say_their_unit():
         ("half-widths", "half-width"),
         ("margin  left", "margin"),
         ("ω", "omega"),
-        ("input gain", "input_gain (beta_O)"),
+        ("input gain", "beta/sqrt(a)"),
     ],
 )
 def test_spellings(asked, word):

@@ -19,14 +19,12 @@ from tubecert import pipeline
 from tubecert.cli.app import app
 from tubecert.errors import SpecError, TargetError
 from tubecert.executor import Cluster, Serial, WorkerError
-from tubecert.pipeline import Options, certify
+from tubecert.pipeline import Options
 from tubecert.report.figures_sweep import sweep_figures
 from tubecert.report.sweep import SweepTable, can_write_parquet
 from tubecert.spec import Setting
-from tubecert.spec.load import load_source
-from tubecert.spec.source import Source
 from tubecert.sweep.grid import Axis
-from tubecert.sweep.point import Task, memory_of, outcome
+from tubecert.sweep.point import Task, memory_of
 from tubecert.sweep.run import Sweep
 
 pytestmark = pytest.mark.timeout(240)
@@ -260,7 +258,7 @@ def test_figures_mark_every_point_that_is_not_certified(done):
     sweep = sweep_of(done[1], "tube.epsilon=.2,.4,1.2,-1")
     ordered = SweepTable.of("one", [Axis.of("tube.epsilon=.2,.4,1.2,2")], sweep.outcomes())
     figures = {figure.key: figure for figure in sweep_figures(ordered)}
-    assert {"sweep-rho", "sweep-bandwidth", "sweep-adaptation_rate", "sweep-sample_time"} <= figures.keys()
+    assert {"sweep-rho", "sweep-bandwidth", "sweep-adaptation_rate"} <= figures.keys()
     for figure in figures.values():
         drawing = ET.fromstring(figure.svg)
         classes = [mark.get("class") for mark in drawing.iter("rect")]
@@ -278,32 +276,6 @@ def test_figures_mark_every_point_that_is_not_certified(done):
         assert len(colored) + sum(name.startswith("cell ") for name in classes) == 4
         assert len(colored) == (0 if figure.key == "sweep-verdict" else 2)
     assert sweep_figures(SweepTable.of("one", sweep.axes, sweep.outcomes())) == []  # its values have no order
-
-
-@pytest.mark.slow
-def test_formulas_are_swept_beside_keys_and_those_as_printed_are_drawn_apart(tmp_path):
-    sweep = sweep_of(tmp_path / "out", "tube.epsilon=.2,.4", "formulas=as-printed,corrected")
-    sweep.run(Serial())
-    found = {point.number: each.result for point, each in sweep.outcomes()}
-    assert [found[k].formulas for k in (1, 2, 3, 4)] == ["as-printed", "corrected"] * 2
-    assert [str(found[k].verdict) for k in (1, 2)] == ["undecided", "certified"]
-    spec = load_source(Source.of("one.yaml", ONE), [Setting.of("tube.epsilon=.2")])
-    alone = certify(spec, Options(formulas="as-printed"))
-    assert found[1].to_json() == alone.to_json()
-    assert "--formulas as-printed" in sweep.task.command(sweep.points[0].settings)
-    assert "formulas" not in sweep.task.command(sweep.points[1].settings)
-    table = SweepTable.of("one", sweep.axes, sweep.outcomes())
-    gamma = next(each for each in sweep_figures(table) if each.key == "sweep-adaptation_rate")
-    legend = [words for _, words in gamma.legend]
-    assert [words.rpartition(", ")[2] for words in legend[:2]] == ["as-printed", "corrected"]
-    assert len(legend) == 3  # B has no formulas as printed
-    assert "prove nothing" in gamma.caption
-    classes = [mark.get("class") for mark in ET.fromstring(gamma.svg).iter("circle")]
-    assert sorted(classes) == ["dot a", "dot a", "dot b", "dot b", "dot m3", "dot m3"]
-    # the certificate of the other formulas is not taken for it
-    files = [tmp_path / "out" / "points" / f"000{k}.certificate.json" for k in (1, 2)]
-    files[1].replace(files[0])
-    assert outcome(sweep.task, sweep.points[0]) is None
 
 
 @pytest.mark.slow

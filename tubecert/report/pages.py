@@ -151,7 +151,7 @@ def _spelled() -> Mapping[str, WordPage]:
 def find(topic: str) -> Page | None:
     """The page of a word, a code, an equation's tag, or a constant; case matters only where it has to."""
     wanted = " ".join(topic.split())
-    if wanted in words():  # A, B, C and H are certificates before they are constants
+    if wanted in words():  # A and B are certificates before they are constants
         return words()[wanted]
     wanted = wanted[1:-1] if wanted.startswith("(") else wanted
     wanted = re.sub(r"^C([123])$", r"CCM_\1", wanted, flags=re.IGNORECASE)  # as reports call them
@@ -161,7 +161,7 @@ def find(topic: str) -> Page | None:
     for table in searched:
         if wanted in table:
             return table[wanted]
-    for spelled in (wanted, wanted.replace(" ", "_")):  # `input gain`, as sentences have it
+    for spelled in (wanted, wanted.replace(" ", "_")):  # `speed on plan`, as sentences have it
         for table in searched:
             folded = [page for key, page in table.items() if key.lower() == spelled.lower()]
             if len(folded) == 1:
