@@ -72,7 +72,7 @@ PLAIN = frozenset(
     follow from full gain give gives good half has holding however if in is its known lag large largest later left
     lengths lies long make marked measurements most ms must narrower nearest needs neither next no
     nor not nothing of on one or over own part pushes ranges relied rest rests row run safe same say says section set
-    sets shows sign so specified starts stated stays supports rates take takes that the their them these
+    sets shows sign so specified stand starts stated stays supports rates take takes that the their them these
     this time to twice under unknown up value versions was what where widest with within without would""",
     )
 )
