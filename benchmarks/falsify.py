@@ -23,7 +23,6 @@ CONFIGS = Path(__file__).parent.parent / "configs"
 SYSTEMS = {"two_state": 10_000, "three_state": 1_000}
 FEW = 100  # random runs of the comparisons
 FAR_BELOW = (Fraction(1, 10), Fraction(1, 1000))  # of omega, of Gamma
-TOO_SLOW = (1, 5, 20)  # times the sample time
 
 
 def main() -> None:
@@ -38,8 +37,6 @@ def main() -> None:
         few = min(FEW, asked.runs)
         _row(setting, loop_of(setting, "l1", Choice()), min(count, asked.runs), asked.seed)
         _row(setting, _far_below(setting), few, asked.seed)
-        for factor in TOO_SLOW:
-            _row(setting, _slower(setting, factor), few if factor > 1 else min(1000, asked.runs), asked.seed)
 
 
 def _setting(name: str) -> Setting:
@@ -52,11 +49,6 @@ def _far_below(setting: Setting) -> Loop:
     omega, Gamma = (Fraction(repr(proof[name])) for name in ("bandwidth", "adaptation_rate"))
     choice = Choice(bandwidth=omega * FAR_BELOW[0], adaptation_rate=Gamma * FAR_BELOW[1])
     return loop_of(setting, "l1", choice)
-
-
-def _slower(setting: Setting, factor: int) -> Loop:
-    Ts = Fraction(repr(setting.result["proof"]["sampled"]["sample_time"]))
-    return loop_of(setting, "sampled", Choice(sample_time=factor * Ts))
 
 
 def _row(setting: Setting, loop: Loop, count: int, seed: int) -> None:
@@ -88,8 +80,8 @@ def _notes(attack: Attack) -> str:
 def _words(loop: Loop) -> str:
     gains = loop.problem.gains
     assert gains is not None
-    fast = f"Gamma {gains.adaptation_rate:.4g}" if gains.adaptation_rate else f"Ts {gains.sample_time:.4g}"
-    return f"{loop.controller}, omega {gains.bandwidth:.4g}, {fast}, {'B/C' if loop.promise else 'chosen'}"
+    chosen = "B" if loop.promise else "chosen"
+    return f"{loop.controller}, omega {gains.bandwidth:.4g}, Gamma {gains.adaptation_rate:.4g}, {chosen}"
 
 
 if __name__ == "__main__":

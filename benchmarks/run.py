@@ -93,21 +93,6 @@ def growth() -> None:
         seconds, result = timed(lambda rho=rho: certify(spec, Options(epsilon=Fraction(rho))))
         reference = reference or seconds
         print(f"epsilon {rho}: {seconds:.2f} s ({seconds / reference:.2f} x), {result.verdict}")
-    _growth_with_windows(TRACKING.with_stem("two_state_windows"))
-
-
-def _growth_with_windows(path: Path) -> None:
-    """Certificate H of the two-state plan at 500 Hz against the number of windows."""
-    from tubecert.pipeline import Options, certify
-    from tubecert.spec import load_text
-
-    text, reference = path.read_text(encoding="utf-8"), None
-    for count in (1, 5, 10):
-        spec = load_text(text.replace("windows: [0.25, 0.5, 1, 1.5, 2.5]", f"windows: {count}"), str(path))
-        seconds, result = once(lambda spec=spec: certify(spec, Options()))
-        reference = reference or seconds
-        radius = result.sections["hardware"].radius
-        print(f"{count} windows: {seconds:.2f} s ({seconds / reference:.2f} x), radius {radius:.3g}")
 
 
 def once(work: Callable[[], object]) -> tuple[float, object]:
